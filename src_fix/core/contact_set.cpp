@@ -1,0 +1,24 @@
+#include "contact_set.h"
+
+namespace inelastic {
+
+void ContactSet::clear()
+{
+  first.clear();
+  second.clear();
+  normal.clear();
+  gap.clear();
+  impulse.clear();
+}
+
+void ContactSet::add(int first_particle, int second_particle, const double *unit_normal,
+                     double gap_value, double impulse_guess)
+{
+  first.push_back(first_particle);
+  second.push_back(second_particle);
+  normal.insert(normal.end(), unit_normal, unit_normal + 3);
+  gap.push_back(gap_value);
+  impulse.push_back(impulse_guess);
+}
+
+}    // namespace inelastic

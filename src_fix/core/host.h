@@ -1,0 +1,33 @@
+// What the solvers need from whatever runs them: the exchange between ranks and global reductions.
+// A host with one rank and no periodic images has nothing to do (SerialHost).
+
+#pragma once
+
+#include <cstddef>
+
+namespace inelastic {
+
+class Host {
+ public:
+  // Per-particle vectors (3 doubles each, owned particles first, then copies of particles that other
+  // ranks own): add the copies' values to their owners, then give every copy its owner's sum.
+  virtual void sum_over_copies(double *per_particle) = 0;
+
+  // Per-particle vectors: give every copy its owner's value.
+  virtual void share_with_copies(double *per_particle) = 0;
+
+  // Global sums and global maxima of a few numbers, in one communication.
+  virtual void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) = 0;
+
+ protected:
+  ~Host() = default;    // not virtual: hosts are never owned through this interface
+};
+
+class SerialHost final : public Host {
+ public:
+  void sum_over_copies(double *) override {}
+  void share_with_copies(double *) override {}
+  void reduce(double *, int, double *, int) override {}
+};
+
+}    // namespace inelastic

@@ -1,0 +1,43 @@
+// The projection of one step onto ALL constraints, with only those that matter in the problem.
+//
+// The set is generated (for the theory see Palmer, Aktulga and Gao, arXiv 2506.14097): solve with the
+// constraints at hand, let the source look at everything that can touch, add what the solution
+// violates, solve again from the impulses reached, until nothing is added. A source may also replace
+// the linearisation of a constraint whose gap is not convex (a concave wall) by one about the new
+// end-of-step position.
+
+#pragma once
+
+#include "contact_problem.h"
+#include "solver.h"
+
+#include <vector>
+
+namespace inelastic {
+
+class ConstraintSource {
+ public:
+  // Given the velocities (3 per particle) that solve the problem as it stands, adds the constraints
+  // that they violate by more than the tolerance and re-linearises where needed. Returns how many
+  // constraints this rank added or changed.
+  virtual long refine(const std::vector<double> &velocity, ContactProblem &problem) = 0;
+
+ protected:
+  ~ConstraintSource() = default;    // not virtual: sources are never owned through this interface
+};
+
+struct ProjectionResult {
+  bool converged = false;    // the solver met the tolerance in every round
+  bool complete = false;     // the last round left nothing to add or change
+  long iterations = 0;       // over all rounds
+  int rounds = 0;
+  Residual residual;         // of the last round
+};
+
+// On return `velocity` (3 per particle, copies included) holds the projection of
+// problem.predicted_velocity and problem.contacts.impulse the impulses.
+ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,
+                         const SolverLimits &limits, int max_rounds, Host &host,
+                         std::vector<double> &velocity);
+
+}    // namespace inelastic

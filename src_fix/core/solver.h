@@ -1,0 +1,78 @@
+// Solvers of the projection problem (contact_problem.h). All work on the dual: they look for the
+// impulses, and are judged by the same residual, in units of length:
+//
+//   feasibility       max over all constraints of       -w_c      (overlap left at the end of the step)
+//   complementarity   max over constraints with impulse of w_c    (gap left where a force acts)
+//
+// A solver takes its first guess from ContactSet::impulse if it warm-starts, and leaves its result
+// there.
+
+#pragma once
+
+#include "contact_problem.h"
+
+#include <memory>
+#include <string>
+
+namespace inelastic {
+
+struct Residual {
+  double feasibility = 0.0;        // [length], >= 0
+  double complementarity = 0.0;    // [length], >= 0
+};
+
+// Local to this rank unless a host reduces it.
+Residual residual(const double *gap_at_end, const double *impulse, std::size_t count);
+
+struct SolverLimits {
+  double tolerance = 0.0;    // [length], both residuals must come down to it
+  long max_iterations = 0;
+};
+
+struct SolverResult {
+  bool converged = false;
+  long iterations = 0;
+  Residual residual;
+};
+
+class Solver {
+ public:
+  virtual ~Solver() = default;
+  virtual SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) = 0;
+};
+
+// Accelerated projected gradient on the dual (Nesterov 1983; restarts after O'Donoghue and Candes,
+// Found. Comput. Math. 15 (2015) 715), in impulses scaled so that A has a unit diagonal. The step
+// 1/L follows the curvature met on the way, which costs no extra product with A; L is remembered
+// from one call to the next.
+class AcceleratedProjectedGradient final : public Solver {
+ public:
+  SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
+
+ private:
+  GapOperator gap_operator_;
+  double curvature_ = 0.0;    // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
+  std::vector<double> inverse_diagonal_;
+  std::vector<double> impulse_, impulse_before_, impulse_next_;
+  std::vector<double> gap_, gap_before_, gap_next_;
+};
+
+// The paper's solver: projected gradient with a fixed step from zero impulses, which stops on
+// feasibility alone. The step is 1 over the largest eigenvalue of A, from power iteration that is not
+// counted among the iterations.
+class Uzawa final : public Solver {
+ public:
+  SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
+
+ private:
+  GapOperator gap_operator_;
+  std::vector<double> gap_, product_;
+};
+
+// Largest eigenvalue of A = h G M^-1 G^T [time / mass], to a relative accuracy of about 1e-3.
+double largest_eigenvalue(const ContactProblem &problem, Host &host);
+
+// "apgd" or "uzawa"; nullptr for any other name.
+std::unique_ptr<Solver> make_solver(const std::string &name);
+
+}    // namespace inelastic

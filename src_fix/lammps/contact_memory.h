@@ -1,0 +1,71 @@
+// The contact forces of the last step, kept per atom so that they follow the atoms through neighbour
+// list rebuilds and from rank to rank: the first guess of the next step.
+
+#ifndef INELASTIC_CONTACT_MEMORY_H
+#define INELASTIC_CONTACT_MEMORY_H
+
+#include "lmptype.h"
+
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class ContactMemory {
+ public:
+  void resize(int atoms) { remembered_.resize(atoms); }
+
+  void forget(int atom) { remembered_[atom].clear(); }
+
+  // partner: the other atom's ID, or minus the wall's number.
+  void remember(int atom, tagint partner, double force)
+  {
+    remembered_[atom].push_back({partner, force});
+  }
+
+  // Zero when nothing is remembered.
+  double force(int atom, tagint partner) const
+  {
+    for (const Entry &entry : remembered_[atom])
+      if (entry.partner == partner) return entry.force;
+    return 0.0;
+  }
+
+  int number_of_partners(int atom) const { return static_cast<int>(remembered_[atom].size()); }
+
+  void copy(int from, int to) { remembered_[to] = remembered_[from]; }
+
+  // Buffer layout: number of partners, then partner and force of each.
+  static constexpr int packed_size(int partners) { return 1 + 2 * partners; }
+
+  int pack(int atom, double *buffer) const
+  {
+    int m = 0;
+    buffer[m++] = static_cast<double>(remembered_[atom].size());
+    for (const Entry &entry : remembered_[atom]) {
+      buffer[m++] = static_cast<double>(entry.partner);
+      buffer[m++] = entry.force;
+    }
+    return m;
+  }
+
+  // Adds what is in the buffer to what the atom has.
+  int unpack(int atom, const double *buffer)
+  {
+    int m = 0;
+    const int partners = static_cast<int>(buffer[m++]);
+    for (int k = 0; k < partners; ++k, m += 2)
+      remember(atom, static_cast<tagint>(buffer[m]), buffer[m + 1]);
+    return m;
+  }
+
+ private:
+  struct Entry {
+    tagint partner;
+    double force;
+  };
+  std::vector<std::vector<Entry>> remembered_;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

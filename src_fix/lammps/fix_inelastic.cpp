@@ -1,0 +1,1233 @@
+#include "fix_inelastic.h"
+
+#include "npz.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "force.h"
+#include "group.h"
+#include "memory.h"
+#include "modify.h"
+#include "neigh_list.h"
+#include "neighbor.h"
+#include "output.h"
+#include "pair.h"
+#include "region.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+using namespace FixConst;
+
+namespace {
+
+constexpr int MAX_ROUNDS = 100;                 // of adding constraints; a handful is usual
+constexpr int MAX_RELINEARISATIONS = 20;        // per step; each one squares the error
+constexpr double REGULAR_OVERLAP = 2.0;         // in eps; more is a bad start
+constexpr double PUSH_LIMIT = 0.05;             // of the sum of radii, per step, out of a bad overlap
+constexpr double RELINEARISE_BEYOND = 1.1;      // in eps, overlap at the end of the step
+constexpr double COINCIDENT = 1.0e-10;          // of the sum of radii: no normal can be computed
+constexpr double EXPECTED_IN_EPS = 1.0e-7;      // how well the predicted motion must be met ...
+constexpr double EXPECTED_RELATIVE = 1.0e-12;   // ... beside the round-off of positions and velocities
+constexpr double SIMILAR_RADII = 1.1;           // up to here one cutoff for all pairs wastes little
+
+constexpr double FIRST_MARGIN = 0.02;           // of the smallest radius
+constexpr double EXTREME = 1.0e300;          // below or above every value that is compared
+constexpr int REDUCED_SUMS = 4;
+constexpr int REDUCED_MAXIMA = 8;
+
+struct Reduced {
+  double sums[REDUCED_SUMS];
+  double maxima[REDUCED_MAXIMA];
+};
+
+void combine(void *in, void *inout, int *count, MPI_Datatype *)
+{
+  const auto *from = static_cast<const Reduced *>(in);
+  auto *to = static_cast<Reduced *>(inout);
+  for (int k = 0; k < *count; ++k) {
+    for (int s = 0; s < REDUCED_SUMS; ++s) to[k].sums[s] += from[k].sums[s];
+    for (int m = 0; m < REDUCED_MAXIMA; ++m)
+      to[k].maxima[m] = std::max(to[k].maxima[m], from[k].maxima[m]);
+  }
+}
+
+double dot(const double *a, const double *b)
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+double norm(const double *a)
+{
+  return std::sqrt(dot(a, a));
+}
+
+}    // namespace
+
+/* ---------------------------------------------------------------------- */
+
+FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
+    Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
+    warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0),  
+    list_(nullptr), margin_(-1.0), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr),
+    memory_complete_(true), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
+    spread_at_start_(0.0), regular_timestep_(0.0), expecting_(false), kick_(0.0), output_{},
+    wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
+    run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0),
+    exchanged_(nullptr), exchanging_memory_(false)
+{
+  if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
+
+  tolerance_ = utils::numeric(FLERR, arg[3], false, lmp);
+  if (!(tolerance_ > 0.0) || std::isinf(tolerance_))
+    error->all(FLERR, 3, "Fix inelastic tolerance must be a length greater than 0, not {}", arg[3]);
+
+  auto is_keyword = [](const char *word) {
+    for (const char *keyword : {"region", "solver", "maxiter", "frozen", "record", "shorten"})
+      if (strcmp(word, keyword) == 0) return true;
+    return false;
+  };
+  std::vector<std::string> regions;
+  int iarg = 4;
+  while (iarg < narg) {
+    const std::string keyword = arg[iarg];
+    if (!is_keyword(arg[iarg]))
+      error->all(FLERR, iarg,
+                 "Unknown fix inelastic keyword {}: use region, solver, maxiter, frozen, record or "
+                 "shorten",
+                 keyword);
+    if (iarg + 2 > narg) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error);
+    const std::string value = arg[iarg + 1];
+    iarg += 2;
+    if (keyword == "region") {
+      regions.push_back(value);
+      while (iarg < narg && !is_keyword(arg[iarg])) regions.emplace_back(arg[iarg++]);
+    } else if (keyword == "solver") {
+      solver_name_ = value;
+    } else if (keyword == "maxiter") {
+      max_iterations_ = utils::bnumeric(FLERR, value, false, lmp);
+      if (max_iterations_ < 1)
+        error->all(FLERR, iarg - 1, "Fix inelastic maxiter must be at least 1, not {}", value);
+      if (iarg < narg && strcmp(arg[iarg], "warn") == 0) {
+        warn_only_ = true;
+        ++iarg;
+      }
+    } else if (keyword == "frozen") {
+      const int frozen_group = group->find(value);
+      if (frozen_group < 0)
+        error->all(FLERR, iarg - 1, "Fix inelastic frozen group {} does not exist", value);
+      frozen_bit_ = group->bitmask[frozen_group];
+    } else if (keyword == "record") {
+      if (iarg + 2 > narg || strcmp(arg[iarg], "every") != 0)
+        error->all(FLERR, iarg - 1, "Fix inelastic record needs: record FILE every N");
+      record_file_ = value;
+      record_every_ = utils::inumeric(FLERR, arg[iarg + 1], false, lmp);
+      if (record_every_ < 1)
+        error->all(FLERR, iarg + 1, "Fix inelastic record every must be at least 1, not {}",
+                   record_every_);
+      if (record_file_.find('*') == std::string::npos)
+        error->all(FLERR, iarg - 1,
+                   "Fix inelastic record file {} must contain a *, which becomes the step",
+                   record_file_);
+      iarg += 2;
+    } else if (keyword == "shorten") {
+      shorten_ = utils::logical(FLERR, value, false, lmp) == 1;
+    }
+  }
+  solver_ = inelastic::make_solver(solver_name_);
+  if (!solver_)
+    error->all(FLERR, "Fix inelastic solver must be apgd or uzawa, not {}", solver_name_);
+  walls_ = std::make_unique<RegionWalls>(lmp, regions);
+
+  if (!atom->radius_flag)
+    error->all(FLERR, "Fix inelastic needs spheres with a radius: use atom_style sphere");
+  if (!atom->tag_enable) error->all(FLERR, "Fix inelastic needs atom IDs: use atom_modify id yes");
+
+  virial_global_flag = virial_peratom_flag = thermo_virial = 1;
+  vector_flag = 1;
+  size_vector = OUTPUT_SIZE;
+  extvector = 0;
+  global_freq = 1;
+  peratom_flag = 1;
+  size_peratom_cols = 5;
+  peratom_freq = 1;
+  local_flag = 1;
+  size_local_cols = 10;
+  size_local_rows = 0;
+  local_freq = 1;
+  force_reneighbor = 1;
+  next_reneighbor = -1;
+  comm_forward = 3;
+  comm_reverse = 3;
+  maxexchange_dynamic = 1;
+  maxexchange = STATE_SIZE + ContactMemory::packed_size(0);
+
+  MPI_Op_create(&combine, 1, &reduction_);
+  MPI_Type_contiguous(sizeof(Reduced) / sizeof(double), MPI_DOUBLE, &reduction_type_);
+  MPI_Type_commit(&reduction_type_);
+
+  FixInelastic::grow_arrays(atom->nmax);
+  for (int i = 0; i < atom->nlocal; ++i) FixInelastic::set_arrays(i);
+  atom->add_callback(Atom::GROW);
+}
+
+FixInelastic::~FixInelastic()
+{
+  if (copymode) return;
+  atom->delete_callback(id, Atom::GROW);
+  memory->destroy(state_);
+  memory->destroy(array_atom);
+  memory->destroy(array_local);
+  MPI_Op_free(&reduction_);
+  MPI_Type_free(&reduction_type_);
+}
+
+int FixInelastic::setmask()
+{
+  return PRE_EXCHANGE | POST_NEIGHBOR | POST_FORCE | POST_RUN;
+}
+
+int FixInelastic::modify_param(int narg, char **arg)
+{
+  if (strcmp(arg[0], "tolerance") != 0) return 0;
+  if (narg < 2) utils::missing_cmd_args(FLERR, "fix_modify tolerance", error);
+  const double tolerance = utils::numeric(FLERR, arg[1], false, lmp);
+  if (!(tolerance > 0.0) || std::isinf(tolerance))
+    error->all(FLERR, "Fix inelastic tolerance must be a length greater than 0, not {}", arg[1]);
+  tolerance_ = tolerance;
+  return 2;
+}
+
+/* ---------------------------------------------------------------------- */
+
+void FixInelastic::init()
+{
+  if (modify->get_fix_by_style("^inelastic$").size() > 1)
+    error->all(FLERR, "More than one fix inelastic: one fix must hold all contacts");
+  if (utils::strmatch(update->integrate_style, "^respa"))
+    error->all(FLERR, "Fix inelastic does not work with run_style respa: use run_style verlet");
+  if (update->whichflag == 2)
+    error->all(FLERR, "Fix inelastic does not work with minimize: unfix it first");
+
+  walls_->init();
+  wall_force_.assign(3 * static_cast<std::size_t>(walls_->number_of_walls()), 0.0);
+  wall_force_total_ = wall_force_;
+  wall_force_step_ = -1;
+  array_flag = walls_->empty() ? 0 : 1;
+  size_array_rows = walls_->number_of_walls();
+  size_array_cols = 3;
+  extarray = 0;
+
+  double radii[2] = {0.0, -EXTREME};
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    radii[0] = std::max(radii[0], atom->radius[i]);
+    radii[1] = std::max(radii[1], -atom->radius[i]);
+  }
+  reduce(nullptr, 0, radii, 2);
+  largest_radius_ = radii[0];
+  const double smallest_radius = -radii[1];
+  if (largest_radius_ > 0.0 && !(smallest_radius > 0.0))
+    error->all(FLERR, "Fix inelastic: an atom of group {} has no radius: set its diameter",
+               group->names[igroup]);
+  if (margin_ < 0.0 && largest_radius_ > 0.0) margin_ = FIRST_MARGIN * smallest_radius;
+
+  // With equal radii the pair style's own list serves, and no second one is built.
+  one_cutoff_ = largest_radius_ <= SIMILAR_RADII * smallest_radius;
+  neighbor->add_request(this, one_cutoff_ ? NeighConst::REQ_DEFAULT : NeighConst::REQ_SIZE);
+
+  regular_timestep_ = update->dt;
+  expecting_ = false;
+  run_iterations_ = run_largest_overlap_ = run_largest_excess_ = 0.0;
+  run_steps_ = run_unconverged_ = 0;
+}
+
+void FixInelastic::init_list(int, NeighList *list)
+{
+  list_ = list;
+}
+
+void FixInelastic::setup_post_neighbor()
+{
+  const double widest = 2.0 * largest_radius_ + neighbor->skin;
+  const double listed = one_cutoff_ ? neighbor->cutneighmin : neighbor->cutneighmax;
+  if (listed < widest * (1.0 - 1.0e-12))
+    error->all(FLERR,
+               "Fix inelastic: the neighbour list reaches {:.6g} between centres but needs {:.6g}: give "
+               "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
+               listed, widest, 2.0 * largest_radius_);
+  list_reach_ = one_cutoff_ ? listed - 2.0 * largest_radius_ : neighbor->skin;
+  post_neighbor();
+}
+
+void FixInelastic::post_neighbor()
+{
+  const double *const *const x = atom->x;
+  position_at_build_.resize(3 * static_cast<std::size_t>(atom->nlocal));
+  for (int i = 0; i < atom->nlocal; ++i) std::copy_n(x[i], 3, &position_at_build_[3 * i]);
+}
+
+// In setup LAMMPS has whole-step velocities and applies only half a kick before the next move.
+// Projecting from there gives the same velocity as projecting the whole step's prediction, because
+// it lies between that prediction and its projection.
+void FixInelastic::setup(int vflag)
+{
+  expecting_ = false;
+  advance(vflag, 0.5);
+}
+
+void FixInelastic::post_force(int vflag)
+{
+  advance(vflag, 1.0);
+}
+
+void FixInelastic::post_run()
+{
+  complete_memory();
+  if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
+  if (comm->me != 0) return;
+  utils::logmesg(lmp,
+                 "Fix inelastic: {} projections, {:.0f} iterations, largest overlap {:.6g} = {:.4g} "
+                 "tolerances, {:.0f} shortened steps\n",
+                 run_steps_, run_iterations_, run_largest_overlap_,
+                 run_largest_overlap_ / tolerance_, output_[SHORTENED_STEPS]);
+  if (run_largest_excess_ > 0.0)
+    utils::logmesg(lmp,
+                   "  the curvature of walls left overlaps of up to {:.6g} beyond 2 tolerances: a shorter "
+                   "timestep, or shorten yes, avoids them\n",
+                   run_largest_excess_);
+  if (run_unconverged_ > 0)
+    utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
+                   run_unconverged_);
+}
+
+/* ----------------------------------------------------------------------
+   one step
+------------------------------------------------------------------------- */
+
+void FixInelastic::advance(int vflag, double kick_steps)
+{
+  v_init(vflag);
+  if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
+  if (expecting_) check_expected();
+
+  inelastic::ProjectionResult result;
+  while (true) {
+    predict(kick_steps);
+    phase_ = Phase::CONTACT;
+    collect();
+    result = inelastic::project(problem_, *this, *solver_, {tolerance_, max_iterations_}, MAX_ROUNDS,
+                                *this, velocity_);
+    if (record_every_ > 0 && kick_steps == 1.0 && update->ntimestep % record_every_ == 0)
+      record_problem();
+    if (bad_overlap_) push_apart(result);
+    if (!result.converged) unconverged(result);
+
+    // Pairs that are not listed were at least list_reach_ apart when the list was built.
+    const double motion = problem_.timestep * spread(velocity_.data());
+    if (spread_at_start_ + motion > list_reach_) {
+      const double room = list_reach_ - spread_at_start_;
+      if (!shorten_ || room <= 0.0)
+        error->all(FLERR,
+                   "Fix inelastic: step {}: spheres move by up to {:.6g} relative to one another, further "
+                   "than the neighbour list reaches ({:.6g}): set the skin of the neighbor command to at "
+                   "least {:.6g}, or lower the timestep, or use shorten yes",
+                   update->ntimestep, spread_at_start_ + motion, list_reach_,
+                   1.2 * (spread_at_start_ + motion));
+      shorten_step(0.9 * room / motion);
+    } else if (shorten_ && output_[EXCESS] > 0.0) {
+      shorten_step(0.5);
+    } else {
+      break;
+    }
+  }
+
+  apply_forces(kick_steps);
+  update_outputs(result);
+  remember_contacts();
+
+  // Rebuild before the list could fall short, with room for the next step to be half as fast again.
+  const double next_start = spread_since_build(velocity_.data());
+  const double motion = problem_.timestep * spread(velocity_.data());
+  next_reneighbor = next_start + 1.5 * motion > list_reach_ ? update->ntimestep + 1 : -1;
+
+  // More pairs at once when the last projection had to come back for some, fewer otherwise.
+  margin_ *= result.rounds > 1 ? 1.3 : 0.98;
+  margin_ = std::clamp(margin_, 4.0 * tolerance_, std::max(4.0 * tolerance_, list_reach_));
+  expecting_ = true;
+}
+
+// Every other fix and force has done its work: the velocities that the step would end with.
+void FixInelastic::predict(double kick_steps)
+{
+  const int nlocal = atom->nlocal;
+  const int nall = nlocal + atom->nghost;
+  const int *const mask = atom->mask;
+  kick_ = kick_steps * update->dt;
+  problem_.timestep = update->dt;
+  problem_.resize(nall);
+  const int push = kick_steps == 1.0 ? PUSH_NEXT : PUSH_HELD;
+  for (int i = 0; i < nall; ++i) {
+    const bool moves = (mask[i] & groupbit) && !(mask[i] & frozen_bit_);
+    problem_.inverse_mass[i] = moves ? 1.0 / mass(i) : 0.0;
+  }
+  for (int i = 0; i < nlocal; ++i) {
+    const double kick_per_force = kick_ * force->ftm2v * problem_.inverse_mass[i];
+    for (int d = 0; d < 3; ++d)
+      problem_.predicted_velocity[3 * i + d] =
+          atom->v[i][d] - state_[i][push + d] + kick_per_force * atom->f[i][d];
+  }
+  share_with_copies(problem_.predicted_velocity.data());
+  message_.clear();
+  for (int i = 0; i < nlocal; ++i)
+    if (!std::isfinite(norm(&problem_.predicted_velocity[3 * i])))
+      message_ = fmt::format("the force on atom {} or its velocity is not a finite number", atom->tag[i]);
+}
+
+void FixInelastic::collect()
+{
+  problem_.contacts.clear();
+  origin_.clear();
+  wall_constraint_.clear();
+  bad_overlap_ = false;
+  output_[OVERLAP] = output_[EXCESS] = 0.0;
+  relinearisations_ = 0;
+  collect_pairs();
+  if (!walls_->empty()) collect_walls();
+
+  spread_at_start_ = spread_since_build(nullptr);
+  double maxima[2] = {bad_overlap_ ? 1.0 : 0.0, output_[OVERLAP]};
+  reduce(nullptr, 0, maxima, 2);
+  bad_overlap_ = maxima[0] > 0.0;
+  output_[OVERLAP] = maxima[1];
+  fail_together(message_);
+}
+
+// The gap that a constraint asks to be kept. `size` is the sum of radii (of one sphere for a wall).
+double FixInelastic::effective_gap(double gap_now, double size) const
+{
+  if (gap_now >= -REGULAR_OVERLAP * tolerance_) return gap_now;
+  return phase_ == Phase::CONTACT ? -tolerance_ : std::max(gap_now, -PUSH_LIMIT * size);
+}
+
+template <typename Visitor> void FixInelastic::for_each_listed_pair(Visitor &&visit) const
+{
+  const int *const mask = atom->mask;
+  const tagint *const tag = atom->tag;
+  const int nlocal = atom->nlocal;
+  std::size_t slot = 0;
+  for (int ii = 0; ii < list_->inum; ++ii) {
+    const int i = list_->ilist[ii];
+    const int *const neighbours = list_->firstneigh[i];
+    const int count = list_->numneigh[i];
+    if (!(mask[i] & groupbit)) {
+      slot += count;
+      continue;
+    }
+    for (int jj = 0; jj < count; ++jj, ++slot) {
+      const int j = neighbours[jj] & NEIGHMASK;
+      if (!(mask[j] & groupbit)) continue;
+      // Without newton a pair across ranks is on both lists: one of them takes it.
+      if (j >= nlocal && !force->newton_pair && tag[i] > tag[j]) continue;
+      visit(slot, i, j);
+    }
+  }
+}
+
+void FixInelastic::collect_pairs()
+{
+  const double *const *const x = atom->x;
+  const double *const radius = atom->radius;
+  const double h = problem_.timestep;
+  const double *const velocity = problem_.predicted_velocity.data();
+
+  std::size_t slots = 0;
+  for (int ii = 0; ii < list_->inum; ++ii) slots += list_->numneigh[list_->ilist[ii]];
+  listed_pair_taken_.assign(slots, 0);
+
+  for_each_listed_pair([&](std::size_t slot, int i, int j) {
+    const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
+    const double distance = norm(away);
+    const double size = radius[i] + radius[j];
+    const double gap = distance - size;
+    const double opening[3] = {velocity[3 * i] - velocity[3 * j],
+                               velocity[3 * i + 1] - velocity[3 * j + 1],
+                               velocity[3 * i + 2] - velocity[3 * j + 2]};
+    if (gap + std::min(0.0, h * dot(away, opening) / distance) > margin_) return;
+    take_pair(slot, i, j);
+  });
+}
+
+void FixInelastic::take_pair(std::size_t slot, int i, int j)
+{
+  const double *const xi = atom->x[i];
+  const double *const xj = atom->x[j];
+  listed_pair_taken_[slot] = 1;
+  if (problem_.inverse_mass[i] + problem_.inverse_mass[j] == 0.0) return;
+  const double away[3] = {xi[0] - xj[0], xi[1] - xj[1], xi[2] - xj[2]};
+  const double distance = norm(away);
+  const double size = atom->radius[i] + atom->radius[j];
+  if (!(distance > COINCIDENT * size)) {
+    message_ = fmt::format("the centres of atoms {} and {} coincide: move one of them", atom->tag[i],
+                           atom->tag[j]);
+    return;
+  }
+  const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
+  const double gap = distance - size;
+  note_overlap(gap);
+  if (atom->tag[i] == atom->tag[j]) {
+    if (gap < -REGULAR_OVERLAP * tolerance_)
+      message_ = fmt::format("atom {} overlaps its own periodic image: the box is too small",
+                             atom->tag[i]);
+    return;
+  }
+  problem_.contacts.add(i, j, normal, effective_gap(gap, size),
+                        kick_ * force->ftm2v * memory_.force(i, atom->tag[j]));
+  origin_.push_back({0, gap, size, 0.0});
+}
+
+void FixInelastic::note_overlap(double gap)
+{
+  output_[OVERLAP] = std::max(output_[OVERLAP], -gap);
+  if (gap < -REGULAR_OVERLAP * tolerance_) bad_overlap_ = true;
+}
+
+// Looks at the walls from where atoms are, or from where they will be after the step's motion.
+std::vector<RegionWalls::Look> FixInelastic::looks(const double *velocity, bool at_end,
+                                                   double beyond) const
+{
+  std::vector<RegionWalls::Look> looks;
+  const double h = problem_.timestep;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (problem_.inverse_mass[i] == 0.0) continue;
+    const double *const x = atom->x[i];
+    const double *const v = velocity + 3 * i;
+    const double reach = atom->radius[i] + beyond;
+    if (at_end)
+      looks.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
+    else
+      looks.push_back({i, {x[0], x[1], x[2]}, reach + h * norm(v)});
+  }
+  return looks;
+}
+
+void FixInelastic::collect_walls()
+{
+  const double *const velocity = problem_.predicted_velocity.data();
+  walls_->view(
+      looks(velocity, false, margin_), false,
+      [&](const RegionWalls::Look &look, const WallView &view) {
+        const double gap = view.distance - atom->radius[look.atom];
+        note_overlap(view.distance_now - atom->radius[look.atom]);
+        const double opening = problem_.timestep * dot(view.normal, velocity + 3 * look.atom);
+        if (gap + std::min(0.0, opening) <= margin_) take_wall(look, view);
+      },
+      [&](const RegionWalls::Look &look, const std::string &region) {
+        message_ = fmt::format("the centre of atom {} is on the wrong side of region {}",
+                               atom->tag[look.atom], region);
+      });
+}
+
+void FixInelastic::take_wall(const RegionWalls::Look &look, const WallView &view)
+{
+  const int i = look.atom;
+  const double size = atom->radius[i];
+  const double gap_now = view.distance_now - size;
+  const double motion = view.distance_now - view.distance;
+  wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
+  problem_.contacts.add(i, problem_.particles, view.normal, effective_gap(gap_now, size) - motion,
+                        kick_ * force->ftm2v * memory_.force(i, -view.wall));
+  origin_.push_back({view.wall, gap_now, size, motion});
+}
+
+long FixInelastic::refine(const std::vector<double> &velocity, inelastic::ContactProblem &)
+{
+  message_.clear();
+  long changed = add_violated_pairs(velocity);
+  if (!walls_->empty()) {
+    changed += add_violated_walls(velocity);
+    if (!walls_->exact()) changed += relinearise_walls(velocity);
+  }
+  fail_together(message_);
+  return changed;
+}
+
+long FixInelastic::add_violated_pairs(const std::vector<double> &velocity)
+{
+  const double *const *const x = atom->x;
+  const double *const radius = atom->radius;
+  const double h = problem_.timestep;
+  const std::size_t before = problem_.contacts.size();
+  for_each_listed_pair([&](std::size_t slot, int i, int j) {
+    if (listed_pair_taken_[slot]) return;
+    const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
+    const double distance = norm(away);
+    const double opening[3] = {velocity[3 * i] - velocity[3 * j],
+                               velocity[3 * i + 1] - velocity[3 * j + 1],
+                               velocity[3 * i + 2] - velocity[3 * j + 2]};
+    if (distance - radius[i] - radius[j] + h * dot(away, opening) / distance < -tolerance_)
+      take_pair(slot, i, j);
+  });
+  return static_cast<long>(problem_.contacts.size() - before);
+}
+
+long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
+{
+  const std::size_t before = problem_.contacts.size();
+  walls_->view(
+      looks(velocity.data(), false, 0.0), false,
+      [&](const RegionWalls::Look &look, const WallView &view) {
+        const double gap = view.distance - atom->radius[look.atom];
+        const double opening = problem_.timestep * dot(view.normal, &velocity[3 * look.atom]);
+        if (gap + opening < -tolerance_ && !wall_constraint_.count(wall_key(look.atom, view.wall)))
+          take_wall(look, view);
+      },
+      [](const RegionWalls::Look &, const std::string &) {});
+  return static_cast<long>(problem_.contacts.size() - before);
+}
+
+// Inside a concave wall the distance is not convex: where a sphere ends up overlapping, the
+// constraint is replaced by the wall's tangent plane at that end.
+long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
+{
+  ++relinearisations_;
+  long changed = 0;
+  output_[EXCESS] = 0.0;
+  std::vector<RegionWalls::Look> to_look = looks(velocity.data(), true, 0.0);
+  while (!to_look.empty()) {
+    std::vector<RegionWalls::Look> again;
+    walls_->view(
+        to_look, true,
+        [&](const RegionWalls::Look &look, const WallView &view) {
+          const int i = look.atom;
+          const auto existing = wall_constraint_.find(wall_key(i, view.wall));
+          const bool known = existing != wall_constraint_.end();
+          if (known && origin_[existing->second].gap_now < -REGULAR_OVERLAP * tolerance_) return;
+          const double gap_there = view.distance - atom->radius[i];
+          output_[EXCESS] = std::max(output_[EXCESS], -gap_there - 2.0 * tolerance_);
+          if (gap_there >= -RELINEARISE_BEYOND * tolerance_) return;
+          if (relinearisations_ > MAX_RELINEARISATIONS) return;
+          ++changed;
+          if (!known) {
+            wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
+            problem_.contacts.add(i, problem_.particles, view.normal, 0.0, 0.0);
+            origin_.push_back({view.wall, gap_there, atom->radius[i], 0.0});
+          }
+          const std::size_t c = wall_constraint_[wall_key(i, view.wall)];
+          const double from_here[3] = {look.where[0] - atom->x[i][0], look.where[1] - atom->x[i][1],
+                                       look.where[2] - atom->x[i][2]};
+          std::copy_n(view.normal, 3, &problem_.contacts.normal[3 * c]);
+          problem_.contacts.gap[c] = gap_there - dot(view.normal, from_here);
+        },
+        [&](const RegionWalls::Look &look, const std::string &) {
+          // Beyond the wall nothing is seen: look from half way, where the plane is a safe one too.
+          RegionWalls::Look nearer = look;
+          for (int d = 0; d < 3; ++d)
+            nearer.where[d] = 0.5 * (look.where[d] + atom->x[look.atom][d]);
+          again.push_back(nearer);
+        });
+    to_look.swap(again);
+  }
+  double excess = output_[EXCESS];
+  reduce(nullptr, 0, &excess, 1);
+  output_[EXCESS] = excess;
+  return changed;
+}
+
+// Beyond the regular overlaps: the smallest motion, added to the step's but not kept as momentum,
+// that takes the spheres apart at a bounded speed.
+void FixInelastic::push_apart(inelastic::ProjectionResult &result)
+{
+  std::vector<double> impulse = problem_.contacts.impulse;
+  std::copy_n(velocity_.begin(), 3 * static_cast<std::size_t>(problem_.particles),
+              problem_.predicted_velocity.begin());
+  phase_ = Phase::PUSH;
+  for (std::size_t c = 0; c < problem_.contacts.size(); ++c) {
+    const Origin &origin = origin_[c];
+    if (origin.gap_now < -REGULAR_OVERLAP * tolerance_)
+      problem_.contacts.gap[c] = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
+    problem_.contacts.impulse[c] = 0.0;
+  }
+  const std::vector<double> kept = velocity_;
+  const inelastic::ProjectionResult pushed =
+      inelastic::project(problem_, *this, *solver_, {tolerance_, max_iterations_}, MAX_ROUNDS, *this,
+                         velocity_);
+  result.iterations += pushed.iterations;
+  result.converged = result.converged && pushed.converged;
+  result.residual.feasibility = std::max(result.residual.feasibility, pushed.residual.feasibility);
+  result.residual.complementarity =
+      std::max(result.residual.complementarity, pushed.residual.complementarity);
+
+  impulse.resize(problem_.contacts.size(), 0.0);
+  problem_.contacts.impulse = impulse;
+  problem_.predicted_velocity.assign(kept.begin(), kept.end());
+  problem_.predicted_velocity.resize(3 * (static_cast<std::size_t>(problem_.particles) + 1), 0.0);
+}
+
+void FixInelastic::apply_forces(double kick_steps)
+{
+  const double h = problem_.timestep;
+  const int *const mask = atom->mask;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(mask[i] & groupbit)) continue;
+    double *const state = state_[i];
+    const bool moves = problem_.inverse_mass[i] > 0.0;
+    for (int d = 0; d < 3; ++d) {
+      const double v = velocity_[3 * i + d];
+      if (moves) {
+        const double without =
+            atom->v[i][d] + kick_ * force->ftm2v * problem_.inverse_mass[i] * atom->f[i][d];
+        atom->f[i][d] += (v - without) / (kick_ * force->ftm2v * problem_.inverse_mass[i]);
+      }
+      const double push =
+          bad_overlap_ && moves ? v - problem_.predicted_velocity[3 * i + d] : 0.0;
+      if (kick_steps == 1.0) state[PUSH_HELD + d] = 0.5 * (state[PUSH_NEXT + d] + push);
+      state[PUSH_NEXT + d] = push;
+      state[EXPECTED_V + d] = v;
+      state[EXPECTED_X + d] = atom->x[i][d] + h * v;
+    }
+  }
+}
+
+// Compares what moved with what the last step predicted.
+void FixInelastic::check_expected()
+{
+  const double h = regular_timestep_;
+  std::string message;
+  for (int i = 0; i < atom->nlocal && message.empty(); ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    const double *const state = state_[i];
+    double off[3] = {atom->x[i][0] - state[EXPECTED_X], atom->x[i][1] - state[EXPECTED_X + 1],
+                     atom->x[i][2] - state[EXPECTED_X + 2]};
+    domain->minimum_image(FLERR, off);
+    const double faster[3] = {atom->v[i][0] - state[EXPECTED_V], atom->v[i][1] - state[EXPECTED_V + 1],
+                              atom->v[i][2] - state[EXPECTED_V + 2]};
+    const bool frozen = (atom->mask[i] & frozen_bit_) != 0;
+    const double round_off =
+        EXPECTED_RELATIVE * (norm(atom->x[i]) + largest_radius_ + h * norm(&state[EXPECTED_V]));
+    const double allowed = (frozen ? 1.0 : EXPECTED_IN_EPS) * tolerance_ + round_off;
+    const double position_error = norm(off);
+    const double velocity_error = frozen ? 0.0 : h * norm(faster);
+    if (position_error <= allowed && velocity_error <= allowed) continue;
+
+    std::string later;
+    bool passed = false;
+    const auto &fixes = modify->get_fix_list();
+    for (std::size_t k = 0; k < fixes.size(); ++k) {
+      if (fixes[k] == this)
+        passed = true;
+      else if ((passed && (modify->fmask[k] & POST_FORCE)) || (modify->fmask[k] & END_OF_STEP))
+        later += fmt::format(" {} ({})", fixes[k]->id, fixes[k]->style);
+    }
+    message = fmt::format(
+        "atom {} did not move as predicted: its {} is off by {:.3g}. Move it with fix nve or nve/sphere "
+        "alone{}; define every fix that adds forces before fix {}; let nothing else change velocities{}{}",
+        atom->tag[i], position_error > velocity_error ? "position" : "velocity",
+        position_error > velocity_error ? position_error : norm(faster),
+        frozen ? " (a frozen one with a velocity that is its motion)" : "", id,
+        later.empty() ? "" : ". Fixes that may have:", later);
+  }
+  fail_together(message);
+}
+
+/* ----------------------------------------------------------------------
+   the neighbour list's reach
+------------------------------------------------------------------------- */
+
+// The largest difference between two of the vectors (3 doubles each) of this fix's atoms: the
+// diagonal of their bounding box.
+double FixInelastic::spread(const double *values)
+{
+  double maxima[6];
+  std::fill_n(maxima, 6, -EXTREME);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    for (int d = 0; d < 3; ++d) {
+      maxima[d] = std::max(maxima[d], values[3 * i + d]);
+      maxima[3 + d] = std::max(maxima[3 + d], -values[3 * i + d]);
+    }
+  }
+  reduce(nullptr, 0, maxima, 6);
+  const double extent[3] = {maxima[0] + maxima[3], maxima[1] + maxima[4], maxima[2] + maxima[5]};
+  return extent[0] < 0.0 ? 0.0 : norm(extent);
+}
+
+// Spread of the displacements since the list was built, at present or after moving with `velocity`.
+double FixInelastic::spread_since_build(const double *velocity)
+{
+  displacement_.resize(3 * static_cast<std::size_t>(atom->nlocal));
+  for (int i = 0; i < atom->nlocal; ++i)
+    for (int d = 0; d < 3; ++d)
+      displacement_[3 * i + d] = atom->x[i][d] - position_at_build_[3 * i + d] +
+          (velocity ? problem_.timestep * velocity[3 * i + d] : 0.0);
+  return spread(displacement_.data());
+}
+
+void FixInelastic::set_timestep(double timestep)
+{
+  update->update_time();
+  update->dt = timestep;
+  update->dt_default = 0;
+  if (force->pair) force->pair->reset_dt();
+  for (Fix *fix : modify->get_fix_list()) fix->reset_dt();
+  output->reset_dt();
+}
+
+void FixInelastic::shorten_step(double factor)
+{
+  constexpr double SHORTEST = 1.0e-6;    // of the regular time step: something else is wrong then
+  const double timestep = factor * update->dt;
+  if (timestep < SHORTEST * regular_timestep_)
+    error->all(FLERR, "Fix inelastic: step {}: no time step above {:.3g} keeps the spheres apart",
+               update->ntimestep, timestep);
+  if (update->dt == regular_timestep_) output_[SHORTENED_STEPS] += 1.0;
+  set_timestep(timestep);
+}
+
+/* ----------------------------------------------------------------------
+   output
+------------------------------------------------------------------------- */
+
+void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
+{
+  const inelastic::ContactSet &contacts = problem_.contacts;
+  const int nlocal = atom->nlocal;
+  const double force_per_impulse = 1.0 / (kick_ * force->ftm2v);
+
+  contact_force_.assign(3 * static_cast<std::size_t>(problem_.particles + 1), 0.0);
+  contact_count_.assign(3 * static_cast<std::size_t>(problem_.particles + 1), 0.0);
+  if (vflag_atom) {
+    virial_diagonal_.assign(contact_force_.size(), 0.0);
+    virial_off_diagonal_.assign(contact_force_.size(), 0.0);
+  }
+  std::fill(wall_force_.begin(), wall_force_.end(), 0.0);
+  wall_force_step_ = -1;
+  std::size_t active = 0;
+  for (const double impulse : contacts.impulse)
+    if (impulse > 0.0) ++active;
+  if (static_cast<int>(active) > max_contacts_) {
+    max_contacts_ = static_cast<int>(active) * 5 / 4 + 16;
+    memory->grow(array_local, max_contacts_, 10, "inelastic:array_local");
+  }
+
+  double counts[2] = {0.0, 0.0};
+  int row = 0;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    if (!(contacts.impulse[c] > 0.0)) continue;
+    const int i = contacts.first[c];
+    const int j = contacts.second[c];
+    const double *const n = &contacts.normal[3 * c];
+    const double strength = contacts.impulse[c] * force_per_impulse;
+    const Origin &origin = origin_[c];
+    const bool is_wall = origin.wall != 0;
+    counts[is_wall] += 1.0;
+    contact_count_[3 * i + is_wall] += 1.0;
+    for (int d = 0; d < 3; ++d) {
+      contact_force_[3 * i + d] += strength * n[d];
+      contact_force_[3 * j + d] -= strength * n[d];
+      if (is_wall) wall_force_[3 * (origin.wall - 1) + d] -= strength * n[d];
+    }
+    if (!is_wall) contact_count_[3 * j] += 1.0;
+
+    const double to_point = atom->radius[i] + (is_wall ? origin.gap_now : 0.5 * origin.gap_now);
+    double *const out = array_local[row++];
+    out[0] = static_cast<double>(atom->tag[i]);
+    out[1] = is_wall ? -origin.wall : static_cast<double>(atom->tag[j]);
+    for (int d = 0; d < 3; ++d) {
+      out[2 + d] = atom->x[i][d] - to_point * n[d];
+      out[5 + d] = n[d];
+    }
+    out[8] = origin.gap_now;
+    out[9] = strength;
+
+    if (evflag) {
+      const double arm = is_wall ? to_point : origin.size + origin.gap_now;
+      double v[6] = {arm * strength * n[0] * n[0], arm * strength * n[1] * n[1],
+                     arm * strength * n[2] * n[2], arm * strength * n[0] * n[1],
+                     arm * strength * n[0] * n[2], arm * strength * n[1] * n[2]};
+      tally_virial(i, is_wall ? i : j, v);
+    }
+  }
+  size_local_rows = row;
+  share_virial();
+
+  sum_over_copies(contact_force_.data());
+  sum_over_copies(contact_count_.data());
+  for (int i = 0; i < nlocal; ++i) {
+    array_atom[i][0] = contact_count_[3 * i];
+    array_atom[i][1] = contact_count_[3 * i + 1];
+    for (int d = 0; d < 3; ++d) array_atom[i][2 + d] = contact_force_[3 * i + d];
+  }
+
+  double sums[3] = {counts[0], counts[1], static_cast<double>(contacts.size())};
+  reduce(sums, 3, nullptr, 0);
+  output_[PARTICLE_CONTACTS] = sums[0];
+  output_[WALL_CONTACTS] = sums[1];
+  output_[CONSTRAINTS] = sums[2];
+  output_[ITERATIONS] = static_cast<double>(result.iterations);
+  output_[FEASIBILITY] = result.residual.feasibility;
+  output_[COMPLEMENTARITY] = result.residual.complementarity;
+  output_[ROUNDS] = result.rounds;
+  output_[TOTAL_ITERATIONS] += static_cast<double>(result.iterations);
+
+  ++run_steps_;
+  run_iterations_ += static_cast<double>(result.iterations);
+  run_largest_overlap_ = std::max(run_largest_overlap_, output_[OVERLAP]);
+  run_largest_excess_ = std::max(run_largest_excess_, output_[EXCESS]);
+}
+
+// Half to each side; a wall's half goes to the sphere as well.
+void FixInelastic::tally_virial(int i, int j, const double *v)
+{
+  if (vflag_global)
+    for (int k = 0; k < 6; ++k) virial[k] += v[k];
+  if (vflag_atom)
+    for (int k = 0; k < 3; ++k) {
+      virial_diagonal_[3 * i + k] += 0.5 * v[k];
+      virial_diagonal_[3 * j + k] += 0.5 * v[k];
+      virial_off_diagonal_[3 * i + k] += 0.5 * v[3 + k];
+      virial_off_diagonal_[3 * j + k] += 0.5 * v[3 + k];
+    }
+}
+
+void FixInelastic::share_virial()
+{
+  if (!vflag_atom) return;
+  sum_over_copies(virial_diagonal_.data());
+  sum_over_copies(virial_off_diagonal_.data());
+  for (int i = 0; i < atom->nlocal; ++i)
+    for (int k = 0; k < 3; ++k) {
+      vatom[i][k] += virial_diagonal_[3 * i + k];
+      vatom[i][3 + k] += virial_off_diagonal_[3 * i + k];
+    }
+}
+
+double FixInelastic::compute_vector(int n)
+{
+  return output_[n];
+}
+
+double FixInelastic::compute_array(int wall, int direction)
+{
+  if (wall_force_step_ != update->ntimestep) {
+    MPI_Allreduce(wall_force_.data(), wall_force_total_.data(), static_cast<int>(wall_force_.size()),
+                  MPI_DOUBLE, MPI_SUM, world);
+    wall_force_step_ = update->ntimestep;
+  }
+  return wall_force_total_[3 * wall + direction];
+}
+
+/* ----------------------------------------------------------------------
+   what is remembered from step to step, and follows the atoms
+------------------------------------------------------------------------- */
+
+// Within one neighbour list a pair is always seen from the same atom, which alone remembers it.
+void FixInelastic::remember_contacts()
+{
+  const inelastic::ContactSet &contacts = problem_.contacts;
+  const double force_per_impulse = 1.0 / (kick_ * force->ftm2v);
+  for (int i = 0; i < atom->nlocal; ++i) memory_.forget(i);
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    if (!(contacts.impulse[c] > 0.0)) continue;
+    const int wall = origin_[c].wall;
+    memory_.remember(contacts.first[c], wall ? -wall : atom->tag[contacts.second[c]],
+                     contacts.impulse[c] * force_per_impulse);
+  }
+  memory_complete_ = false;
+}
+
+// The next list may show a pair from the other side: let both atoms remember it, those of other
+// ranks included.
+void FixInelastic::complete_memory()
+{
+  if (memory_complete_) return;
+  memory_complete_ = true;
+  const inelastic::ContactSet &contacts = problem_.contacts;
+  const double force_per_impulse = 1.0 / (kick_ * force->ftm2v);
+  const int nlocal = atom->nlocal;
+  for (int i = nlocal; i < nlocal + atom->nghost; ++i) memory_.forget(i);
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    if (contacts.impulse[c] > 0.0 && origin_[c].wall == 0)
+      memory_.remember(contacts.second[c], atom->tag[contacts.first[c]],
+                       contacts.impulse[c] * force_per_impulse);
+  if (has_copies()) {
+    exchanging_memory_ = true;
+    comm->reverse_comm_variable(this);
+    exchanging_memory_ = false;
+  }
+  double most = 0.0;
+  for (int i = 0; i < nlocal; ++i)
+    most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
+  reduce(nullptr, 0, &most, 1);
+  maxexchange = STATE_SIZE + ContactMemory::packed_size(static_cast<int>(most));
+}
+
+void FixInelastic::pre_exchange()
+{
+  complete_memory();
+}
+
+void FixInelastic::grow_arrays(int nmax)
+{
+  memory->grow(state_, nmax, STATE_SIZE, "inelastic:state");
+  memory->grow(array_atom, nmax, size_peratom_cols, "inelastic:array_atom");
+  memory_.resize(nmax);
+  max_atoms_ = nmax;
+}
+
+void FixInelastic::copy_arrays(int i, int j, int)
+{
+  std::copy_n(state_[i], STATE_SIZE, state_[j]);
+  std::copy_n(array_atom[i], size_peratom_cols, array_atom[j]);
+  memory_.copy(i, j);
+}
+
+void FixInelastic::set_arrays(int i)
+{
+  std::fill_n(state_[i], STATE_SIZE, 0.0);
+  std::fill_n(array_atom[i], size_peratom_cols, 0.0);
+  memory_.forget(i);
+  // An atom that is created during a run moves on from where it is.
+  std::copy_n(atom->x[i], 3, state_[i] + EXPECTED_X);
+  std::copy_n(atom->v[i], 3, state_[i] + EXPECTED_V);
+}
+
+int FixInelastic::pack_exchange(int i, double *buffer)
+{
+  std::copy_n(state_[i], STATE_SIZE, buffer);
+  return STATE_SIZE + memory_.pack(i, buffer + STATE_SIZE);
+}
+
+int FixInelastic::unpack_exchange(int i, double *buffer)
+{
+  std::copy_n(buffer, STATE_SIZE, state_[i]);
+  std::fill_n(array_atom[i], size_peratom_cols, 0.0);
+  memory_.forget(i);
+  return STATE_SIZE + memory_.unpack(i, buffer + STATE_SIZE);
+}
+
+/* ----------------------------------------------------------------------
+   communication
+------------------------------------------------------------------------- */
+
+bool FixInelastic::has_copies() const
+{
+  return comm->nprocs > 1 || atom->nghost > 0;
+}
+
+void FixInelastic::sum_over_copies(double *per_particle)
+{
+  if (!has_copies()) return;
+  exchanged_ = per_particle;
+  comm->reverse_comm(this);
+  comm->forward_comm(this);
+}
+
+void FixInelastic::share_with_copies(double *per_particle)
+{
+  if (!has_copies()) return;
+  exchanged_ = per_particle;
+  comm->forward_comm(this);
+}
+
+void FixInelastic::reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima)
+{
+  if (comm->nprocs == 1) return;
+  Reduced mine{};
+  std::copy_n(sums, number_of_sums, mine.sums);
+  std::fill_n(mine.maxima, REDUCED_MAXIMA, -EXTREME);
+  std::copy_n(maxima, number_of_maxima, mine.maxima);
+  Reduced all{};
+  MPI_Allreduce(&mine, &all, 1, reduction_type_, reduction_, world);
+  std::copy_n(all.sums, number_of_sums, sums);
+  std::copy_n(all.maxima, number_of_maxima, maxima);
+}
+
+int FixInelastic::pack_forward_comm(int n, int *list, double *buffer, int, int *)
+{
+  for (int k = 0; k < n; ++k) std::copy_n(exchanged_ + 3 * list[k], 3, buffer + 3 * k);
+  return 3 * n;
+}
+
+void FixInelastic::unpack_forward_comm(int n, int first, double *buffer)
+{
+  std::copy_n(buffer, 3 * n, exchanged_ + 3 * first);
+}
+
+int FixInelastic::pack_reverse_comm_size(int n, int first)
+{
+  int size = 0;
+  for (int i = first; i < first + n; ++i)
+    size += ContactMemory::packed_size(memory_.number_of_partners(i));
+  return size;
+}
+
+int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
+{
+  if (exchanging_memory_) {
+    int m = 0;
+    for (int i = first; i < first + n; ++i) m += memory_.pack(i, buffer + m);
+    return m;
+  }
+  std::copy_n(exchanged_ + 3 * first, 3 * n, buffer);
+  return 3 * n;
+}
+
+void FixInelastic::unpack_reverse_comm(int n, int *list, double *buffer)
+{
+  if (exchanging_memory_) {
+    int m = 0;
+    for (int k = 0; k < n; ++k) m += memory_.unpack(list[k], buffer + m);
+    return;
+  }
+  for (int k = 0; k < n; ++k)
+    for (int d = 0; d < 3; ++d) exchanged_[3 * list[k] + d] += buffer[3 * k + d];
+}
+
+/* ----------------------------------------------------------------------
+   when things go wrong
+------------------------------------------------------------------------- */
+
+// Collective: stops with the message of the first rank that has one.
+void FixInelastic::fail_together(const std::string &message)
+{
+  int speaker = message.empty() ? comm->nprocs : comm->me;
+  if (comm->nprocs > 1) {
+    const int mine = speaker;
+    MPI_Allreduce(&mine, &speaker, 1, MPI_INT, MPI_MIN, world);
+  }
+  if (speaker == comm->nprocs) return;
+  int length = static_cast<int>(message.size());
+  MPI_Bcast(&length, 1, MPI_INT, speaker, world);
+  std::string text = message;
+  text.resize(length);
+  MPI_Bcast(text.data(), length, MPI_CHAR, speaker, world);
+  error->all(FLERR, "Fix inelastic: step {}: {}", update->ntimestep, text);
+}
+
+void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
+{
+  ++run_unconverged_;
+  const std::string message = fmt::format(
+      "step {}: {} iterations left an overlap of {:.4g} and a gap under a force of {:.4g}, where {:.4g} is "
+      "allowed",
+      update->ntimestep, result.iterations, result.residual.feasibility,
+      result.residual.complementarity, tolerance_);
+  if (!warn_only_)
+    error->all(FLERR,
+               "Fix inelastic: {}. Either the scene leaves no room for the spheres, or: raise maxiter ({}), "
+               "raise the tolerance, or lower the timestep",
+               message, max_iterations_);
+  if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
+}
+
+/* ----------------------------------------------------------------------
+   record
+------------------------------------------------------------------------- */
+
+// One .npz per recorded step; ../doc/fix_inelastic.md lists its arrays.
+void FixInelastic::record_problem()
+{
+  constexpr int PER_ATOM = 13;
+  constexpr int PER_CONTACT = 9;
+  std::vector<double> atoms, contacts;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    const double *const predicted = &problem_.predicted_velocity[3 * i];
+    const double *const projected = &velocity_[3 * i];
+    const double *const x = atom->x[i];
+    for (const double value :
+         {static_cast<double>(atom->tag[i]), problem_.inverse_mass[i], atom->radius[i], x[0], x[1], x[2],
+          predicted[0], predicted[1], predicted[2], projected[0], projected[1], projected[2], mass(i)})
+      atoms.push_back(value);
+  }
+  for (std::size_t c = 0; c < problem_.contacts.size(); ++c) {
+    const int j = problem_.contacts.second[c];
+    const double *const n = &problem_.contacts.normal[3 * c];
+    const Origin &origin = origin_[c];
+    const double partner = origin.wall ? -origin.wall : static_cast<double>(atom->tag[j]);
+    for (const double value :
+         {static_cast<double>(atom->tag[problem_.contacts.first[c]]), partner, n[0], n[1], n[2],
+          problem_.contacts.gap[c], origin.gap_now, origin.wall_motion, problem_.contacts.impulse[c]})
+      contacts.push_back(value);
+  }
+  const std::vector<double> all_atoms = gather(atoms);
+  const std::vector<double> all_contacts = gather(contacts);
+  std::string message;
+  if (comm->me == 0) {
+    const std::size_t number = all_atoms.size() / PER_ATOM;
+    std::vector<std::size_t> order(number);
+    for (std::size_t k = 0; k < number; ++k) order[k] = k;
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return all_atoms[PER_ATOM * a] < all_atoms[PER_ATOM * b];
+    });
+    auto column = [&](int from, int width) {
+      std::vector<double> values;
+      for (const std::size_t k : order)
+        for (int d = 0; d < width; ++d) values.push_back(all_atoms[PER_ATOM * k + from + d]);
+      return values;
+    };
+    auto contact_column = [&](int from, int width) {
+      std::vector<double> values;
+      for (std::size_t k = 0; k < all_contacts.size() / PER_CONTACT; ++k)
+        for (int d = 0; d < width; ++d) values.push_back(all_contacts[PER_CONTACT * k + from + d]);
+      return values;
+    };
+    auto integers = [](const std::vector<double> &values) {
+      return std::vector<std::int64_t>(values.begin(), values.end());
+    };
+    inelastic::NpzWriter file;
+    file.add("step", static_cast<double>(update->ntimestep));
+    file.add("timestep", problem_.timestep);
+    file.add("tolerance", tolerance_);
+    file.add("id", integers(column(0, 1)));
+    file.add("inverse_mass", column(1, 1));
+    file.add("radius", column(2, 1));
+    file.add("position", column(3, 3), 3);
+    file.add("predicted_velocity", column(6, 3), 3);
+    file.add("velocity", column(9, 3), 3);
+    file.add("mass", column(12, 1));
+    file.add("id1", integers(contact_column(0, 1)));
+    file.add("id2", integers(contact_column(1, 1)));
+    file.add("normal", contact_column(2, 3), 3);
+    file.add("gap", contact_column(5, 1));
+    file.add("gap_now", contact_column(6, 1));
+    file.add("wall_motion", contact_column(7, 1));
+    file.add("impulse", contact_column(8, 1));
+    const std::string path = utils::star_subst(record_file_, update->ntimestep, 0);
+    if (!file.write(path))
+      message = fmt::format("cannot write the record {}: {}", path, utils::getsyserror());
+  }
+  fail_together(message);
+}
+
+std::vector<double> FixInelastic::gather(const std::vector<double> &mine) const
+{
+  const int count = static_cast<int>(mine.size());
+  std::vector<int> counts(comm->nprocs), offsets(comm->nprocs, 0);
+  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, world);
+  for (int rank = 1; rank < comm->nprocs; ++rank) offsets[rank] = offsets[rank - 1] + counts[rank - 1];
+  std::vector<double> all(comm->me == 0 ? offsets.back() + counts.back() : 0);
+  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(), MPI_DOUBLE, 0,
+              world);
+  return all;
+}
+
+double FixInelastic::mass(int i) const
+{
+  return atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
+}
+
+double FixInelastic::memory_usage()
+{
+  const double per_atom = STATE_SIZE + size_peratom_cols + 20.0;
+  const double per_contact = 20.0 + 10.0;
+  return sizeof(double) *
+      (per_atom * max_atoms_ + per_contact * static_cast<double>(problem_.contacts.size()));
+}

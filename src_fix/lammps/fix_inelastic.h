@@ -1,0 +1,209 @@
+/* -*- c++ -*- ----------------------------------------------------------
+   Inelastic contacts between hard spheres by projection of the predicted
+   velocity (Faure, Lefebvre-Lepot and Semin, ESAIM: Proceedings 28 (2009) 13;
+   Maury, Numer. Math. 102 (2006) 649).
+
+   The physics and the solvers are in ../core; this fix parses, collects the
+   contacts, calls the core, adds the contact forces and reports.
+------------------------------------------------------------------------- */
+
+#ifdef FIX_CLASS
+// clang-format off
+FixStyle(inelastic,FixInelastic);
+// clang-format on
+#else
+
+#ifndef LMP_FIX_INELASTIC_H
+#define LMP_FIX_INELASTIC_H
+
+#include "contact_memory.h"
+#include "fix.h"
+#include "host.h"
+#include "projection.h"
+#include "region_walls.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class FixInelastic : public Fix, private inelastic::Host, private inelastic::ConstraintSource {
+ public:
+  FixInelastic(class LAMMPS *, int, char **);
+  ~FixInelastic() override;
+
+  int setmask() override;
+  void init() override;
+  void init_list(int, class NeighList *) override;
+  void setup_post_neighbor() override;
+  void setup(int) override;
+  void pre_exchange() override;
+  void post_neighbor() override;
+  void post_force(int) override;
+  void post_run() override;
+
+  void grow_arrays(int) override;
+  void copy_arrays(int, int, int) override;
+  void set_arrays(int) override;
+  int pack_exchange(int, double *) override;
+  int unpack_exchange(int, double *) override;
+
+  int pack_forward_comm(int, int *, double *, int, int *) override;
+  void unpack_forward_comm(int, int, double *) override;
+  int pack_reverse_comm_size(int, int) override;
+  int pack_reverse_comm(int, int, double *) override;
+  void unpack_reverse_comm(int, int *, double *) override;
+
+  double compute_vector(int) override;
+  double compute_array(int, int) override;
+  int modify_param(int, char **) override;
+  double memory_usage() override;
+
+ private:
+  // Settings
+  double tolerance_;    // eps, the largest overlap allowed [length]
+  std::string solver_name_;
+  long max_iterations_;
+  bool warn_only_;
+  bool shorten_;
+  int frozen_bit_;
+  std::string record_file_;
+  int record_every_;
+
+  // What the core works on
+  std::unique_ptr<inelastic::Solver> solver_;
+  inelastic::ContactProblem problem_;
+  std::vector<double> velocity_;    // the projection, 3 per atom, copies included
+  std::unique_ptr<RegionWalls> walls_;
+  class NeighList *list_;
+
+  // Beside each constraint of problem_.contacts
+  struct Origin {
+    int wall;              // 0 = two particles, otherwise the wall's number
+    double gap_now;        // at the present positions
+    double size;           // sum of the radii; the radius at a wall
+    double wall_motion;    // by how much the wall closes the gap during the step
+  };
+  std::vector<Origin> origin_;
+  std::vector<char> listed_pair_taken_;    // per pair of the neighbour list: is it in the problem?
+  std::unordered_map<std::uint64_t, std::size_t> wall_constraint_;    // atom and wall -> constraint
+  double margin_;                // what comes closer than this is in the problem from the start
+  int relinearisations_;         // in this step
+  std::string message_;          // what went wrong on this rank while collecting
+
+  // A bad start: overlaps beyond the regular ones are first treated as touching, then pushed apart.
+  enum class Phase { CONTACT, PUSH };
+  Phase phase_;
+  bool bad_overlap_;
+
+  // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the last
+  // move (NEXT) and as LAMMPS holds it between runs, half a kick earlier (HELD).
+  enum StateColumn { EXPECTED_X = 0, EXPECTED_V = 3, PUSH_NEXT = 6, PUSH_HELD = 9, STATE_SIZE = 12 };
+  double **state_;
+  ContactMemory memory_;
+  bool memory_complete_;    // both atoms of every contact remember it
+
+  // The neighbour list's reach
+  double largest_radius_;
+  bool one_cutoff_;       // the list is by one cutoff for all pairs, not by their radii
+  double list_reach_;     // gap beyond which a pair may be missing from a fresh list
+  double spread_at_start_;    // largest relative displacement since the list was built
+  std::vector<double> position_at_build_, displacement_;
+
+  double regular_timestep_;
+  bool expecting_;    // state_ holds a prediction to compare with
+  double kick_;       // time for which the force acts before the next move
+
+  // Output
+  enum Output {
+    ITERATIONS,
+    FEASIBILITY,
+    COMPLEMENTARITY,
+    OVERLAP,
+    PARTICLE_CONTACTS,
+    WALL_CONTACTS,
+    CONSTRAINTS,
+    ROUNDS,
+    TOTAL_ITERATIONS,
+    SHORTENED_STEPS,
+    EXCESS,
+    OUTPUT_SIZE
+  };
+  double output_[OUTPUT_SIZE];
+  std::vector<double> contact_force_, contact_count_;    // 3 per atom, copies included
+  std::vector<double> virial_diagonal_, virial_off_diagonal_;
+  std::vector<double> wall_force_;    // on each wall, this rank's share
+  std::vector<double> wall_force_total_;
+  bigint wall_force_step_;
+  int max_atoms_;
+  int max_contacts_;
+
+  // Summary of a run
+  double run_iterations_, run_largest_overlap_, run_largest_excess_;
+  long run_steps_, run_unconverged_;
+
+  // Communication
+  MPI_Op reduction_;
+  MPI_Datatype reduction_type_;
+  double *exchanged_;    // the per-particle vectors that pack and unpack work on
+  bool exchanging_memory_;
+
+  // Host
+  void sum_over_copies(double *) override;
+  void share_with_copies(double *) override;
+  void reduce(double *, int, double *, int) override;
+  bool has_copies() const;
+
+  // ConstraintSource
+  long refine(const std::vector<double> &, inelastic::ContactProblem &) override;
+
+  // One step
+  void advance(int vflag, double kick_steps);
+  void check_expected();
+  void predict(double kick_steps);
+  void collect();
+  void push_apart(inelastic::ProjectionResult &);
+  void apply_forces(double kick_steps);
+  void update_outputs(const inelastic::ProjectionResult &);
+  void remember_contacts();
+  void record_problem();
+
+  // Constraints
+  template <typename Visitor> void for_each_listed_pair(Visitor &&) const;
+  void collect_pairs();
+  void collect_walls();
+  void take_pair(std::size_t slot, int i, int j);
+  void take_wall(const RegionWalls::Look &, const WallView &);
+  long add_violated_pairs(const std::vector<double> &velocity);
+  long add_violated_walls(const std::vector<double> &velocity);
+  long relinearise_walls(const std::vector<double> &velocity);
+  std::vector<RegionWalls::Look> looks(const double *velocity, bool at_end, double beyond) const;
+  double effective_gap(double gap_now, double size) const;
+  void note_overlap(double gap);
+  std::uint64_t wall_key(int i, int wall) const
+  {
+    return static_cast<std::uint64_t>(i) * (walls_->number_of_walls() + 1) + wall;
+  }
+
+  // Reach and time step
+  double spread(const double *values);
+  double spread_since_build(const double *velocity);
+  void shorten_step(double factor);
+  void set_timestep(double timestep);
+
+  void complete_memory();
+  void tally_virial(int i, int j, const double *virial);
+  void share_virial();
+  void unconverged(const inelastic::ProjectionResult &);
+  void fail_together(const std::string &message);
+  std::vector<double> gather(const std::vector<double> &mine) const;
+  double mass(int i) const;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
+#endif

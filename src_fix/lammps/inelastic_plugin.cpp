@@ -1,0 +1,83 @@
+// Registers the fixes when LAMMPS loads this file as a plugin.
+
+#include "fix_inelastic.h"
+#include "fix_random_force.h"
+
+#include "comm.h"
+#include "error.h"
+#include "lammps.h"
+
+#include <cstring>
+
+using namespace LAMMPS_NS;
+
+// The plugin interface of LAMMPS (manual: Developer guide, Writing plugins), whose header the wheel
+// does not ship.
+extern "C" {
+typedef void *(lammpsplugin_factory1) (void *);
+typedef void *(lammpsplugin_factory2) (void *, int, char **);
+
+typedef struct {
+  const char *version;
+  const char *style;
+  const char *name;
+  const char *info;
+  const char *author;
+  union {
+    lammpsplugin_factory1 *v1;
+    lammpsplugin_factory2 *v2;
+  } creator;
+  void *handle;
+} lammpsplugin_t;
+
+typedef void (*lammpsplugin_regfunc)(lammpsplugin_t *, void *);
+
+__attribute__((visibility("default"))) void lammpsplugin_init(void *, void *, void *);
+}
+
+namespace {
+
+Fix *create_fix_inelastic(LAMMPS *lmp, int narg, char **arg)
+{
+  return new FixInelastic(lmp, narg, arg);
+}
+
+Fix *create_fix_random_force(LAMMPS *lmp, int narg, char **arg)
+{
+  return new FixRandomForce(lmp, narg, arg);
+}
+
+}    // namespace
+
+void lammpsplugin_init(void *lmp_pointer, void *handle, void *register_function)
+{
+  auto *lmp = static_cast<LAMMPS *>(lmp_pointer);
+
+  // The classes that plugins share with LAMMPS change their layout even within a release: two updates
+  // that both print one date do not fit together. The git descriptor tells them apart.
+  if (strcmp(LAMMPS::git_descriptor(), INELASTIC_LAMMPS_BUILD) != 0) {
+    if (lmp->comm->me == 0)
+      lmp->error->warning(FLERR,
+                          "fix inelastic is not available: its plugin was built for LAMMPS {}, this is {}. "
+                          "Install lammps-inelastic again in this environment",
+                          INELASTIC_LAMMPS_BUILD, LAMMPS::git_descriptor());
+    return;
+  }
+
+  auto *register_plugin = reinterpret_cast<lammpsplugin_regfunc>(register_function);
+  lammpsplugin_t plugin{};
+  plugin.version = lmp->version;
+  plugin.style = "fix";
+  plugin.author = "the lammps-inelastic developers";
+  plugin.handle = handle;
+
+  plugin.name = "inelastic";
+  plugin.info = "inelastic contacts between hard spheres by projection of velocities";
+  plugin.creator.v2 = reinterpret_cast<lammpsplugin_factory2 *>(&create_fix_inelastic);
+  register_plugin(&plugin, lmp);
+
+  plugin.name = "random/force";
+  plugin.info = "random force that is the same on any number of ranks";
+  plugin.creator.v2 = reinterpret_cast<lammpsplugin_factory2 *>(&create_fix_random_force);
+  register_plugin(&plugin, lmp);
+}

@@ -1,0 +1,153 @@
+#include "region_walls.h"
+
+#include "domain.h"
+#include "error.h"
+#include "modify.h"
+#include "region.h"
+#include "update.h"
+
+#include <cmath>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+
+namespace {
+
+constexpr double EVERYTHING = 1.0e300;    // a reach that no wall exceeds
+
+WallView make_view(const Region::Contact &contact, int first_wall)
+{
+  WallView view{};
+  view.wall = first_wall + contact.iwall;
+  view.distance = view.distance_now = contact.r;
+  const double inverse = contact.r > 0.0 ? 1.0 / contact.r : 0.0;
+  view.normal[0] = contact.delx * inverse;
+  view.normal[1] = contact.dely * inverse;
+  view.normal[2] = contact.delz * inverse;
+  return view;
+}
+
+}    // namespace
+
+RegionWalls::RegionWalls(LAMMPS *lmp, std::vector<std::string> region_ids) :
+    Pointers(lmp), ids_(std::move(region_ids))
+{
+}
+
+void RegionWalls::init()
+{
+  obstacles_.clear();
+  number_of_walls_ = 0;
+  exact_ = true;
+  for (const std::string &id : ids_) {
+    Region *region = domain->get_region_by_id(id);
+    if (!region) error->all(FLERR, "Fix inelastic: region {} does not exist", id);
+    const bool moving = region->dynamic_check() != 0;
+    const bool flat = strcmp(region->style, "block") == 0 || strcmp(region->style, "plane") == 0 ||
+        strcmp(region->style, "prism") == 0;
+    // The distance to a convex obstacle (side out) is a convex function, like the one to a flat wall.
+    // Motion changes nothing: walls are taken where they stand at the end of the step.
+    const bool convex_obstacle = !region->interior && !region->openflag &&
+        strcmp(region->style, "union") != 0 && strcmp(region->style, "intersect") != 0;
+    const bool exact = flat || convex_obstacle;
+    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact});
+    number_of_walls_ += region->cmax;
+    exact_ = exact_ && exact;
+  }
+}
+
+std::string RegionWalls::wall_name(int wall) const
+{
+  std::size_t which = 0;
+  while (which + 1 < obstacles_.size() && obstacles_[which + 1].first_wall <= wall) ++which;
+  return "wall " + std::to_string(wall) + " (region " + ids_[which] + ")";
+}
+
+void RegionWalls::view(const std::vector<Look> &looks, bool inexact_only,
+                       const std::function<void(const Look &, const WallView &)> &found,
+                       const std::function<void(const Look &, const std::string &)> &outside)
+{
+  for (const Obstacle &obstacle : obstacles_) {
+    if (inexact_only && obstacle.exact) continue;
+    if (obstacle.moving)
+      view_moving(obstacle, looks, found, outside);
+    else
+      view_static(obstacle, looks, found, outside);
+  }
+}
+
+void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Look> &looks,
+                              const std::function<void(const Look &, const WallView &)> &found,
+                              const std::function<void(const Look &, const std::string &)> &outside)
+{
+  Region *region = obstacle.region;
+  for (const Look &look : looks) {
+    const double *x = look.where;
+    const int count = region->surface(x[0], x[1], x[2], look.reach);
+    for (int k = 0; k < count; ++k)
+      found(look, make_view(region->contact[k], obstacle.first_wall));
+    if (count == 0 && !region->match(x[0], x[1], x[2])) outside(look, region->id);
+  }
+}
+
+// Variables that move a region are evaluated for the end of the step by setting LAMMPS's clock ahead.
+void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)
+{
+  modify->clearstep_compute();
+  update->ntimestep += steps_ahead;
+  obstacle.region->prematch();
+  update->ntimestep -= steps_ahead;
+  modify->addstep_compute(update->ntimestep + 1);
+}
+
+void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Look> &looks,
+                              const std::function<void(const Look &, const WallView &)> &found,
+                              const std::function<void(const Look &, const std::string &)> &outside)
+{
+  Region *region = obstacle.region;
+
+  set_clock(obstacle, 0);
+  const double now[3] = {region->dx, region->dy, region->dz};
+  set_clock(obstacle, 1);
+  const double shift[3] = {region->dx - now[0], region->dy - now[1], region->dz - now[2]};
+  const double shift_length =
+      std::sqrt(shift[0] * shift[0] + shift[1] * shift[1] + shift[2] * shift[2]);
+
+  struct Seen {
+    const Look *look;
+    WallView view;
+    bool passed_over;
+  };
+  std::vector<Seen> seen;
+  for (const Look &look : looks) {
+    const double *x = look.where;
+    const int count = region->surface(x[0], x[1], x[2], look.reach);
+    for (int k = 0; k < count; ++k)
+      seen.push_back({&look, make_view(region->contact[k], obstacle.first_wall), false});
+    if (count == 0 && !region->match(x[0], x[1], x[2])) seen.push_back({&look, WallView{}, true});
+  }
+
+  set_clock(obstacle, 0);
+  for (Seen &entry : seen) {
+    const double *x = entry.look->where;
+    if (entry.passed_over) {
+      // The wall will have swept over the centre. LAMMPS then sees no wall, but for one that only
+      // translates the distance it will have follows from the one it has now.
+      const int count = region->rotateflag || region->varshape
+          ? 0
+          : region->surface(x[0], x[1], x[2], entry.look->reach + shift_length);
+      for (int k = 0; k < count; ++k) {
+        WallView view = make_view(region->contact[k], obstacle.first_wall);
+        for (int d = 0; d < 3; ++d) view.distance -= view.normal[d] * shift[d];
+        if (view.distance < entry.look->reach) found(*entry.look, view);
+      }
+      if (count == 0) outside(*entry.look, region->id);
+      continue;
+    }
+    const int count = region->surface(x[0], x[1], x[2], EVERYTHING);
+    for (int k = 0; k < count; ++k)
+      if (obstacle.first_wall + region->contact[k].iwall == entry.view.wall)
+        entry.view.distance_now = region->contact[k].r;
+    found(*entry.look, entry.view);
+  }
+}

@@ -1,0 +1,80 @@
+// LAMMPS regions as obstacles: which walls a sphere can reach in a step, and how far they are at the
+// end of it.
+
+#ifndef INELASTIC_REGION_WALLS_H
+#define INELASTIC_REGION_WALLS_H
+
+#include "pointers.h"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class Region;
+
+// One wall seen from the centre of one sphere.
+struct WallView {
+  int wall;             // 1, 2, ... over all regions of the fix
+  double distance;      // from the sphere's centre to the wall as it will stand at the end of the step
+  double normal[3];     // unit vector from the wall to the centre, for the wall at the end of the step
+  double distance_now;  // to the wall as it stands now; the difference is the wall's own motion
+};
+
+class RegionWalls : protected Pointers {
+ public:
+  RegionWalls(class LAMMPS *lmp, std::vector<std::string> region_ids);
+
+  // Finds the regions and numbers their walls. Errors: a region that does not exist.
+  void init();
+
+  bool empty() const { return ids_.empty(); }
+  int number_of_walls() const { return number_of_walls_; }
+  // 1 for the first region's first wall and so on; for messages.
+  std::string wall_name(int wall) const;
+
+  // All walls flat (or convex obstacles): the linearised constraint is exact or on the safe side, and
+  // no look at the end of the step is needed.
+  bool exact() const { return exact_; }
+
+  // A point from which to look at the walls: `where` is the centre of atom i, or the place where it
+  // will be; walls whose distance is below `reach` are wanted.
+  struct Look {
+    int atom;
+    double where[3];
+    double reach;
+  };
+
+  // Calls found(look, view) for every wall within reach. outside(look) is called instead for a centre
+  // that lies on the wrong side of a region, from where LAMMPS sees no wall. `inexact_only` leaves
+  // out the regions whose constraints are exact. Collective (variables of moving regions).
+  void view(const std::vector<Look> &looks, bool inexact_only,
+            const std::function<void(const Look &, const WallView &)> &found,
+            const std::function<void(const Look &, const std::string &region)> &outside);
+
+ private:
+  struct Obstacle {
+    Region *region;
+    int first_wall;
+    bool moving;
+    bool exact;
+  };
+
+  void view_static(const Obstacle &, const std::vector<Look> &,
+                   const std::function<void(const Look &, const WallView &)> &,
+                   const std::function<void(const Look &, const std::string &)> &);
+  void view_moving(const Obstacle &, const std::vector<Look> &,
+                   const std::function<void(const Look &, const WallView &)> &,
+                   const std::function<void(const Look &, const std::string &)> &);
+  void set_clock(const Obstacle &, int steps_ahead);
+
+  std::vector<std::string> ids_;
+  std::vector<Obstacle> obstacles_;
+  int number_of_walls_ = 0;
+  bool exact_ = true;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,74 @@
+"""The projection problem: see src_fix/core/contact_problem.h for the equations.
+
+n particles, m contacts. ``first`` and ``second`` are int64 arrays (m,) of particle indices, second
+= -1 for a wall; ``normal`` (m, 3) are unit vectors from second to first; ``gap`` (m,) [length] is
+negative for an overlap. ``inverse_mass`` (n,) [1 / mass], zero for a frozen particle. Arrays are
+float64 and C-contiguous. ValueError for wrong shapes, indices out of range, numbers that are not
+finite and contacts between two particles that cannot move.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+class Projection:
+    @property
+    def velocity(self) -> NDArray[np.float64]: ...  # (n, 3) [length / time]
+    @property
+    def impulse(self) -> NDArray[np.float64]: ...  # (m,) [mass length / time], >= 0
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def feasibility(self) -> float: ...  # largest overlap left at the end of the step [length]
+    @property
+    def complementarity(self) -> float: ...  # largest gap where an impulse acts [length]
+
+def project(
+    predicted_velocity: NDArray[np.float64],
+    inverse_mass: NDArray[np.float64],
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    normal: NDArray[np.float64],
+    gap: NDArray[np.float64],
+    *,
+    timestep: float,
+    tolerance: float,
+    solver: str = "apgd",
+    max_iterations: int = 100000,
+    impulse: NDArray[np.float64] | None = None,
+) -> Projection:
+    """Project ``predicted_velocity`` (n, 3) onto the velocities that keep every contact apart.
+
+    Both residuals come down to ``tolerance`` [length] (with "uzawa" only the feasibility), or
+    ``converged`` is False after ``max_iterations``. ``impulse`` (m,) is a first guess for "apgd".
+    """
+
+def residual(
+    predicted_velocity: NDArray[np.float64],
+    inverse_mass: NDArray[np.float64],
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    normal: NDArray[np.float64],
+    gap: NDArray[np.float64],
+    impulse: NDArray[np.float64],
+    *,
+    timestep: float,
+) -> tuple[float, float]:
+    """Feasibility and complementarity [length] of given impulses."""
+
+def largest_eigenvalue(
+    inverse_mass: NDArray[np.float64],
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    normal: NDArray[np.float64],
+    *,
+    timestep: float,
+) -> float:
+    """Largest eigenvalue of h G M^-1 G^T [time / mass], to about 1e-3."""
+
+def uniform_vector(seed: int, particle: int, step: int) -> tuple[float, float, float]:
+    """The three numbers, uniform in [-1, 1], that ``fix random/force`` gives one particle."""
+
+def write_npz(path: str, arrays: dict[str, NDArray[np.float64]]) -> None:
+    """Write (n, 3) arrays with the core's own .npz writer. RuntimeError when it cannot."""

@@ -1,0 +1,200 @@
+// The core as a Python module. Shapes, units and errors are documented in _core.pyi.
+
+#include "contact_problem.h"
+#include "npz.h"
+#include "random.h"
+#include "solver.h"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+using Vectors = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Scalars = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+nb::ndarray<nb::numpy, double> to_numpy(const std::vector<double> &values, std::size_t columns)
+{
+  auto *data = new double[std::max<std::size_t>(values.size(), 1)];
+  std::copy(values.begin(), values.end(), data);
+  nb::capsule owner(data, [](void *pointer) noexcept { delete[] static_cast<double *>(pointer); });
+  if (columns == 0) {
+    const std::size_t shape[1] = {values.size()};
+    return {data, 1, shape, owner};
+  }
+  const std::size_t shape[2] = {values.size() / columns, columns};
+  return {data, 2, shape, owner};
+}
+
+template <typename Array> void require_length(const Array &array, std::size_t length, const char *name)
+{
+  if (array.shape(0) != length)
+    throw nb::value_error((std::string(name) + " must have length " + std::to_string(length) +
+                           ", not " + std::to_string(array.shape(0)))
+                              .c_str());
+}
+
+inelastic::ContactProblem make_problem(const Vectors &predicted_velocity, const Scalars &inverse_mass,
+                                       const Indices &first, const Indices &second,
+                                       const Vectors &normal, const Scalars &gap, double timestep,
+                                       const std::optional<Scalars> &impulse)
+{
+  const std::size_t particles = predicted_velocity.shape(0);
+  const std::size_t count = gap.shape(0);
+  require_length(inverse_mass, particles, "inverse_mass");
+  require_length(first, count, "first");
+  require_length(second, count, "second");
+  require_length(normal, count, "normal");
+  if (impulse) require_length(*impulse, count, "impulse");
+  if (!(timestep > 0.0)) throw nb::value_error("timestep must be greater than 0");
+
+  inelastic::ContactProblem problem;
+  problem.timestep = timestep;
+  problem.resize(static_cast<int>(particles));
+  std::copy_n(predicted_velocity.data(), 3 * particles, problem.predicted_velocity.begin());
+  std::copy_n(inverse_mass.data(), particles, problem.inverse_mass.begin());
+  const auto limit = static_cast<std::int64_t>(particles);
+  for (std::size_t c = 0; c < count; ++c) {
+    const std::int64_t i = first.data()[c];
+    const std::int64_t j = second.data()[c];
+    if (i < 0 || i >= limit || j < -1 || j >= limit)
+      throw nb::value_error(("contact " + std::to_string(c) + " names a particle outside 0 ... " +
+                             std::to_string(limit - 1))
+                                .c_str());
+    const double w =
+        problem.inverse_mass[i] + (j < 0 ? 0.0 : problem.inverse_mass[static_cast<std::size_t>(j)]);
+    if (!(w > 0.0))
+      throw nb::value_error(
+          ("contact " + std::to_string(c) + " is between particles that cannot move").c_str());
+    problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j),
+                         normal.data() + 3 * c, gap.data()[c], impulse ? impulse->data()[c] : 0.0);
+  }
+  for (const std::vector<double> *values :
+       {&problem.predicted_velocity, &problem.inverse_mass, &problem.contacts.normal,
+        &problem.contacts.gap, &problem.contacts.impulse})
+    for (const double value : *values)
+      if (!std::isfinite(value)) throw nb::value_error("every number must be finite");
+  return problem;
+}
+
+struct Projection {
+  std::vector<double> velocity;
+  std::vector<double> impulse;
+  long iterations;
+  bool converged;
+  inelastic::Residual residual;
+};
+
+inelastic::Residual residual_of(const inelastic::ContactProblem &problem)
+{
+  inelastic::SerialHost host;
+  inelastic::GapOperator gap_operator;
+  std::vector<double> gap_at_end(problem.contacts.size());
+  gap_operator.prepare(problem);
+  gap_operator.apply(problem, problem.contacts.impulse.data(), gap_at_end.data(), host);
+  return inelastic::residual(gap_at_end.data(), problem.contacts.impulse.data(), gap_at_end.size());
+}
+
+Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mass,
+                   const Indices &first, const Indices &second, const Vectors &normal,
+                   const Scalars &gap, double timestep, double tolerance, const std::string &solver_name,
+                   long max_iterations, const std::optional<Scalars> &impulse)
+{
+  if (!(tolerance > 0.0)) throw nb::value_error("tolerance must be greater than 0");
+  auto solver = inelastic::make_solver(solver_name);
+  if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
+  inelastic::ContactProblem problem = make_problem(predicted_velocity, inverse_mass, first, second,
+                                                   normal, gap, timestep, impulse);
+  inelastic::SerialHost host;
+  Projection projection;
+  const inelastic::SolverResult result = solver->solve(problem, {tolerance, max_iterations}, host);
+  projection.iterations = result.iterations;
+  projection.converged = result.converged;
+  projection.residual = residual_of(problem);
+  projection.impulse = problem.contacts.impulse;
+  projection.velocity.resize(3 * static_cast<std::size_t>(problem.particles));
+  inelastic::GapOperator gap_operator;
+  gap_operator.prepare(problem);
+  gap_operator.velocity(problem, problem.contacts.impulse.data(), projection.velocity.data(), host);
+  return projection;
+}
+
+}    // namespace
+
+NB_MODULE(_core, module)
+{
+  nb::class_<Projection>(module, "Projection")
+      .def_prop_ro("velocity", [](const Projection &p) { return to_numpy(p.velocity, 3); })
+      .def_prop_ro("impulse", [](const Projection &p) { return to_numpy(p.impulse, 0); })
+      .def_ro("iterations", &Projection::iterations)
+      .def_ro("converged", &Projection::converged)
+      .def_prop_ro("feasibility", [](const Projection &p) { return p.residual.feasibility; })
+      .def_prop_ro("complementarity", [](const Projection &p) { return p.residual.complementarity; });
+
+  module.def("project", &project, "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a,
+             "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "solver"_a = "apgd",
+             "max_iterations"_a = 100000, "impulse"_a = nb::none());
+
+  module.def(
+      "residual",
+      [](const Vectors &predicted_velocity, const Scalars &inverse_mass, const Indices &first,
+         const Indices &second, const Vectors &normal, const Scalars &gap, const Scalars &impulse,
+         double timestep) {
+        const inelastic::Residual worst = residual_of(make_problem(
+            predicted_velocity, inverse_mass, first, second, normal, gap, timestep, impulse));
+        return nb::make_tuple(worst.feasibility, worst.complementarity);
+      },
+      "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, "gap"_a,
+      "impulse"_a, nb::kw_only(), "timestep"_a);
+
+  module.def(
+      "largest_eigenvalue",
+      [](const Scalars &inverse_mass, const Indices &first, const Indices &second,
+         const Vectors &normal, double timestep) {
+        const std::vector<double> zeros(3 * inverse_mass.shape(0) + first.shape(0), 0.0);
+        const std::size_t velocity_shape[2] = {inverse_mass.shape(0), 3};
+        const std::size_t gap_shape[1] = {first.shape(0)};
+        const Vectors velocity(zeros.data(), 2, velocity_shape);
+        const Scalars gap(zeros.data(), 1, gap_shape);
+        inelastic::SerialHost host;
+        return inelastic::largest_eigenvalue(
+            make_problem(velocity, inverse_mass, first, second, normal, gap, timestep, {}), host);
+      },
+      "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, nb::kw_only(), "timestep"_a);
+
+  module.def(
+      "uniform_vector",
+      [](std::uint32_t seed, std::uint64_t particle, std::uint64_t step) {
+        const auto vector = inelastic::uniform_vector(seed, particle, step);
+        return nb::make_tuple(vector[0], vector[1], vector[2]);
+      },
+      "seed"_a, "particle"_a, "step"_a);
+
+  module.def(
+      "write_npz",
+      [](const std::string &path, nb::dict arrays) {
+        inelastic::NpzWriter writer;
+        for (const auto &[name, values] : arrays) {
+          const auto array = nb::cast<Vectors>(values);
+          writer.add(nb::cast<std::string>(name),
+                     std::vector<double>(array.data(), array.data() + array.size()), 3);
+        }
+        if (!writer.write(path))
+          throw std::runtime_error("cannot write " + path + ": " + std::strerror(errno));
+      },
+      "path"_a, "arrays"_a);
+}
