@@ -1,5 +1,7 @@
 #include "contact_problem.h"
 
+#include "vectorise.h"
+
 #include <algorithm>
 
 namespace inelastic {
@@ -29,26 +31,56 @@ void GapOperator::prepare(const ContactProblem &problem)
   }
 }
 
+// Contacts come in runs with the same first particle, in the order of the neighbour list. Its sum is
+// kept in registers over a run: through memory each addition would wait for the one before.
+INELASTIC_CLONES void scatter_impulses(const ContactSet &contacts, const double *impulse, double *sum)
+{
+  const std::size_t count = contacts.size();
+  const int *const first = contacts.first.data();
+  const int *const second = contacts.second.data();
+  const double *n = contacts.normal.data();
+  std::size_t c = 0;
+  while (c < count) {
+    const int i = first[c];
+    double ix = 0.0, iy = 0.0, iz = 0.0;
+    for (; c < count && first[c] == i; ++c, n += 3) {
+      const double lambda = impulse[c];
+      double *const j = sum + 3 * static_cast<std::size_t>(second[c]);
+      const double x = lambda * n[0], y = lambda * n[1], z = lambda * n[2];
+      ix += x;
+      iy += y;
+      iz += z;
+      j[0] -= x;
+      j[1] -= y;
+      j[2] -= z;
+    }
+    double *const own = sum + 3 * static_cast<std::size_t>(i);
+    own[0] += ix;
+    own[1] += iy;
+    own[2] += iz;
+  }
+}
+
+INELASTIC_CLONES void gather_gaps(const ContactSet &contacts, const double *free_gap, double timestep,
+                                  const double *change, double *gap_at_end)
+{
+  const std::size_t count = contacts.size();
+  const int *const first = contacts.first.data();
+  const int *const second = contacts.second.data();
+  const double *n = contacts.normal.data();
+  for (std::size_t c = 0; c < count; ++c, n += 3) {
+    const double *const i = change + 3 * static_cast<std::size_t>(first[c]);
+    const double *const j = change + 3 * static_cast<std::size_t>(second[c]);
+    gap_at_end[c] = free_gap[c] +
+        timestep * (n[0] * (i[0] - j[0]) + n[1] * (i[1] - j[1]) + n[2] * (i[2] - j[2]));
+  }
+}
+
 void GapOperator::velocity_change(const ContactProblem &problem, const double *impulse, Host &host)
 {
-  const ContactSet &contacts = problem.contacts;
   double *const change = change_.data();
   std::fill(change_.begin(), change_.end(), 0.0);
-  const std::size_t count = contacts.size();
-  for (std::size_t c = 0; c < count; ++c) {
-    const double *n = &contacts.normal[3 * c];
-    double *pi = change + 3 * static_cast<std::size_t>(contacts.first[c]);
-    double *pj = change + 3 * static_cast<std::size_t>(contacts.second[c]);
-    const double px = impulse[c] * n[0];
-    const double py = impulse[c] * n[1];
-    const double pz = impulse[c] * n[2];
-    pi[0] += px;
-    pi[1] += py;
-    pi[2] += pz;
-    pj[0] -= px;
-    pj[1] -= py;
-    pj[2] -= pz;
-  }
+  scatter_impulses(problem.contacts, impulse, change);
   host.sum_over_copies(change);
   for (std::size_t i = 0; i <= static_cast<std::size_t>(problem.particles); ++i) {
     const double w = problem.inverse_mass[i];
@@ -62,17 +94,7 @@ void GapOperator::apply(const ContactProblem &problem, const double *impulse, do
                         Host &host)
 {
   velocity_change(problem, impulse, host);
-  const ContactSet &contacts = problem.contacts;
-  const double *const change = change_.data();
-  const double h = problem.timestep;
-  const std::size_t count = contacts.size();
-  for (std::size_t c = 0; c < count; ++c) {
-    const double *n = &contacts.normal[3 * c];
-    const double *ui = change + 3 * static_cast<std::size_t>(contacts.first[c]);
-    const double *uj = change + 3 * static_cast<std::size_t>(contacts.second[c]);
-    gap_at_end[c] = free_gap_[c] +
-        h * (n[0] * (ui[0] - uj[0]) + n[1] * (ui[1] - uj[1]) + n[2] * (ui[2] - uj[2]));
-  }
+  gather_gaps(problem.contacts, free_gap_.data(), problem.timestep, change_.data(), gap_at_end);
 }
 
 void GapOperator::velocity(const ContactProblem &problem, const double *impulse, double *velocity,

@@ -50,9 +50,20 @@ class AcceleratedProjectedGradient final : public Solver {
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
 
  private:
+  struct Advance {
+    double uphill;            // > 0: the momentum points uphill
+    double change_squared;    // squared norm of the change of the scaled impulses
+  };
+  struct Outcome {
+    double curved;    // change . A change
+    Residual residual;
+  };
+  Advance advance_impulses(std::size_t count, double momentum, double step);
+  Outcome compare(std::size_t count) const;
+
   GapOperator gap_operator_;
   double curvature_ = 0.0;    // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
-  std::vector<double> inverse_diagonal_;
+  std::vector<double> diagonal_;    // of A
   std::vector<double> impulse_, impulse_before_, impulse_next_;
   std::vector<double> gap_, gap_before_, gap_next_;
 };

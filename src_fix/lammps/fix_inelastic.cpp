@@ -30,7 +30,7 @@ namespace {
 constexpr int MAX_ROUNDS = 100;                 // of adding constraints; a handful is usual
 constexpr int MAX_RELINEARISATIONS = 20;        // per step; each one squares the error
 constexpr double REGULAR_OVERLAP = 2.0;         // in eps; more is a bad start
-constexpr double PUSH_LIMIT = 0.05;             // of the sum of radii, per step, out of a bad overlap
+constexpr double PUSH_LIMIT = 0.05;             // of the sum of radii, per regular step, out of a bad overlap
 constexpr double RELINEARISE_BEYOND = 1.1;      // in eps, overlap at the end of the step
 constexpr double COINCIDENT = 1.0e-10;          // of the sum of radii: no normal can be computed
 constexpr double EXPECTED_IN_EPS = 1.0e-7;      // how well the predicted motion must be met ...
@@ -358,7 +358,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
   next_reneighbor = next_start + 1.5 * motion > list_reach_ ? update->ntimestep + 1 : -1;
 
   // More pairs at once when the last projection had to come back for some, fewer otherwise.
-  margin_ *= result.rounds > 1 ? 1.3 : 0.98;
+  margin_ *= result.rounds > 1 ? 1.1 : 0.95;
   margin_ = std::clamp(margin_, 4.0 * tolerance_, std::max(4.0 * tolerance_, list_reach_));
   expecting_ = true;
 }
@@ -413,7 +413,9 @@ void FixInelastic::collect()
 double FixInelastic::effective_gap(double gap_now, double size) const
 {
   if (gap_now >= -REGULAR_OVERLAP * tolerance_) return gap_now;
-  return phase_ == Phase::CONTACT ? -tolerance_ : std::max(gap_now, -PUSH_LIMIT * size);
+  if (phase_ == Phase::CONTACT) return -tolerance_;
+  const double limit = PUSH_LIMIT * size * problem_.timestep / regular_timestep_;
+  return std::max(gap_now, -std::max(limit, REGULAR_OVERLAP * tolerance_));
 }
 
 template <typename Visitor> void FixInelastic::for_each_listed_pair(Visitor &&visit) const

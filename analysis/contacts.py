@@ -1,0 +1,119 @@
+"""Contact frames: LAMMPS's local text dump of the fix's contacts.
+
+MDAnalysis does not read local dumps, so this module does. Every row is a contact that carries a
+force: a positive multiplier, no distance criterion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from .dump_text import (
+    FrameHeader,
+    malformed_row,
+    open_dump,
+    read_header,
+    read_rows,
+    require_columns,
+)
+from .errors import DumpError
+from .geometry import BoolArray, FloatArray, IntArray
+
+COLUMNS = ("id1", "id2", "x", "y", "z", "nx", "ny", "nz", "gap", "force")
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFrame:
+    """The contacts at one step, in the order of the file; m may be 0.
+
+    Attributes
+    ----------
+    step : time step
+    ids : (m, 2), both sides; the second is -k for wall k
+    points : (m, 3), contact point, length
+    normals : (m, 3), unit vector from side 2 to side 1
+    gaps : (m,), negative where the two overlap, length
+    forces : (m,), positive, force
+    """
+
+    step: int
+    ids: IntArray
+    points: FloatArray
+    normals: FloatArray
+    gaps: FloatArray
+    forces: FloatArray
+
+
+def iterate_contact_frames(path: str | PathLike[str]) -> Iterator[ContactFrame]:
+    """Read the frames of a contact dump one by one; at least one frame must be there."""
+    file = Path(path)
+    line = 1
+    with open_dump(file) as dump:
+        while header := read_header(dump, file, line):
+            require_columns(header, COLUMNS, file)
+            yield _parsed_frame(read_rows(dump, file, header), header, file)
+            line = header.next_line
+    if line == 1:
+        raise DumpError(file, "the file is empty")
+
+
+def _parsed_frame(rows: list[bytes], header: FrameHeader, path: Path) -> ContactFrame:
+    data = np.empty((0, len(COLUMNS)))
+    if rows:
+        try:
+            table = np.loadtxt(rows, comments=None, ndmin=2)
+        except ValueError:
+            table = np.empty((0, 0))
+        if table.shape != (len(rows), len(header.columns)):
+            raise malformed_row(rows, header, COLUMNS, path) or DumpError(
+                path, "every column must hold numbers", header.first_row_line
+            )
+        data = table[:, [header.columns.index(name) for name in COLUMNS]]
+    _check(data, header, path)
+    return ContactFrame(
+        step=header.step,
+        ids=data[:, 0:2].astype(np.int64),
+        points=data[:, 2:5].copy(),
+        normals=data[:, 5:8].copy(),
+        gaps=data[:, 8].copy(),
+        forces=data[:, 9].copy(),
+    )
+
+
+def _check(data: FloatArray, header: FrameHeader, path: Path) -> None:
+    finite = np.isfinite(data)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise DumpError(
+            path, f"{COLUMNS[column]} is {data[row, column]}", header.first_row_line + int(row)
+        )
+    ids = data[:, 0:2]
+    for wrong, message in (
+        (
+            (ids != np.rint(ids)).any(axis=1) | (ids[:, 0] < 1) | (ids[:, 1] == 0),
+            "id1 must be a particle's id and id2 a particle's id or minus a wall's number",
+        ),
+        (ids[:, 0] == ids[:, 1], "a particle is in contact with itself"),
+        (data[:, 9] <= 0, "the force of a contact must be positive"),
+        (_repeated(ids), "this pair of particles is listed twice"),
+    ):
+        if wrong.any():
+            raise DumpError(path, message, header.first_row_line + int(np.argmax(wrong)))
+
+
+def _repeated(ids: FloatArray) -> BoolArray:
+    """Say which rows repeat an earlier pair of particles, in either order.
+
+    A pair counted once by each of two ranks would double the coordination number unseen. Walls are
+    left out: a particle may touch one curved wall at several points.
+    """
+    between_particles = np.flatnonzero(ids[:, 1] > 0)
+    _, first = np.unique(np.sort(ids[between_particles], axis=1), axis=0, return_index=True)
+    repeated = np.zeros(len(ids), dtype=bool)
+    repeated[np.delete(between_particles, first)] = True
+    return repeated

@@ -1,0 +1,128 @@
+"""Coordination numbers: contacts of a particle with other particles.
+
+In contact means that the contact carries a force. Walls are counted apart and never enter the
+coordination number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import InputError
+from .geometry import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class ContactCounts:
+    """Contacts of each particle in one frame.
+
+    Attributes
+    ----------
+    particles : (n,), contacts with other particles
+    walls : (n,), contacts with walls
+    """
+
+    particles: IntArray
+    walls: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinationNumber:
+    """The coordination number of a set of particles over some frames.
+
+    Attributes
+    ----------
+    mean : mean over the frames of the mean over the particles
+    scatter : standard deviation between the frames' means; None for a single frame
+    per_frame : (frames,), mean over the particles
+    distribution : (k_max + 1,), share of particles with 0, 1, ... k_max contacts, over all frames
+    particles : number of particles in the set
+    """
+
+    mean: float
+    scatter: float | None
+    per_frame: FloatArray
+    distribution: FloatArray
+    particles: int
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(self.per_frame)
+
+    def particles_with(self, fewest: int, most: int) -> float:
+        """Number of particles with `fewest` to `most` contacts, mean over the frames."""
+        return float(self.particles * self.distribution[fewest : most + 1].sum())
+
+
+def contact_counts(contact_ids: ArrayLike, particle_ids: ArrayLike) -> ContactCounts:
+    """Count every particle's contacts; a contact between two particles counts for both.
+
+    Parameters
+    ----------
+    contact_ids : (m, 2), both sides; the second is -k for wall k
+    particle_ids : (n,), ids of the particles in the order of the result, in any order
+    """
+    contacts = np.asarray(contact_ids, dtype=np.int64)
+    ids = np.asarray(particle_ids, dtype=np.int64)
+    if contacts.ndim != 2 or contacts.shape[1] != 2:
+        raise InputError(f"contact ids must have shape (m, 2), not {contacts.shape}")
+    if ids.ndim != 1 or len(ids) == 0:
+        raise InputError(f"particle ids must have shape (n,) with n >= 1, not {ids.shape}")
+
+    with_wall = contacts[:, 1] < 0
+    return ContactCounts(
+        particles=np.bincount(_index_of(contacts[~with_wall].ravel(), ids), minlength=len(ids)),
+        walls=np.bincount(_index_of(contacts[with_wall, 0], ids), minlength=len(ids)),
+    )
+
+
+def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> CoordinationNumber:
+    """Average the contact counts of chosen particles over frames.
+
+    The choice is by the particle alone: one whose centre lies in a box counts its contacts with
+    particles outside too.
+
+    Parameters
+    ----------
+    counts : one array (n,) per frame, such as `ContactCounts.particles`
+    chosen : (n,) of bool, such as the result of `particles_inside`
+    """
+    mask = np.asarray(chosen, dtype=np.bool_)
+    particles = int(mask.sum())
+    if particles == 0:
+        raise InputError("no particle is chosen: the mean over none does not exist")
+    means: list[float] = []
+    histogram = np.zeros(0, dtype=np.int64)
+    for frame in counts:
+        values = np.asarray(frame, dtype=np.int64)
+        if values.shape != mask.shape:
+            raise InputError(f"contact counts must have shape {mask.shape}, not {values.shape}")
+        means.append(float(values[mask].mean()))
+        more = np.bincount(values[mask], minlength=len(histogram))
+        more[: len(histogram)] += histogram
+        histogram = more
+    if not means:
+        raise InputError("at least one frame of contacts is needed")
+    per_frame = np.array(means)
+    return CoordinationNumber(
+        mean=float(per_frame.mean()),
+        scatter=float(per_frame.std(ddof=1)) if len(per_frame) > 1 else None,
+        per_frame=per_frame,
+        distribution=histogram / histogram.sum(),
+        particles=particles,
+    )
+
+
+def _index_of(wanted: IntArray, ids: IntArray) -> IntArray:
+    order = np.argsort(ids)
+    place = np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)
+    index = order[place]
+    unknown = ids[index] != wanted
+    if unknown.any():
+        raise InputError(f"a contact names particle {wanted[unknown][0]}, which does not exist")
+    return index

@@ -1,0 +1,26 @@
+"""What can go wrong: the text of each error is one line, which the command line prints as it is."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+
+class AnalysisError(ValueError):
+    """Base of every error that the analysis raises on purpose."""
+
+
+class InputError(AnalysisError):
+    """An array, a box or a number does not have the shape or the value that the function needs."""
+
+
+class DumpError(AnalysisError):
+    """A dump file is missing, incomplete or malformed."""
+
+    def __init__(self, path: str | PathLike[str], message: str, line: int | None = None) -> None:
+        """Make the text `path, line N: message`; lines are counted from 1."""
+        where = f"{path}" if line is None else f"{path}, line {line}"
+        super().__init__(f"{where}: {message}")
+
+
+class PictureError(AnalysisError):
+    """The picture could not be drawn: no LAMMPS, or LAMMPS refused."""

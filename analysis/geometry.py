@@ -1,0 +1,65 @@
+"""Spheres and axis-aligned boxes as arrays: the checks every function makes, and who is inside.
+
+Lengths are in the units of the dump. A box is a (3, 2) array, one row (lower, upper) per axis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InputError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+def as_positions(positions: ArrayLike) -> FloatArray:
+    """Return positions as an (n, 3) array of finite numbers, n >= 1."""
+    array = np.asarray(positions, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise InputError(f"positions must have shape (n, 3) with n >= 1, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError("positions hold NaN or infinity")
+    return array
+
+
+def as_spheres(positions: ArrayLike, radii: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return positions (n, 3) and radii (n,), checked against each other; radii are positive."""
+    centres = as_positions(positions)
+    array = np.asarray(radii, dtype=np.float64)
+    if array.shape != (len(centres),):
+        raise InputError(f"radii must have shape ({len(centres)},), not {array.shape}")
+    # Written so that NaN fails too.
+    if not ((array > 0) & np.isfinite(array)).all():
+        raise InputError("radii must be positive and finite")
+    return centres, array
+
+
+def as_box(box: ArrayLike) -> FloatArray:
+    """Return a box as a (3, 2) array with lower < upper on every axis."""
+    array = np.asarray(box, dtype=np.float64)
+    if array.shape != (3, 2):
+        raise InputError(f"a box must have shape (3, 2), not {array.shape}")
+    for axis, (lower, upper) in zip("xyz", array, strict=True):
+        if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+            raise InputError(f"box: {axis}lo = {lower:g} must be less than {axis}hi = {upper:g}")
+    return array
+
+
+def particles_inside(positions: ArrayLike, box: ArrayLike) -> BoolArray:
+    """Say which centres lie in a box, its faces included.
+
+    Parameters
+    ----------
+    positions : (n, 3), length
+    box : (3, 2), length
+
+    Returns
+    -------
+    (n,) of bool
+    """
+    centres, bounds = as_positions(positions), as_box(box)
+    inside: BoolArray = np.all((centres >= bounds[:, 0]) & (centres <= bounds[:, 1]), axis=1)
+    return inside

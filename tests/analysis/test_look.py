@@ -1,0 +1,214 @@
+"""`inelastic look` on a crystal whose every number is known."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from lammps_inelastic.workflow.main import main
+
+RADIUS, EXCESS = 0.1, 1e-4
+CELLS = 5
+# Three cells of the crystal on each axis.
+BOX = ["--box", "0.2", "0.8", "0.2", "0.8", "0.2", "0.8"]
+
+
+@pytest.fixture
+def run(tmp_path, write_particles, write_contacts):
+    """Return a folder with 5 x 5 x 5 spheres, each 1e-4 too large for its cell of width 0.2.
+
+    The contact dump has all 300 neighbours in its first frame, and lacks in its second the six
+    contacts of the sphere in the middle.
+    """
+    places = [(i, j, k) for i in range(CELLS) for j in range(CELLS) for k in range(CELLS)]
+    number = {place: 1 + index for index, place in enumerate(places)}
+    rows = [
+        [number[place], 1, *((np.array(place) + 0.5) * 2 * RADIUS), 0, 0, 0, RADIUS + EXCESS]
+        for place in places
+    ]
+    contacts = []
+    for i, j, k in places:
+        for other in ((i + 1, j, k), (i, j + 1, k), (i, j, k + 1)):
+            if other in number:
+                contacts.append([number[i, j, k], number[other], 0, 0, 0, 1, 0, 0, -2e-4, 1])
+    floor = [[number[i, 0, k], -3, 0, 0, 0, 0, 1, 0, -1e-4, 1] for i, _, k in places]
+    middle = number[2, 2, 2]
+    fewer = [row for row in contacts if middle not in row[:2]]
+    write_particles({0: rows[::-1], 90: rows})
+    write_contacts({80: contacts + floor, 90: fewer + floor})
+    return tmp_path
+
+
+def test_numbers(run, capsys):
+    assert main(["look", str(run), *BOX, "--no-picture", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["step"], found["particles"]) == (90, 125)
+
+    packing = found["packing_fraction"]
+    # The cap by which each sphere leaves its cell is 1e-8 of its volume. Four standard deviations:
+    # the seed is fixed, one seed in 16,000 fails by chance.
+    exact = 4 / 3 * np.pi * (RADIUS + EXCESS) ** 3 / (2 * RADIUS) ** 3
+    assert abs(packing["value"] - exact) < 4 * packing["uncertainty"]
+    assert packing["points"] == 1_000_000
+
+    coordination = found["coordination_number"]
+    assert (coordination["particles"], coordination["frames"]) == (27, 2)
+    # 27 spheres of 6 contacts; in the second frame the middle one has none and six have 5. The
+    # mean of the two is exact up to rounding.
+    assert coordination["mean"] == pytest.approx(6 - 12 / 27 / 2, rel=1e-14)
+    assert coordination["scatter"] == pytest.approx(12 / 27 / np.sqrt(2), rel=1e-14)
+    assert coordination["steps"] == [80, 90]
+    assert coordination["particles_with_0_or_1"] == pytest.approx(0.5, rel=1e-14)
+
+    # Differences of coordinates near 1, in float64.
+    assert found["largest_pair_overlap"]["depth"] == pytest.approx(2 * EXCESS, abs=1e-15)
+    assert len(found["largest_pair_overlap"]["ids"]) == 2
+    # The top of the crystal is at y = 1 and the container's at 5, but five faces are touched.
+    assert found["largest_wall_overlap"]["depth"] == pytest.approx(EXCESS, abs=1e-15)
+    assert found["files"]["picture"] is None
+
+
+def test_text_and_picture(run, capsys):
+    assert main(["look", str(run), *BOX]) == 0
+    output = capsys.readouterr().out
+    for expected in (
+        "particles            125",
+        "packing fraction     0.52",
+        "coordination number  5.778 ± 0.314",
+        "2 frames, steps 80 to 90",
+        "  0 or 1 contacts    0.5 particles",
+        "of the 27 in the box",
+        "largest overlap      0.002 r",
+        "  with a wall        0.000999 r",
+        "x 0.2 to 0.8, y 0.2 to 0.8, z 0.2 to 0.8",
+        str(run / "particles.lammpsdump"),
+        str(run / "contacts.lammpsdump"),
+        str(run / "packing.png"),
+    ):
+        assert expected in output
+    assert (run / "packing.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_container_can_be_given(run, capsys):
+    container = ["--container", "0", "1", "0", "0.95", "0", "1"]
+    assert main(["look", str(run), *container, "--no-picture", "--json"]) == 0
+    wall = json.loads(capsys.readouterr().out)["largest_wall_overlap"]
+    assert wall["face"] == "yhi"
+    # Differences of coordinates near 1, in float64.
+    assert wall["depth"] == pytest.approx(0.05 + EXCESS, abs=1e-15)
+
+
+def test_box_that_is_not_fixed_has_no_walls(run, capsys):
+    dump = run / "particles.lammpsdump"
+    dump.write_text(dump.read_text().replace("ff ff ff", "ff mm ff"))
+    assert main(["look", str(run), "--no-picture"]) == 0
+    assert "the box is not fixed: give --container or --walls" in capsys.readouterr().out
+    assert main(["look", str(run), "--no-picture", "--walls", "--json"]) == 0
+    wall = json.loads(capsys.readouterr().out)["largest_wall_overlap"]
+    # Differences of coordinates near 1, in float64.
+    assert wall["depth"] == pytest.approx(EXCESS, abs=1e-15)
+
+
+def test_one_frame(run, write_contacts, capsys):
+    write_contacts({5: []})
+    assert main(["look", str(run), "--no-picture"]) == 0
+    output = capsys.readouterr().out
+    assert "coordination number  0.000 " in output
+    assert "one frame, step 5" in output
+
+
+def test_spheres_of_a_body_may_overlap(tmp_path, write_particles, write_contacts, capsys):
+    centres = [(0.3, 1, 0.5), (0.4, 1, 0.5), (0.55, 1, 0.5)]
+    rows = [[i, max(i - 1, 1), 1, *at, 0, 0, 0, 0.1] for i, at in enumerate(centres, start=1)]
+    write_particles({0: rows}, columns="id mol type x y z vx vy vz radius")
+    write_contacts({0: []})
+    box = ["--box", "0", "1", "0", "5", "0", "1"]
+    assert main(["look", str(tmp_path), *box, "--no-picture", "--json"]) == 0
+    pair = json.loads(capsys.readouterr().out)["largest_pair_overlap"]
+    # Spheres 1 and 2 overlap by 0.1, but are one body.
+    assert pair["ids"] == [2, 3]
+    # Differences of coordinates near 1, in float64.
+    assert pair["depth"] == pytest.approx(0.05, abs=1e-15)
+
+
+def failure_of(arguments, capsys):
+    """Run the command line; return what it says, after seeing that it is one line and no more."""
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("inelastic: ")
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def test_no_folder(tmp_path, capsys):
+    assert "no such file" in failure_of(["look", str(tmp_path / "nowhere")], capsys)
+
+
+def test_no_contacts(run, capsys):
+    (run / "contacts.lammpsdump").unlink()
+    assert "contacts.lammpsdump: no such file" in failure_of(["look", str(run)], capsys)
+
+
+def test_truncated_dump(run, capsys):
+    dump = run / "particles.lammpsdump"
+    dump.write_bytes(dump.read_bytes()[:-3])
+    assert "the file ends inside the frame of step 90" in failure_of(["look", str(run)], capsys)
+
+
+def test_contact_of_an_unknown_particle(run, write_contacts, capsys):
+    write_contacts({0: [[1, 999, 0, 0, 0, 1, 0, 0, 0, 1]]})
+    assert "names particle 999" in failure_of(["look", str(run)], capsys)
+
+
+def test_periodic_box(run, capsys):
+    dump = run / "particles.lammpsdump"
+    dump.write_text(dump.read_text().replace("ff ff ff", "pp ff ff"))
+    assert "the box is periodic (pp ff ff)" in failure_of(["look", str(run)], capsys)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--box", "1", "0", "0", "1", "0", "1"], "xlo = 1 must be less than xhi = 0"),
+        (["--box", "2", "3", "2", "3", "2", "3"], "no particle's centre lies in the box x 2 to 3"),
+        (["--points", "0"], "--points must be at least 1, not 0"),
+        (["--seed", "-1"], "--seed must not be negative, not -1"),
+        (["--container", "0", "1", "0", "nan", "0", "1"], "ylo = 0 must be less than yhi = nan"),
+    ],
+)
+def test_wrong_values(run, arguments, message, capsys):
+    assert message in failure_of(["look", str(run), *arguments], capsys)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["fly"],
+        ["look"],
+        ["look", "x", "--points", "many"],
+        ["look", "x", "--box", "1"],
+        ["look", "x", "--walls", "--container", "0", "1", "0", "1", "0", "1"],
+    ],
+)
+def test_wrong_arguments(arguments, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(arguments)
+    error = capsys.readouterr().err
+    assert error.startswith("inelastic: ")
+    assert error.count("\n") == 1
+
+
+def test_numbers_come_without_lammps_too(run, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "lammps", None)
+    assert main(["look", str(run), "--json"]) == 2
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert found["particles"] == 125
+    assert found["files"]["picture"] is None
+    assert captured.err.startswith("inelastic: no picture: LAMMPS cannot be imported")
+    assert captured.err.count("\n") == 1

@@ -1,0 +1,168 @@
+"""Particle dumps: what is read is exactly what was written, and nothing wrong is read silently."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lammps_inelastic.analysis import DumpError, ParticleDump, read_particle_frame
+
+FIRST = [1, 1, 0.12345678901234567, 0.1, 0.5, 0.0, -1.0 / 3.0, 0.0, 0.055]
+SECOND = [2, 1, 0.7, 1e-17, 0.5, 1e-300, 0.0, 2.0, 0.11]
+
+
+def test_float64_survives(write_particles):
+    frame = read_particle_frame(write_particles({7: [FIRST, SECOND]}))
+    # Equality, not closeness: 17 digits give a float64 back.
+    assert frame.positions.tolist() == [FIRST[2:5], SECOND[2:5]]
+    assert frame.velocities.tolist() == [FIRST[5:8], SECOND[5:8]]
+    assert frame.radii.tolist() == [0.055, 0.11]
+    assert frame.ids.tolist() == [1, 2]
+    assert frame.box.tolist() == [[0, 1], [0, 5], [0, 1]]
+    assert frame.boundaries == ("ff", "ff", "ff")
+    assert frame.step == 7
+    assert frame.bodies is None
+
+
+def test_rows_come_ordered_by_id(write_particles):
+    frame = read_particle_frame(write_particles({0: [SECOND, FIRST]}))
+    assert frame.ids.tolist() == [1, 2]
+    assert frame.radii.tolist() == [0.055, 0.11]
+
+
+def test_molecules_are_bodies(write_particles):
+    rows = [[1, 4, *FIRST[1:]], [2, 0, *SECOND[1:]]]
+    frame = read_particle_frame(write_particles({0: rows}, "id mol type x y z vx vy vz radius"))
+    assert frame.bodies is not None
+    assert frame.bodies.tolist() == [4, 0]
+
+
+def test_frames_by_index_and_in_order(write_particles):
+    frames = {step: [[1, 1, step / 8, 0, 0, 0, 0, 0, 1]] for step in (0, 3, 5)}
+    dump = ParticleDump(write_particles(frames))
+    assert dump.steps == (0, 3, 5)
+    assert [frame.positions[0, 0] for frame in dump] == [0, 3 / 8, 5 / 8]
+    assert [dump[index].step for index in (1, -1, 0)] == [3, 5, 0]
+    with pytest.raises(IndexError, match="no frame 3, there are 3"):
+        dump[3]
+
+
+def test_a_frame_is_read_only_when_asked_for(write_particles):
+    bad = [*FIRST[:-1], np.nan]
+    dump = ParticleDump(write_particles({0: [FIRST], 1: [bad]}))
+    assert dump[0].radii.tolist() == [0.055]
+    with pytest.raises(DumpError, match="step 1, particle 1: radius is nan"):
+        dump[1]
+
+
+def test_dump_written_by_lammps(lammps_dumps):
+    first, *_, last = ParticleDump(lammps_dumps[0])
+    # 16 digits are one short of a float64: half a unit of the sixteenth.
+    assert first.positions == pytest.approx(
+        np.array([[0.60, 0.123456789012345, 0.5], [0.42, 0.123456789012345, 0.5]]), rel=5e-16
+    )
+    assert first.radii.tolist() == [0.1, 0.1]
+    assert (first.step, last.step) == (0, 4000)
+    # Elastic: the energy k overlap^2 / 2 of the spring becomes kinetic, half in each sphere.
+    # Velocity Verlet, and a release between two steps, err by (omega dt)^2 = 5e-6 at most.
+    speed = np.sqrt(100 * 0.02**2 / 2 / (np.pi / 6 * 0.2**3))
+    assert last.velocities[:, 0] == pytest.approx([speed, -speed], rel=1e-5)
+
+
+def edited(path: Path, old: str, new: str) -> Path:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    return path
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(DumpError, match=r"nowhere\.lammpsdump: no such file"):
+        read_particle_frame(tmp_path / "nowhere.lammpsdump")
+
+
+def test_folder_instead_of_file(tmp_path):
+    with pytest.raises(DumpError, match="cannot be read"):
+        read_particle_frame(tmp_path)
+
+
+def test_empty_file(tmp_path):
+    (tmp_path / "empty").touch()
+    with pytest.raises(DumpError, match="the file is empty"):
+        read_particle_frame(tmp_path / "empty")
+
+
+def test_missing_column_names_what_is_there(write_particles):
+    path = write_particles({0: [[1, 0.5, 0.5, 0.5]]}, "id x y z")
+    with pytest.raises(DumpError, match="line 9: no column vx, vy, vz, radius; there is id x y z"):
+        read_particle_frame(path)
+
+
+@pytest.mark.parametrize(
+    ("cut", "line", "rows"),
+    [(1, 22, "1 of 2"), (12, 22, "1 of 2"), (70, 21, "0 of 2")],
+    ids=["end of line only", "last digits", "a row and more"],
+)
+def test_truncated_rows(write_particles, cut, line, rows):
+    path = write_particles({0: [FIRST, SECOND], 1: [FIRST, SECOND]})
+    path.write_bytes(path.read_bytes()[:-cut])
+    with pytest.raises(DumpError, match=f"line {line}: .* inside the frame of step 1: {rows} rows"):
+        read_particle_frame(path, 0)
+
+
+def test_truncated_header(write_particles):
+    path = write_particles({0: [FIRST], 1: [FIRST]})
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:14]))
+    with pytest.raises(DumpError, match="line 14: the file ends inside this frame's header"):
+        read_particle_frame(path, 0)
+
+
+@pytest.mark.parametrize("announced", [1, 3])
+def test_wrong_number_of_rows(write_particles, announced):
+    path = write_particles({0: [FIRST, SECOND], 1: [FIRST, SECOND]}, announced=announced)
+    with pytest.raises(DumpError, match=f"line {10 + announced}: expected 'ITEM: TIMESTEP'"):
+        read_particle_frame(path)
+
+
+def test_frame_without_particles(write_particles):
+    with pytest.raises(DumpError, match="line 4: the frame of step 5 has no particles"):
+        read_particle_frame(write_particles({5: []}))
+
+
+def test_number_of_particles_changes(write_particles):
+    path = write_particles({0: [FIRST, SECOND], 1: [FIRST]})
+    with pytest.raises(DumpError, match="line 15: 1 particles at step 1, but 2 at step 0"):
+        read_particle_frame(path)
+
+
+def test_columns_change(write_particles):
+    path = write_particles({0: [FIRST], 1: [FIRST]})
+    text = path.read_text()
+    path.write_text(text[::-1].replace(" y z vx"[::-1], " z y vx"[::-1], 1)[::-1])
+    with pytest.raises(DumpError, match="line 19: the columns are not those"):
+        read_particle_frame(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (" 0.11 ", " 0.1x1 ", "line 11: radius = '0.1x1' is no number"),
+        (" 0.11 ", " ", "line 11: expected 9 values, found 8"),
+        (" 0.11 ", " inf ", "step 0, particle 2: radius is inf"),
+        (" 0.11 ", " 0 ", "step 0, particle 2: radius is not positive"),
+        (" 0.11 ", " \xe9 ", "line 11: radius = .* is no number"),
+        ("\n2 1", "\n1 1", "step 0: ids must be positive and each there once"),
+        ("ff ff ff", "xy xz yz ff ff ff", "line 5: expected an orthogonal box"),
+        ("e+00 5.0", "e+00 -5.0", "line 7: box bounds 0 -5 are not in order"),
+        ("e+00 5.0", "e+00 5.0 5.0", "line 7: expected two bounds"),
+        ("ATOMS\n2", "ATOMS\ntwo", "line 4: expected an integer, found 'two'"),
+        ("ITEM: ATOMS", "ITEM: ENTRIES", "line 9: expected 'ITEM: ATOMS'"),
+        ("ITEM: TIMESTEP", "ITEM: UNITS\nlj\nITEM: TIMESTEP", "line 1: .* 'units yes'"),
+    ],
+)
+def test_malformed(write_particles, old, new, message):
+    path = edited(write_particles({0: [FIRST, SECOND]}), old, new)
+    with pytest.raises(DumpError, match=message):
+        read_particle_frame(path)

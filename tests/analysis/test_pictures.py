@@ -1,0 +1,69 @@
+"""The picture: the right colours in the right places, nothing cut off."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lammps_inelastic.analysis import InputError, PictureError, draw_packing
+
+CONTAINER = [[0, 1], [0, 5], [0, 1]]
+# The upper sphere has no contact (dark violet), the lower one ten or more (yellow).
+CENTRES, RADII = [[0.5, 0.9, 0.5], [0.5, 0.2, 0.5]], [0.2, 0.2]
+
+
+def pixels_of(path):
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def test_colours_and_gravity(tmp_path):
+    path = tmp_path / "packing.png"
+    draw_packing(path, CENTRES, RADII, CONTAINER, [0, 12], pixels=300)
+    red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
+    yellow = np.argwhere((red > 150) & (green > 150) & (blue < 100))
+    violet = np.argwhere((red > green + 40) & (blue > green + 40))
+    # Each disc of the picture is about 60 pixels wide; those of the legend have below 100 pixels.
+    assert len(yellow) > 1000
+    assert len(violet) > 1000
+    assert np.median(violet[:, 0]) < np.median(yellow[:, 0])
+
+
+@pytest.mark.parametrize("size", [(1, 1, 1), (1, 5, 1), (5, 1, 1), (1, 1, 5)])
+def test_nothing_is_cut_off(tmp_path, size):
+    path = tmp_path / "packing.png"
+    corners = [np.full(3, 0.5), np.array(size) - 0.5]
+    draw_packing(path, corners, [0.5, 0.5], [[0, length] for length in size], pixels=300)
+    drawn = (pixels_of(path) < 250).any(axis=2)
+    for edge in (drawn[0], drawn[-1], drawn[:, 0], drawn[:, -1]):
+        assert not edge.any()
+    # The outermost rows hold the tip of a corner or of a sphere; a cut through the packing would
+    # fill most of them.
+    rows = np.flatnonzero(drawn.any(axis=1))
+    assert drawn[rows[[0, -1]]].mean(axis=1).max() < 0.2
+    assert [file.name for file in tmp_path.iterdir()] == ["packing.png"]
+
+
+def test_colours_by_radius(tmp_path):
+    path = tmp_path / "packing.png"
+    draw_packing(path, CENTRES, [0.1, 0.2], CONTAINER, pixels=300)
+    red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
+    assert np.count_nonzero((red > 150) & (green > 150) & (blue < 100)) > 1000
+
+
+def test_picture_without_lammps(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "lammps", None)
+    with pytest.raises(PictureError, match="no picture: LAMMPS cannot be imported"):
+        draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER)
+
+
+def test_picture_into_no_folder(tmp_path):
+    with pytest.raises(PictureError, match="cannot be written"):
+        draw_packing(tmp_path / "no" / "packing.png", CENTRES, RADII, CONTAINER, pixels=100)
+
+
+def test_wrong_number_of_contacts(tmp_path):
+    with pytest.raises(InputError, match=r"contacts must have shape \(2,\), not \(3,\)"):
+        draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2, 3])

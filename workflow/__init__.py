@@ -1,0 +1,1 @@
+"""From a study's description to its report, and the command line `inelastic`."""

@@ -1,0 +1,310 @@
+"""The command line `inelastic`: one subcommand for each thing that a user does with a run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lammps_inelastic.analysis import (
+    AnalysisError,
+    CoordinationNumber,
+    PackingFraction,
+    PairOverlap,
+    ParticleFrame,
+    PictureError,
+    WallOverlap,
+    contact_counts,
+    coordination_number,
+    draw_packing,
+    iterate_contact_frames,
+    largest_pair_overlap,
+    largest_wall_overlap,
+    packing_fraction,
+    particles_inside,
+    read_particle_frame,
+)
+
+PARTICLE_DUMP = "particles.lammpsdump"
+CONTACT_DUMP = "contacts.lammpsdump"
+PICTURE = "packing.png"
+
+# The box of the paper: a quarter of the container's width away from every wall and the floor.
+MEASURING_BOX = (0.25, 0.75, 0.25, 0.75, 0.25, 0.75)
+
+FloatArray = NDArray[np.float64]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a subcommand; 0 if all went well, 2 after one line on stderr about what did not."""
+    options = _parser().parse_args(arguments)
+    try:
+        return _look(options)
+    except (AnalysisError, OSError) as error:
+        return _complain(error)
+    except KeyboardInterrupt:
+        return 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports a wrong argument like every other error, in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"inelastic: {message} (see {self.prog} --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="inelastic", description="Packings of inelastic spheres with LAMMPS.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    look = commands.add_parser(
+        "look",
+        help="measure a run and draw its packing",
+        description=f"Measure the packing in a run's folder, which holds {PARTICLE_DUMP} and "
+        f"{CONTACT_DUMP}, and draw it as {PICTURE}.",
+    )
+    look.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a run")
+    bounds = ("XLO", "XHI", "YLO", "YHI", "ZLO", "ZHI")
+    look.add_argument(
+        "--box",
+        type=float,
+        nargs=6,
+        metavar=bounds,
+        default=MEASURING_BOX,
+        help="measure the packing fraction and the coordination number in this box "
+        "(default: 0.25 to 0.75 on every axis)",
+    )
+    look.add_argument(
+        "--points",
+        type=int,
+        default=1_000_000,
+        help="random points for the packing fraction (default: 1000000)",
+    )
+    look.add_argument("--seed", type=int, default=1, help="seed of these points (default: 1)")
+    walls = look.add_mutually_exclusive_group()
+    walls.add_argument(
+        "--walls",
+        action="store_true",
+        help="take the faces of the dump's box as walls (default: if they are all fixed)",
+    )
+    walls.add_argument(
+        "--container", type=float, nargs=6, metavar=bounds, help="take the faces of this box"
+    )
+    look.add_argument("--no-picture", action="store_true", help="draw nothing")
+    look.add_argument("--json", action="store_true", help="print JSON")
+    return parser
+
+
+def _complain(error: Exception) -> int:
+    print(f"inelastic: {' '.join(str(error).split())}", file=sys.stderr)
+    return 2
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What `inelastic look` found in a folder.
+
+    Attributes
+    ----------
+    folder : of the run
+    frame : the last particle frame, on which everything but the contacts is measured
+    box : (3, 2), where the packing fraction and the coordination number are measured, length
+    seed : of the random points
+    packing : packing fraction in the box
+    coordination : coordination number of the particles in the box, over all contact frames
+    contact_steps : first and last step of the contact frames
+    pair : largest overlap of two particles
+    wall : largest overlap with a wall; None where the walls are not known
+    picture : where the picture is; None if there is none
+    """
+
+    folder: Path
+    frame: ParticleFrame
+    box: FloatArray
+    seed: int
+    packing: PackingFraction
+    coordination: CoordinationNumber
+    contact_steps: tuple[int, int]
+    pair: PairOverlap
+    wall: WallOverlap | None
+    picture: Path | None
+
+    @property
+    def smallest_radius(self) -> float:
+        return float(self.frame.radii.min())
+
+
+def _look(options: argparse.Namespace) -> int:
+    if options.points < 1:
+        raise AnalysisError(f"--points must be at least 1, not {options.points}")
+    if options.seed < 0:
+        raise AnalysisError(f"--seed must not be negative, not {options.seed}")
+    folder: Path = options.folder
+    frame = read_particle_frame(folder / PARTICLE_DUMP)
+    if any("p" in flags for flags in frame.boundaries):
+        raise AnalysisError(
+            f"{folder / PARTICLE_DUMP}: the box is periodic ({' '.join(frame.boundaries)}), and "
+            "overlaps across its faces are not looked for yet"
+        )
+
+    box = np.reshape(np.asarray(options.box, dtype=np.float64), (3, 2))
+    chosen = particles_inside(frame.positions, box)
+    if not chosen.any():
+        raise AnalysisError(
+            f"{folder / PARTICLE_DUMP}: no particle's centre lies in the box {_as_ranges(box)} "
+            f"at step {frame.step}; choose another with --box"
+        )
+    steps: list[int] = []
+    counts = []
+    for contacts in iterate_contact_frames(folder / CONTACT_DUMP):
+        steps.append(contacts.step)
+        counts.append(contact_counts(contacts.ids, frame.ids).particles)
+
+    walls: FloatArray | None = None
+    if options.container is not None:
+        walls = np.reshape(np.asarray(options.container, dtype=np.float64), (3, 2))
+    elif options.walls or all(flags == "ff" for flags in frame.boundaries):
+        walls = frame.box
+
+    failure: PictureError | None = None
+    picture = None if options.no_picture else folder / PICTURE
+    if picture is not None:
+        try:
+            draw_packing(
+                picture,
+                frame.positions,
+                frame.radii,
+                frame.box if walls is None else walls,
+                counts[-1],
+            )
+        # The numbers do not need the picture: they are printed, and what failed is said last.
+        except PictureError as error:
+            failure, picture = error, None
+
+    found = _Look(
+        folder=folder,
+        frame=frame,
+        box=box,
+        seed=options.seed,
+        packing=packing_fraction(
+            frame.positions, frame.radii, box, points=options.points, seed=options.seed
+        ),
+        coordination=coordination_number(counts, chosen),
+        contact_steps=(steps[0], steps[-1]),
+        pair=largest_pair_overlap(frame.positions, frame.radii, frame.bodies),
+        wall=None if walls is None else largest_wall_overlap(frame.positions, frame.radii, walls),
+        picture=picture,
+    )
+    print(_as_json(found) if options.json else _as_text(found))
+    return 0 if failure is None else _complain(failure)
+
+
+def _as_text(found: _Look) -> str:
+    coordination, ids = found.coordination, found.frame.ids
+    first, last = found.contact_steps
+    if coordination.scatter is None:
+        mean = f"{coordination.mean:.3f}"
+        over = f"one frame, step {first}"
+    else:
+        mean = f"{coordination.mean:.3f} ± {coordination.scatter:.3f}"
+        over = f"{coordination.frames} frames, steps {first} to {last}; ± is their scatter"
+
+    pair, wall = found.pair, found.wall
+    where_pair = f"particles {ids[pair.pair[0]]} and {ids[pair.pair[1]]}" if pair.pair else "none"
+    if wall is None:
+        with_wall = ("-", "the box is not fixed: give --container or --walls")
+    else:
+        touched = "none" if wall.particle is None else f"particle {ids[wall.particle]}, {wall.face}"
+        with_wall = (f"{wall.depth / found.smallest_radius:.3g} r", touched)
+
+    rows = [
+        ("particles", f"{len(ids)}", f"step {found.frame.step}"),
+        (
+            "packing fraction",
+            f"{found.packing.value:.4f} ± {found.packing.uncertainty:.4f}",
+            f"{found.packing.points:,} points, seed {found.seed}",
+        ),
+        ("coordination number", mean, over),
+        (
+            "  0 or 1 contacts",
+            f"{coordination.particles_with(0, 1):.1f} particles",
+            f"of the {coordination.particles} in the box",
+        ),
+        ("largest overlap", f"{pair.depth / found.smallest_radius:.3g} r", where_pair),
+        ("  with a wall", *with_wall),
+    ]
+    left, right = (max(len(row[column]) for row in rows) for column in (0, 1))
+    lines = [f"{name:<{left}}  {value:<{right}}  {note}" for name, value, note in rows]
+    files = [
+        ("particle dump", found.folder / PARTICLE_DUMP),
+        ("contact dump", found.folder / CONTACT_DUMP),
+        ("picture", found.picture or "none"),
+    ]
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"{'box':<{left}}  {_as_ranges(found.box)}",
+            f"{'r':<{left}}  {found.smallest_radius:.6g}, the smallest radius",
+            *(f"{name:<{left}}  {path}" for name, path in files),
+        ]
+    )
+
+
+def _as_json(found: _Look) -> str:
+    coordination, ids, wall = found.coordination, found.frame.ids, found.wall
+    report: dict[str, Any] = {
+        "step": found.frame.step,
+        "particles": len(ids),
+        "smallest_radius": found.smallest_radius,
+        "box": found.box.tolist(),
+        "packing_fraction": {
+            "value": found.packing.value,
+            "uncertainty": found.packing.uncertainty,
+            "points": found.packing.points,
+            "seed": found.seed,
+        },
+        "coordination_number": {
+            "mean": coordination.mean,
+            "scatter": coordination.scatter,
+            "frames": coordination.frames,
+            "steps": list(found.contact_steps),
+            "particles": coordination.particles,
+            "particles_with_0_or_1": coordination.particles_with(0, 1),
+            "distribution": coordination.distribution.tolist(),
+        },
+        "largest_pair_overlap": {
+            "depth": found.pair.depth,
+            "ids": [int(ids[index]) for index in found.pair.pair or ()],
+        },
+        "largest_wall_overlap": None
+        if wall is None
+        else {
+            "depth": wall.depth,
+            "id": None if wall.particle is None else int(ids[wall.particle]),
+            "face": wall.face,
+        },
+        "files": {
+            "particles": str(found.folder / PARTICLE_DUMP),
+            "contacts": str(found.folder / CONTACT_DUMP),
+            "picture": None if found.picture is None else str(found.picture),
+        },
+    }
+    return json.dumps(report, indent=2, allow_nan=False)
+
+
+def _as_ranges(box: FloatArray) -> str:
+    return ", ".join(
+        f"{axis} {low:g} to {high:g}" for axis, (low, high) in zip("xyz", box.tolist(), strict=True)
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
