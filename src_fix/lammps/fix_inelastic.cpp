@@ -76,11 +76,11 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0),  
     list_(nullptr), margin_(-1.0), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr),
-    memory_complete_(true), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
+    largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
     spread_at_start_(0.0), regular_timestep_(0.0), expecting_(false), kick_(0.0), output_{},
     wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
-    run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0),
-    exchanged_(nullptr), exchanging_memory_(false)
+    run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0), run_shortened_(0),
+    exchanged_(nullptr), memory_exchange_size_(0)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -144,6 +144,11 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
   if (!solver_)
     error->all(FLERR, "Fix inelastic solver must be apgd or uzawa, not {}", solver_name_);
   walls_ = std::make_unique<RegionWalls>(lmp, regions);
+  walls_->init();
+  array_flag = walls_->empty() ? 0 : 1;
+  size_array_rows = walls_->number_of_walls();
+  size_array_cols = 3;
+  extarray = 0;
 
   if (!atom->radius_flag)
     error->all(FLERR, "Fix inelastic needs spheres with a radius: use atom_style sphere");
@@ -166,6 +171,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
   comm_forward = 3;
   comm_reverse = 3;
   maxexchange_dynamic = 1;
+  create_attribute = 1;
   maxexchange = STATE_SIZE + ContactMemory::packed_size(0);
 
   MPI_Op_create(&combine, 1, &reduction_);
@@ -190,7 +196,7 @@ FixInelastic::~FixInelastic()
 
 int FixInelastic::setmask()
 {
-  return PRE_EXCHANGE | POST_NEIGHBOR | POST_FORCE | POST_RUN;
+  return POST_NEIGHBOR | POST_FORCE | POST_RUN;
 }
 
 int FixInelastic::modify_param(int narg, char **arg)
@@ -219,10 +225,6 @@ void FixInelastic::init()
   wall_force_.assign(3 * static_cast<std::size_t>(walls_->number_of_walls()), 0.0);
   wall_force_total_ = wall_force_;
   wall_force_step_ = -1;
-  array_flag = walls_->empty() ? 0 : 1;
-  size_array_rows = walls_->number_of_walls();
-  size_array_cols = 3;
-  extarray = 0;
 
   double radii[2] = {0.0, -EXTREME};
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -245,7 +247,7 @@ void FixInelastic::init()
   regular_timestep_ = update->dt;
   expecting_ = false;
   run_iterations_ = run_largest_overlap_ = run_largest_excess_ = 0.0;
-  run_steps_ = run_unconverged_ = 0;
+  run_steps_ = run_unconverged_ = run_shortened_ = 0;
 }
 
 void FixInelastic::init_list(int, NeighList *list)
@@ -255,6 +257,20 @@ void FixInelastic::init_list(int, NeighList *list)
 
 void FixInelastic::setup_post_neighbor()
 {
+  post_neighbor();
+}
+
+void FixInelastic::post_neighbor()
+{
+  const double *const *const x = atom->x;
+  position_at_build_.resize(3 * static_cast<std::size_t>(atom->nlocal));
+  radius_at_build_.assign(atom->radius, atom->radius + atom->nlocal);
+  for (int i = 0; i < atom->nlocal; ++i) std::copy_n(x[i], 3, &position_at_build_[3 * i]);
+
+  largest_radius_ = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (atom->mask[i] & groupbit) largest_radius_ = std::max(largest_radius_, atom->radius[i]);
+  reduce(nullptr, 0, &largest_radius_, 1);
   const double widest = 2.0 * largest_radius_ + neighbor->skin;
   const double listed = one_cutoff_ ? neighbor->cutneighmin : neighbor->cutneighmax;
   if (listed < widest * (1.0 - 1.0e-12))
@@ -263,14 +279,6 @@ void FixInelastic::setup_post_neighbor()
                "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
                listed, widest, 2.0 * largest_radius_);
   list_reach_ = one_cutoff_ ? listed - 2.0 * largest_radius_ : neighbor->skin;
-  post_neighbor();
-}
-
-void FixInelastic::post_neighbor()
-{
-  const double *const *const x = atom->x;
-  position_at_build_.resize(3 * static_cast<std::size_t>(atom->nlocal));
-  for (int i = 0; i < atom->nlocal; ++i) std::copy_n(x[i], 3, &position_at_build_[3 * i]);
 }
 
 // In setup LAMMPS has whole-step velocities and applies only half a kick before the next move.
@@ -289,14 +297,13 @@ void FixInelastic::post_force(int vflag)
 
 void FixInelastic::post_run()
 {
-  complete_memory();
   if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
   if (comm->me != 0) return;
   utils::logmesg(lmp,
                  "Fix inelastic: {} projections, {:.0f} iterations, largest overlap {:.6g} = {:.4g} "
-                 "tolerances, {:.0f} shortened steps\n",
+                 "tolerances, {} shortened steps\n",
                  run_steps_, run_iterations_, run_largest_overlap_,
-                 run_largest_overlap_ / tolerance_, output_[SHORTENED_STEPS]);
+                 run_largest_overlap_ / tolerance_, run_shortened_);
   if (run_largest_excess_ > 0.0)
     utils::logmesg(lmp,
                    "  the curvature of walls left overlaps of up to {:.6g} beyond 2 tolerances: a shorter "
@@ -320,27 +327,35 @@ void FixInelastic::advance(int vflag, double kick_steps)
   inelastic::ProjectionResult result;
   while (true) {
     predict(kick_steps);
+    spread_at_start_ = spread_since_build(nullptr);
+    // The prediction moves nearly as far as the projection will: where the list cannot reach that far
+    // there is no use in solving first.
+    if (shorten_ && !list_reaches(problem_.predicted_velocity)) {
+      shorten_step(room_in_list(problem_.predicted_velocity));
+      continue;
+    }
     phase_ = Phase::CONTACT;
     collect();
     result = inelastic::project(problem_, *this, *solver_, {tolerance_, max_iterations_}, MAX_ROUNDS,
                                 *this, velocity_);
+    double maxima[2] = {bad_overlap_ ? 1.0 : 0.0, output_[OVERLAP]};
+    reduce(nullptr, 0, maxima, 2);
+    bad_overlap_ = maxima[0] > 0.0;
+    output_[OVERLAP] = maxima[1];
     if (record_every_ > 0 && kick_steps == 1.0 && update->ntimestep % record_every_ == 0)
       record_problem();
     if (bad_overlap_) push_apart(result);
     if (!result.converged) unconverged(result);
-
-    // Pairs that are not listed were at least list_reach_ apart when the list was built.
-    const double motion = problem_.timestep * spread(velocity_.data());
-    if (spread_at_start_ + motion > list_reach_) {
-      const double room = list_reach_ - spread_at_start_;
-      if (!shorten_ || room <= 0.0)
+    if (!list_reaches(velocity_)) {
+      if (!shorten_) {
+        const double needed = spread_at_start_ + problem_.timestep * spread(velocity_.data());
         error->all(FLERR,
                    "Fix inelastic: step {}: spheres move by up to {:.6g} relative to one another, further "
                    "than the neighbour list reaches ({:.6g}): set the skin of the neighbor command to at "
                    "least {:.6g}, or lower the timestep, or use shorten yes",
-                   update->ntimestep, spread_at_start_ + motion, list_reach_,
-                   1.2 * (spread_at_start_ + motion));
-      shorten_step(0.9 * room / motion);
+                   update->ntimestep, needed, list_reach_, 1.2 * needed);
+      }
+      shorten_step(room_in_list(velocity_));
     } else if (shorten_ && output_[EXCESS] > 0.0) {
       shorten_step(0.5);
     } else {
@@ -372,22 +387,34 @@ void FixInelastic::predict(double kick_steps)
   kick_ = kick_steps * update->dt;
   problem_.timestep = update->dt;
   problem_.resize(nall);
-  const int push = kick_steps == 1.0 ? PUSH_NEXT : PUSH_HELD;
   for (int i = 0; i < nall; ++i) {
     const bool moves = (mask[i] & groupbit) && !(mask[i] & frozen_bit_);
     problem_.inverse_mass[i] = moves ? 1.0 / mass(i) : 0.0;
   }
   for (int i = 0; i < nlocal; ++i) {
     const double kick_per_force = kick_ * force->ftm2v * problem_.inverse_mass[i];
+    const double *const push = pushed_velocity(i, kick_steps);
     for (int d = 0; d < 3; ++d)
       problem_.predicted_velocity[3 * i + d] =
-          atom->v[i][d] - state_[i][push + d] + kick_per_force * atom->f[i][d];
+          atom->v[i][d] - push[d] + kick_per_force * atom->f[i][d];
   }
   share_with_copies(problem_.predicted_velocity.data());
   message_.clear();
   for (int i = 0; i < nlocal; ++i)
     if (!std::isfinite(norm(&problem_.predicted_velocity[3 * i])))
       message_ = fmt::format("the force on atom {} or its velocity is not a finite number", atom->tag[i]);
+}
+
+// The part of atom i's present velocity that is no momentum. Between runs a command may have set
+// another velocity, of which none is.
+const double *FixInelastic::pushed_velocity(int i, double kick_steps) const
+{
+  static constexpr double none[3] = {0.0, 0.0, 0.0};
+  const double *const state = state_[i];
+  if (kick_steps == 1.0) return state + PUSH_NEXT;
+  const double *const v = atom->v[i];
+  const double change[3] = {v[0] - state[HELD_V], v[1] - state[HELD_V + 1], v[2] - state[HELD_V + 2]};
+  return norm(change) <= EXPECTED_RELATIVE * norm(v) ? state + PUSH_HELD : none;
 }
 
 void FixInelastic::collect()
@@ -401,18 +428,19 @@ void FixInelastic::collect()
   collect_pairs();
   if (!walls_->empty()) collect_walls();
 
-  spread_at_start_ = spread_since_build(nullptr);
-  double maxima[2] = {bad_overlap_ ? 1.0 : 0.0, output_[OVERLAP]};
-  reduce(nullptr, 0, maxima, 2);
-  bad_overlap_ = maxima[0] > 0.0;
-  output_[OVERLAP] = maxima[1];
   fail_together(message_);
+}
+
+// More than a step can leave behind.
+bool FixInelastic::is_bad(double gap) const
+{
+  return gap < -REGULAR_OVERLAP * tolerance_;
 }
 
 // The gap that a constraint asks to be kept. `size` is the sum of radii (of one sphere for a wall).
 double FixInelastic::effective_gap(double gap_now, double size) const
 {
-  if (gap_now >= -REGULAR_OVERLAP * tolerance_) return gap_now;
+  if (!is_bad(gap_now)) return gap_now;
   if (phase_ == Phase::CONTACT) return -tolerance_;
   const double limit = PUSH_LIMIT * size * problem_.timestep / regular_timestep_;
   return std::max(gap_now, -std::max(limit, REGULAR_OVERLAP * tolerance_));
@@ -484,7 +512,7 @@ void FixInelastic::take_pair(std::size_t slot, int i, int j)
   const double gap = distance - size;
   note_overlap(gap);
   if (atom->tag[i] == atom->tag[j]) {
-    if (gap < -REGULAR_OVERLAP * tolerance_)
+    if (is_bad(gap))
       message_ = fmt::format("atom {} overlaps its own periodic image: the box is too small",
                              atom->tag[i]);
     return;
@@ -497,7 +525,7 @@ void FixInelastic::take_pair(std::size_t slot, int i, int j)
 void FixInelastic::note_overlap(double gap)
 {
   output_[OVERLAP] = std::max(output_[OVERLAP], -gap);
-  if (gap < -REGULAR_OVERLAP * tolerance_) bad_overlap_ = true;
+  if (is_bad(gap)) bad_overlap_ = true;
 }
 
 // Looks at the walls from where atoms are, or from where they will be after the step's motion.
@@ -610,22 +638,25 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
           const int i = look.atom;
           const auto existing = wall_constraint_.find(wall_key(i, view.wall));
           const bool known = existing != wall_constraint_.end();
-          if (known && origin_[existing->second].gap_now < -REGULAR_OVERLAP * tolerance_) return;
+          if (known && is_bad(origin_[existing->second].gap_now)) return;
           const double gap_there = view.distance - atom->radius[i];
           output_[EXCESS] = std::max(output_[EXCESS], -gap_there - 2.0 * tolerance_);
           if (gap_there >= -RELINEARISE_BEYOND * tolerance_) return;
           if (relinearisations_ > MAX_RELINEARISATIONS) return;
           ++changed;
+          const double from_here[3] = {look.where[0] - atom->x[i][0], look.where[1] - atom->x[i][1],
+                                       look.where[2] - atom->x[i][2]};
+          const double gap_here = gap_there - dot(view.normal, from_here);
           if (!known) {
             wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
             problem_.contacts.add(i, problem_.particles, view.normal, 0.0, 0.0);
-            origin_.push_back({view.wall, gap_there, atom->radius[i], 0.0});
+            origin_.push_back({view.wall, gap_here, atom->radius[i], 0.0});
+            // A region can show a wall late: from inside one part of a union the others are not seen.
+            note_overlap(gap_here);
           }
           const std::size_t c = wall_constraint_[wall_key(i, view.wall)];
-          const double from_here[3] = {look.where[0] - atom->x[i][0], look.where[1] - atom->x[i][1],
-                                       look.where[2] - atom->x[i][2]};
           std::copy_n(view.normal, 3, &problem_.contacts.normal[3 * c]);
-          problem_.contacts.gap[c] = gap_there - dot(view.normal, from_here);
+          problem_.contacts.gap[c] = effective_gap(gap_here, atom->radius[i]);
         },
         [&](const RegionWalls::Look &look, const std::string &) {
           // Beyond the wall nothing is seen: look from half way, where the plane is a safe one too.
@@ -652,7 +683,7 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
   phase_ = Phase::PUSH;
   for (std::size_t c = 0; c < problem_.contacts.size(); ++c) {
     const Origin &origin = origin_[c];
-    if (origin.gap_now < -REGULAR_OVERLAP * tolerance_)
+    if (is_bad(origin.gap_now))
       problem_.contacts.gap[c] = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
     problem_.contacts.impulse[c] = 0.0;
   }
@@ -689,7 +720,10 @@ void FixInelastic::apply_forces(double kick_steps)
       }
       const double push =
           bad_overlap_ && moves ? v - problem_.predicted_velocity[3 * i + d] : 0.0;
-      if (kick_steps == 1.0) state[PUSH_HELD + d] = 0.5 * (state[PUSH_NEXT + d] + push);
+      if (kick_steps == 1.0) {
+        state[PUSH_HELD + d] = 0.5 * (state[PUSH_NEXT + d] + push);
+        state[HELD_V + d] = 0.5 * (atom->v[i][d] + v);
+      }
       state[PUSH_NEXT + d] = push;
       state[EXPECTED_V + d] = v;
       state[EXPECTED_X + d] = atom->x[i][d] + h * v;
@@ -718,6 +752,13 @@ void FixInelastic::check_expected()
     const double velocity_error = frozen ? 0.0 : h * norm(faster);
     if (position_error <= allowed && velocity_error <= allowed) continue;
 
+    if (frozen) {
+      message = fmt::format(
+          "frozen atom {} is {:.3g} away from where its velocity takes it: give it the velocity that it moves "
+          "with (command velocity), the same during a step, or none if nothing moves it",
+          atom->tag[i], position_error);
+      break;
+    }
     std::string later;
     bool passed = false;
     const auto &fixes = modify->get_fix_list();
@@ -729,10 +770,9 @@ void FixInelastic::check_expected()
     }
     message = fmt::format(
         "atom {} did not move as predicted: its {} is off by {:.3g}. Move it with fix nve or nve/sphere "
-        "alone{}; define every fix that adds forces before fix {}; let nothing else change velocities{}{}",
+        "alone; define every fix that adds forces before fix {}; let nothing else change velocities{}{}",
         atom->tag[i], position_error > velocity_error ? "position" : "velocity",
-        position_error > velocity_error ? position_error : norm(faster),
-        frozen ? " (a frozen one with a velocity that is its motion)" : "", id,
+        position_error > velocity_error ? position_error : norm(faster), id,
         later.empty() ? "" : ". Fixes that may have:", later);
   }
   fail_together(message);
@@ -760,6 +800,19 @@ double FixInelastic::spread(const double *values)
   return extent[0] < 0.0 ? 0.0 : norm(extent);
 }
 
+// Pairs that are not listed were at least list_reach_ apart when the list was built.
+bool FixInelastic::list_reaches(const std::vector<double> &velocity)
+{
+  return spread_at_start_ + problem_.timestep * spread(velocity.data()) <= list_reach_;
+}
+
+// The part of the time step for which the list would reach, with some reserve.
+double FixInelastic::room_in_list(const std::vector<double> &velocity)
+{
+  constexpr double RESERVE = 0.9;
+  return RESERVE * (list_reach_ - spread_at_start_) / (problem_.timestep * spread(velocity.data()));
+}
+
 // Spread of the displacements since the list was built, at present or after moving with `velocity`.
 double FixInelastic::spread_since_build(const double *velocity)
 {
@@ -768,7 +821,11 @@ double FixInelastic::spread_since_build(const double *velocity)
     for (int d = 0; d < 3; ++d)
       displacement_[3 * i + d] = atom->x[i][d] - position_at_build_[3 * i + d] +
           (velocity ? problem_.timestep * velocity[3 * i + d] : 0.0);
-  return spread(displacement_.data());
+  double growth = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    growth = std::max(growth, atom->radius[i] - radius_at_build_[i]);
+  reduce(nullptr, 0, &growth, 1);
+  return spread(displacement_.data()) + 2.0 * growth;
 }
 
 void FixInelastic::set_timestep(double timestep)
@@ -788,7 +845,10 @@ void FixInelastic::shorten_step(double factor)
   if (timestep < SHORTEST * regular_timestep_)
     error->all(FLERR, "Fix inelastic: step {}: no time step above {:.3g} keeps the spheres apart",
                update->ntimestep, timestep);
-  if (update->dt == regular_timestep_) output_[SHORTENED_STEPS] += 1.0;
+  if (update->dt == regular_timestep_) {
+    output_[SHORTENED_STEPS] += 1.0;
+    run_shortened_ += 1;
+  }
   set_timestep(timestep);
 }
 
@@ -929,50 +989,35 @@ double FixInelastic::compute_array(int wall, int direction)
    what is remembered from step to step, and follows the atoms
 ------------------------------------------------------------------------- */
 
-// Within one neighbour list a pair is always seen from the same atom, which alone remembers it.
+// Both atoms of a contact remember it, those of other ranks included: the next neighbour list may show
+// the pair from the other side, and atoms may migrate before it is built.
 void FixInelastic::remember_contacts()
 {
   const inelastic::ContactSet &contacts = problem_.contacts;
   const double force_per_impulse = 1.0 / (kick_ * force->ftm2v);
-  for (int i = 0; i < atom->nlocal; ++i) memory_.forget(i);
+  for (int i = 0; i < problem_.particles; ++i) memory_.forget(i);
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     if (!(contacts.impulse[c] > 0.0)) continue;
+    const int i = contacts.first[c];
+    const int j = contacts.second[c];
     const int wall = origin_[c].wall;
-    memory_.remember(contacts.first[c], wall ? -wall : atom->tag[contacts.second[c]],
-                     contacts.impulse[c] * force_per_impulse);
+    const double strength = contacts.impulse[c] * force_per_impulse;
+    memory_.remember(i, wall ? -wall : atom->tag[j], strength);
+    if (!wall) memory_.remember(j, atom->tag[i], strength);
   }
-  memory_complete_ = false;
-}
-
-// The next list may show a pair from the other side: let both atoms remember it, those of other
-// ranks included.
-void FixInelastic::complete_memory()
-{
-  if (memory_complete_) return;
-  memory_complete_ = true;
-  const inelastic::ContactSet &contacts = problem_.contacts;
-  const double force_per_impulse = 1.0 / (kick_ * force->ftm2v);
-  const int nlocal = atom->nlocal;
-  for (int i = nlocal; i < nlocal + atom->nghost; ++i) memory_.forget(i);
-  for (std::size_t c = 0; c < contacts.size(); ++c)
-    if (contacts.impulse[c] > 0.0 && origin_[c].wall == 0)
-      memory_.remember(contacts.second[c], atom->tag[contacts.first[c]],
-                       contacts.impulse[c] * force_per_impulse);
+  auto most_partners = [this](int begin, int end) {
+    double most = 0.0;
+    for (int i = begin; i < end; ++i)
+      most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
+    reduce(nullptr, 0, &most, 1);
+    return static_cast<int>(most);
+  };
   if (has_copies()) {
-    exchanging_memory_ = true;
-    comm->reverse_comm_variable(this);
-    exchanging_memory_ = false;
+    memory_exchange_size_ = ContactMemory::packed_size(most_partners(atom->nlocal, problem_.particles));
+    comm->reverse_comm(this, memory_exchange_size_);
+    memory_exchange_size_ = 0;
   }
-  double most = 0.0;
-  for (int i = 0; i < nlocal; ++i)
-    most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
-  reduce(nullptr, 0, &most, 1);
-  maxexchange = STATE_SIZE + ContactMemory::packed_size(static_cast<int>(most));
-}
-
-void FixInelastic::pre_exchange()
-{
-  complete_memory();
+  maxexchange = STATE_SIZE + ContactMemory::packed_size(most_partners(0, atom->nlocal));
 }
 
 void FixInelastic::grow_arrays(int nmax)
@@ -1062,20 +1107,11 @@ void FixInelastic::unpack_forward_comm(int n, int first, double *buffer)
   std::copy_n(buffer, 3 * n, exchanged_ + 3 * first);
 }
 
-int FixInelastic::pack_reverse_comm_size(int n, int first)
-{
-  int size = 0;
-  for (int i = first; i < first + n; ++i)
-    size += ContactMemory::packed_size(memory_.number_of_partners(i));
-  return size;
-}
-
 int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
 {
-  if (exchanging_memory_) {
-    int m = 0;
-    for (int i = first; i < first + n; ++i) m += memory_.pack(i, buffer + m);
-    return m;
+  if (memory_exchange_size_ > 0) {
+    for (int k = 0; k < n; ++k) memory_.pack(first + k, buffer + k * memory_exchange_size_);
+    return n * memory_exchange_size_;
   }
   std::copy_n(exchanged_ + 3 * first, 3 * n, buffer);
   return 3 * n;
@@ -1083,9 +1119,8 @@ int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
 
 void FixInelastic::unpack_reverse_comm(int n, int *list, double *buffer)
 {
-  if (exchanging_memory_) {
-    int m = 0;
-    for (int k = 0; k < n; ++k) m += memory_.unpack(list[k], buffer + m);
+  if (memory_exchange_size_ > 0) {
+    for (int k = 0; k < n; ++k) memory_.unpack(list[k], buffer + k * memory_exchange_size_);
     return;
   }
   for (int k = 0; k < n; ++k)

@@ -40,7 +40,6 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void init_list(int, class NeighList *) override;
   void setup_post_neighbor() override;
   void setup(int) override;
-  void pre_exchange() override;
   void post_neighbor() override;
   void post_force(int) override;
   void post_run() override;
@@ -53,7 +52,6 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   int pack_forward_comm(int, int *, double *, int, int *) override;
   void unpack_forward_comm(int, int, double *) override;
-  int pack_reverse_comm_size(int, int) override;
   int pack_reverse_comm(int, int, double *) override;
   void unpack_reverse_comm(int, int *, double *) override;
 
@@ -100,18 +98,24 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool bad_overlap_;
 
   // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the last
-  // move (NEXT) and as LAMMPS holds it between runs, half a kick earlier (HELD).
-  enum StateColumn { EXPECTED_X = 0, EXPECTED_V = 3, PUSH_NEXT = 6, PUSH_HELD = 9, STATE_SIZE = 12 };
+  // move (NEXT) and as LAMMPS holds it between runs, half a kick earlier (HELD, with HELD_V all of it).
+  enum StateColumn {
+    EXPECTED_X = 0,
+    EXPECTED_V = 3,
+    PUSH_NEXT = 6,
+    PUSH_HELD = 9,
+    HELD_V = 12,
+    STATE_SIZE = 15
+  };
   double **state_;
   ContactMemory memory_;
-  bool memory_complete_;    // both atoms of every contact remember it
 
   // The neighbour list's reach
   double largest_radius_;
   bool one_cutoff_;       // the list is by one cutoff for all pairs, not by their radii
   double list_reach_;     // gap beyond which a pair may be missing from a fresh list
   double spread_at_start_;    // largest relative displacement since the list was built
-  std::vector<double> position_at_build_, displacement_;
+  std::vector<double> position_at_build_, radius_at_build_, displacement_;
 
   double regular_timestep_;
   bool expecting_;    // state_ holds a prediction to compare with
@@ -143,13 +147,13 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   // Summary of a run
   double run_iterations_, run_largest_overlap_, run_largest_excess_;
-  long run_steps_, run_unconverged_;
+  long run_steps_, run_unconverged_, run_shortened_;
 
   // Communication
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
   double *exchanged_;    // the per-particle vectors that pack and unpack work on
-  bool exchanging_memory_;
+  int memory_exchange_size_;    // values per atom while the memory is exchanged, otherwise 0
 
   // Host
   void sum_over_copies(double *) override;
@@ -164,6 +168,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void advance(int vflag, double kick_steps);
   void check_expected();
   void predict(double kick_steps);
+  const double *pushed_velocity(int i, double kick_steps) const;
   void collect();
   void push_apart(inelastic::ProjectionResult &);
   void apply_forces(double kick_steps);
@@ -182,6 +187,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   long relinearise_walls(const std::vector<double> &velocity);
   std::vector<RegionWalls::Look> looks(const double *velocity, bool at_end, double beyond) const;
   double effective_gap(double gap_now, double size) const;
+  bool is_bad(double gap) const;
   void note_overlap(double gap);
   std::uint64_t wall_key(int i, int wall) const
   {
@@ -191,10 +197,11 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   // Reach and time step
   double spread(const double *values);
   double spread_since_build(const double *velocity);
+  bool list_reaches(const std::vector<double> &velocity);
+  double room_in_list(const std::vector<double> &velocity);
   void shorten_step(double factor);
   void set_timestep(double timestep);
 
-  void complete_memory();
   void tally_virial(int i, int j, const double *virial);
   void share_virial();
   void unconverged(const inelastic::ProjectionResult &);

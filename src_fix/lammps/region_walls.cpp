@@ -1,5 +1,6 @@
 #include "region_walls.h"
 
+#include "comm.h"
 #include "domain.h"
 #include "error.h"
 #include "modify.h"
@@ -50,6 +51,12 @@ void RegionWalls::init()
     const bool convex_obstacle = !region->interior && !region->openflag &&
         strcmp(region->style, "union") != 0 && strcmp(region->style, "intersect") != 0;
     const bool exact = flat || convex_obstacle;
+    if (strcmp(region->style, region->interior ? "union" : "intersect") == 0 && comm->me == 0)
+      error->warning(FLERR,
+                     "Fix inelastic: LAMMPS shows the walls of region {} only to spheres whose centre is in the "
+                     "same part of it: spheres can overlap its re-entrant edges. Where each part can be a "
+                     "container of its own, list the parts instead: region A B",
+                     id);
     obstacles_.push_back({region, number_of_walls_ + 1, moving, exact});
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
@@ -84,9 +91,12 @@ void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Look> 
   for (const Look &look : looks) {
     const double *x = look.where;
     const int count = region->surface(x[0], x[1], x[2], look.reach);
-    for (int k = 0; k < count; ++k)
+    bool on_wall = false;
+    for (int k = 0; k < count; ++k) {
+      on_wall = on_wall || !(region->contact[k].r > 0.0);
       found(look, make_view(region->contact[k], obstacle.first_wall));
-    if (count == 0 && !region->match(x[0], x[1], x[2])) outside(look, region->id);
+    }
+    if (on_wall || (count == 0 && !region->match(x[0], x[1], x[2]))) outside(look, region->id);
   }
 }
 
@@ -122,9 +132,11 @@ void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Look> 
   for (const Look &look : looks) {
     const double *x = look.where;
     const int count = region->surface(x[0], x[1], x[2], look.reach);
-    for (int k = 0; k < count; ++k)
+    bool on_wall = false;
+    for (int k = 0; k < count; ++k) on_wall = on_wall || !(region->contact[k].r > 0.0);
+    for (int k = 0; k < count && !on_wall; ++k)
       seen.push_back({&look, make_view(region->contact[k], obstacle.first_wall), false});
-    if (count == 0 && !region->match(x[0], x[1], x[2])) seen.push_back({&look, WallView{}, true});
+    if (on_wall || (count == 0 && !region->match(x[0], x[1], x[2]))) seen.push_back({&look, WallView{}, true});
   }
 
   set_clock(obstacle, 0);
