@@ -2,6 +2,7 @@
 # make test     set up, check style and types, run the tests
 # make validate set up, check the physics (minutes)
 # make bench    set up, measure iterations and times
+# make tables   set up, print the measured tables of the documentation (an hour)
 # make clean    remove what these made
 
 PYTHON ?= python3
@@ -13,7 +14,7 @@ SOURCES := $(shell find src_fix inputs workflow analysis -type f -not -path '*/_
 # The environment's mpicxx and mpiexec come before any of the system's.
 export PATH := $(abspath $(BIN)):$(PATH)
 
-.PHONY: run test validate bench setup clean
+.PHONY: run test validate tables bench setup clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -27,6 +28,9 @@ test: setup
 
 validate: setup
 	pytest -m validation --durations=0
+
+tables: setup
+	python tests/tables.py
 
 bench: setup
 	python tests/benchmark.py

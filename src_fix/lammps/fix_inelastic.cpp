@@ -343,7 +343,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
     bad_overlap_ = maxima[0] > 0.0;
     output_[OVERLAP] = maxima[1];
     if (record_every_ > 0 && kick_steps == 1.0 && update->ntimestep % record_every_ == 0)
-      record_problem();
+      record_problem(result);
     if (bad_overlap_) push_apart(result);
     if (!result.converged) unconverged(result);
     if (!list_reaches(velocity_)) {
@@ -622,8 +622,9 @@ long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
   return static_cast<long>(problem_.contacts.size() - before);
 }
 
-// Inside a concave wall the distance is not convex: where a sphere ends up overlapping, the
-// constraint is replaced by the wall's tangent plane at that end.
+// Inside a concave wall the distance is not convex: where a sphere ends up overlapping, the wall's
+// tangent plane at that end is added. The planes seen before stay: all of them bound the container
+// from outside, and at the tip of a cone a sphere rests on several.
 long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
 {
   ++relinearisations_;
@@ -647,16 +648,14 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
           const double from_here[3] = {look.where[0] - atom->x[i][0], look.where[1] - atom->x[i][1],
                                        look.where[2] - atom->x[i][2]};
           const double gap_here = gap_there - dot(view.normal, from_here);
-          if (!known) {
-            wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
-            problem_.contacts.add(i, problem_.particles, view.normal, 0.0, 0.0);
-            origin_.push_back({view.wall, gap_here, atom->radius[i], 0.0});
-            // A region can show a wall late: from inside one part of a union the others are not seen.
-            note_overlap(gap_here);
-          }
-          const std::size_t c = wall_constraint_[wall_key(i, view.wall)];
-          std::copy_n(view.normal, 3, &problem_.contacts.normal[3 * c]);
-          problem_.contacts.gap[c] = effective_gap(gap_here, atom->radius[i]);
+          const double motion = view.distance_now - view.distance;
+          const double gap_now = known ? origin_[existing->second].gap_now : gap_here + motion;
+          // A region can show a wall late: from inside one part of a union the others are not seen.
+          note_overlap(gap_now);
+          const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - motion : gap_here;
+          wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
+          problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
+          origin_.push_back({view.wall, gap_now, atom->radius[i], motion});
         },
         [&](const RegionWalls::Look &look, const std::string &) {
           // Beyond the wall nothing is seen: look from half way, where the plane is a safe one too.
@@ -1169,7 +1168,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
 ------------------------------------------------------------------------- */
 
 // One .npz per recorded step; ../doc/fix_inelastic.md lists its arrays.
-void FixInelastic::record_problem()
+void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
 {
   constexpr int PER_ATOM = 13;
   constexpr int PER_CONTACT = 9;
@@ -1223,6 +1222,7 @@ void FixInelastic::record_problem()
     file.add("step", static_cast<double>(update->ntimestep));
     file.add("timestep", problem_.timestep);
     file.add("tolerance", tolerance_);
+    file.add("iterations", static_cast<double>(result.iterations));
     file.add("id", integers(column(0, 1)));
     file.add("inverse_mass", column(1, 1));
     file.add("radius", column(2, 1));

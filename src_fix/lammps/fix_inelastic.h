@@ -174,7 +174,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void apply_forces(double kick_steps);
   void update_outputs(const inelastic::ProjectionResult &);
   void remember_contacts();
-  void record_problem();
+  void record_problem(const inelastic::ProjectionResult &);
 
   // Constraints
   template <typename Visitor> void for_each_listed_pair(Visitor &&) const;

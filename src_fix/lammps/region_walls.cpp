@@ -7,6 +7,7 @@
 #include "region.h"
 #include "update.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -14,6 +15,8 @@ using namespace LAMMPS_NS;
 
 namespace {
 
+// Off an axis, in units of the reach: far above round-off, far below any tolerance.
+constexpr double OFF_AXIS[3] = {1.0e-12, 0.7e-12, 0.4e-12};
 constexpr double EVERYTHING = 1.0e300;    // a reach that no wall exceeds
 
 WallView make_view(const Region::Contact &contact, int first_wall)
@@ -57,7 +60,8 @@ void RegionWalls::init()
                      "same part of it: spheres can overlap its re-entrant edges. Where each part can be a "
                      "container of its own, list the parts instead: region A B",
                      id);
-    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact});
+    const bool cone = strcmp(region->style, "cone") == 0;
+    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, cone});
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
   }
@@ -83,20 +87,58 @@ void RegionWalls::view(const std::vector<Look> &looks, bool inexact_only,
   }
 }
 
+// The walls of one region within reach of a point; empty when LAMMPS shows none. False when the point
+// lies on a wall or beyond it.
+bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reach,
+                      std::vector<WallView> &views) const
+{
+  Region *region = obstacle.region;
+  double x[3] = {where[0], where[1], where[2]};
+  // From a point exactly on its axis LAMMPS does not see the side of a cone or a cylinder.
+  if (!obstacle.exact)
+    for (int d = 0; d < 3; ++d) x[d] += OFF_AXIS[d] * std::min(reach, 1.0);
+  views.clear();
+  const int count = region->surface(x[0], x[1], x[2], reach);
+  for (int k = 0; k < count; ++k) {
+    if (!(region->contact[k].r > 0.0)) return false;
+    views.push_back(make_view(region->contact[k], obstacle.first_wall));
+  }
+  if (obstacle.cone)
+    for (WallView &view : views) correct_cap(obstacle, x, view);
+  return count > 0 || region->match(x[0], x[1], x[2]) != 0;
+}
+
+// LAMMPS turns the vector to the caps of a cone along y to z (update 4 of 22 Jul 2025). A vector is
+// right if the wall is half as far from half way.
+void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallView &view) const
+{
+  Region *region = obstacle.region;
+  auto leads_to_wall = [&](const double *normal) {
+    double half_way[3];
+    for (int d = 0; d < 3; ++d) half_way[d] = x[d] - 0.5 * view.distance * normal[d];
+    const int count =
+        region->surface(half_way[0], half_way[1], half_way[2], 2.0 * view.distance);
+    for (int k = 0; k < count; ++k)
+      if (obstacle.first_wall + region->contact[k].iwall == view.wall &&
+          std::abs(region->contact[k].r - 0.5 * view.distance) < 1.0e-6 * view.distance)
+        return true;
+    return false;
+  };
+  if (leads_to_wall(view.normal)) return;
+  const double turned[3] = {view.normal[0], view.normal[2], view.normal[1]};
+  if (leads_to_wall(turned)) std::copy_n(turned, 3, view.normal);
+}
+
 void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Look> &looks,
                               const std::function<void(const Look &, const WallView &)> &found,
                               const std::function<void(const Look &, const std::string &)> &outside)
 {
-  Region *region = obstacle.region;
+  std::vector<WallView> views;
   for (const Look &look : looks) {
-    const double *x = look.where;
-    const int count = region->surface(x[0], x[1], x[2], look.reach);
-    bool on_wall = false;
-    for (int k = 0; k < count; ++k) {
-      on_wall = on_wall || !(region->contact[k].r > 0.0);
-      found(look, make_view(region->contact[k], obstacle.first_wall));
-    }
-    if (on_wall || (count == 0 && !region->match(x[0], x[1], x[2]))) outside(look, region->id);
+    if (see(obstacle, look.where, look.reach, views))
+      for (const WallView &view : views) found(look, view);
+    else
+      outside(look, obstacle.region->id);
   }
 }
 
@@ -129,14 +171,12 @@ void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Look> 
     bool passed_over;
   };
   std::vector<Seen> seen;
+  std::vector<WallView> views;
   for (const Look &look : looks) {
-    const double *x = look.where;
-    const int count = region->surface(x[0], x[1], x[2], look.reach);
-    bool on_wall = false;
-    for (int k = 0; k < count; ++k) on_wall = on_wall || !(region->contact[k].r > 0.0);
-    for (int k = 0; k < count && !on_wall; ++k)
-      seen.push_back({&look, make_view(region->contact[k], obstacle.first_wall), false});
-    if (on_wall || (count == 0 && !region->match(x[0], x[1], x[2]))) seen.push_back({&look, WallView{}, true});
+    if (see(obstacle, look.where, look.reach, views))
+      for (const WallView &view : views) seen.push_back({&look, view, false});
+    else
+      seen.push_back({&look, WallView{}, true});
   }
 
   set_clock(obstacle, 0);
@@ -145,15 +185,14 @@ void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Look> 
     if (entry.passed_over) {
       // The wall will have swept over the centre. LAMMPS then sees no wall, but for one that only
       // translates the distance it will have follows from the one it has now.
-      const int count = region->rotateflag || region->varshape
-          ? 0
-          : region->surface(x[0], x[1], x[2], entry.look->reach + shift_length);
-      for (int k = 0; k < count; ++k) {
-        WallView view = make_view(region->contact[k], obstacle.first_wall);
+      const bool seen_now = !region->rotateflag && !region->varshape &&
+          see(obstacle, x, entry.look->reach + shift_length, views);
+      for (WallView &view : views) {
+        if (!seen_now) break;
         for (int d = 0; d < 3; ++d) view.distance -= view.normal[d] * shift[d];
         if (view.distance < entry.look->reach) found(*entry.look, view);
       }
-      if (count == 0) outside(*entry.look, region->id);
+      if (!seen_now) outside(*entry.look, region->id);
       continue;
     }
     const int count = region->surface(x[0], x[1], x[2], EVERYTHING);

@@ -59,7 +59,11 @@ class RegionWalls : protected Pointers {
     int first_wall;
     bool moving;
     bool exact;
+    bool cone;
   };
+
+  bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &) const;
+  void correct_cap(const Obstacle &, const double *x, WallView &) const;
 
   void view_static(const Obstacle &, const std::vector<Look> &,
                    const std::function<void(const Look &, const WallView &)> &,

@@ -138,8 +138,10 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
 NB_MODULE(_core, module)
 {
   nb::class_<Projection>(module, "Projection")
-      .def_prop_ro("velocity", [](const Projection &p) { return to_numpy(p.velocity, 3); })
-      .def_prop_ro("impulse", [](const Projection &p) { return to_numpy(p.impulse, 0); })
+      .def_prop_ro("velocity", [](const Projection &p) { return to_numpy(p.velocity, 3); },
+                   nb::rv_policy::move)
+      .def_prop_ro("impulse", [](const Projection &p) { return to_numpy(p.impulse, 0); },
+                   nb::rv_policy::move)
       .def_ro("iterations", &Projection::iterations)
       .def_ro("converged", &Projection::converged)
       .def_prop_ro("feasibility", [](const Projection &p) { return p.residual.feasibility; })

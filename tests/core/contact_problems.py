@@ -1,0 +1,221 @@
+"""Contact problems to solve, and dense formulas to judge the solutions with, in plain NumPy.
+
+Lengths are in sphere diameters, velocities near 1, masses near 1, time steps near 0.01.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lammps_inelastic import core
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+WALL = -1
+UP = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The arguments of ``core.project`` (their shapes, signs and units are in _core.pyi)."""
+
+    predicted_velocity: Floats
+    inverse_mass: Floats
+    first: Indices
+    second: Indices
+    normal: Floats
+    gap: Floats
+    timestep: float
+
+    @property
+    def arguments(self) -> tuple[Floats, Floats, Indices, Indices, Floats, Floats]:
+        return (
+            self.predicted_velocity,
+            self.inverse_mass,
+            self.first,
+            self.second,
+            self.normal,
+            self.gap,
+        )
+
+    @property
+    def mass(self) -> Floats:
+        """Mass of each particle; zero where frozen, so that sums leave those out."""
+        movable = self.inverse_mass > 0
+        return np.where(movable, 1 / np.where(movable, self.inverse_mass, 1), 0)
+
+    @property
+    def fastest(self) -> float:
+        return float(np.abs(self.predicted_velocity).max())
+
+    def project(self, tolerance: float, **options) -> core.Projection:
+        return core.project(*self.arguments, timestep=self.timestep, tolerance=tolerance, **options)
+
+    def jacobian(self) -> Floats:
+        """G (m, 3 n), dense: (G V)_c = n_c . (v_first - v_second)."""
+        rows = np.zeros((self.gap.size, self.inverse_mass.size + 1, 3))
+        contacts = np.arange(self.gap.size)
+        rows[contacts, self.first] += self.normal
+        rows[contacts, self.second] -= self.normal  # a wall's -1 is the last, dropped particle
+        return rows[:, :-1].reshape(self.gap.size, -1)
+
+    def delassus(self) -> Floats:
+        """A = h G M^-1 G^T (m, m), dense."""
+        jacobian = self.jacobian()
+        return self.timestep * (jacobian * np.repeat(self.inverse_mass, 3)) @ jacobian.T
+
+    def velocity(self, impulse: Floats) -> Floats:
+        """V* + M^-1 G^T lambda."""
+        sums = (self.jacobian().T @ impulse).reshape(-1, 3)
+        return self.predicted_velocity + self.inverse_mass[:, None] * sums
+
+    def gap_at_end(self, velocity: Floats) -> Floats:
+        return self.gap + self.timestep * self.jacobian() @ velocity.ravel()
+
+    def residual(self, impulse: Floats) -> tuple[float, float]:
+        """Feasibility and complementarity [length]."""
+        gap = self.gap_at_end(self.velocity(impulse))
+        return -gap.min(initial=0.0), gap[impulse > 0].max(initial=0.0)
+
+    def kinetic_energy(self, velocity: Floats) -> float:
+        return float(0.5 * self.mass @ (velocity**2).sum(axis=1))
+
+    def with_contacts(self, order: Indices) -> Problem:
+        """Return the problem with these of its contacts, in this order; one may come twice."""
+        return replace(
+            self,
+            first=self.first[order],
+            second=self.second[order],
+            normal=self.normal[order],
+            gap=self.gap[order],
+        )
+
+
+def assert_within(actual, expected, bound: float) -> None:
+    """Fail, naming the worst offender, where two arrays differ by more than the bound."""
+    actual, expected = np.broadcast_arrays(np.asarray(actual, float), np.asarray(expected, float))
+    difference = np.abs(actual - expected)
+    if difference.size == 0:
+        return
+    worst = np.unravel_index(np.argmax(difference), difference.shape)  # a NaN, if there is one
+    assert difference[worst] <= bound, (
+        f"{actual[worst]:.17g} instead of {expected[worst]:.17g} at {tuple(map(int, worst))}: "
+        f"off by {difference[worst]:.3g}, allowed {bound:.3g}"
+    )
+
+
+def residual_left(projection: core.Projection) -> float:
+    """Return to what length each end-of-step gap of an active contact is known to be zero."""
+    return max(projection.feasibility, projection.complementarity)
+
+
+def problem(velocity, mass, contacts, timestep=0.01) -> Problem:
+    """Write out a small problem: contacts are (first, second, normal, gap) each.
+
+    A particle of infinite mass is frozen.
+    """
+    first, second, normal, gap = zip(*contacts, strict=True) if contacts else ((), (), (), ())
+    return Problem(
+        np.array(velocity, float).reshape(-1, 3),
+        1 / np.array(mass, float),
+        np.array(first, np.int64),
+        np.array(second, np.int64),
+        np.array(normal, float).reshape(-1, 3),
+        np.array(gap, float),
+        timestep,
+    )
+
+
+def column(mass, velocity) -> Problem:
+    """Spheres on top of each other, the lowest on a floor, all just touching."""
+    count = len(mass)
+    contacts = [(k, k - 1, UP, 0.0) for k in range(count)]  # the lowest sphere's k - 1 is the wall
+    return problem([(0, 0, v) for v in velocity], mass, contacts)
+
+
+def row(mass, velocity) -> Problem:
+    """Spheres side by side along x, all just touching, with these speeds along x."""
+    contacts = [(k + 1, k, (1, 0, 0), 0.0) for k in range(len(mass) - 1)]
+    return problem([(v, 0, 0) for v in velocity], mass, contacts)
+
+
+def heap(
+    seed: int,
+    particles: int = 60,
+    *,
+    floor: bool = True,
+    frozen: int = 0,
+    overlap: float = 0.0,
+    mass_ratio: float = 1.0,
+) -> Problem:
+    """Random points, each in contact with those nearby and the lower ones with a floor.
+
+    About three contacts per particle. Gaps lie between -overlap and one step's motion, and are
+    positive without overlap, so that V = 0 is admissible; with overlap, and nothing frozen, V
+    pointing away from the origin is. Frozen particles have no velocity.
+    """
+    generator = np.random.default_rng(seed)
+    timestep = 0.01
+    position = generator.uniform(0, (particles / 0.9) ** (1 / 3), (particles, 3))
+    separation = position[:, None] - position
+    distance = np.linalg.norm(separation, axis=2)
+    first, second = np.nonzero(np.triu(distance < 1.2, 1))
+    normal = separation[first, second] / distance[first, second, None]
+    if floor:
+        low = np.flatnonzero(position[:, 2] < 0.8)
+        first = np.concatenate([first, low])
+        second = np.concatenate([second, np.full(low.size, WALL)])
+        normal = np.concatenate([normal, np.tile(UP, (low.size, 1))])
+    inverse_mass = mass_ratio ** generator.uniform(-0.5, 0.5, particles)
+    inverse_mass[:frozen] = 0
+    velocity = generator.uniform(-1, 1, (particles, 3))
+    velocity[:frozen] = 0
+    movable = np.maximum(first, second) >= frozen  # a wall has second = -1
+    first, second, normal = first[movable], second[movable], normal[movable]
+    gap = generator.uniform(-overlap if overlap else 0.02 * timestep, timestep, first.size)
+    return Problem(velocity, inverse_mass, first, second, normal, gap, timestep)
+
+
+def cubic_crystal(side: int, seed: int, *, walls: int = 1) -> Problem:
+    """A cube of side^3 touching spheres of random velocities on a floor, or in a box of 6 walls.
+
+    With six walls there are more contacts than degrees of freedom: the impulses are not unique.
+    """
+    index = np.arange(side**3).reshape(side, side, side)
+    contacts = []
+    for axis in range(3):
+        normal = np.eye(3)[axis]
+        layers = np.moveaxis(index, axis, 0)
+        if axis == 2 or walls == 6:
+            contacts += [(i, WALL, normal, 0.0) for i in layers[0].ravel()]
+        if walls == 6:
+            contacts += [(i, WALL, -normal, 0.0) for i in layers[-1].ravel()]
+        for below, above in pairwise(layers):
+            contacts += [
+                (j, i, normal, 0.0) for i, j in zip(below.ravel(), above.ravel(), strict=True)
+            ]
+    velocity = np.random.default_rng(seed).uniform(-1, 1, (side**3, 3))
+    return problem(velocity, np.ones(side**3), contacts)
+
+
+def dense_crystal(side: int, seed: int) -> Problem:
+    """A face-centred cubic crystal of touching spheres on a floor, all rushing to its middle.
+
+    Twice as many contacts as degrees of freedom, most of them pressed.
+    """
+    generator = np.random.default_rng(seed)
+    cells = np.moveaxis(np.indices((side,) * 3), 0, -1).reshape(-1, 3)
+    position = cells[cells.sum(axis=1) % 2 == 0] / np.sqrt(2)
+    separation = position[:, None] - position
+    distance = np.linalg.norm(separation, axis=2)
+    contacts = [
+        (i, j, separation[i, j], 0.0) for i, j in np.argwhere(np.triu(distance < 1.01, 1)).tolist()
+    ]
+    contacts += [(i, WALL, UP, 0.0) for i in np.flatnonzero(position[:, 2] == 0).tolist()]
+    velocity = position.mean(axis=0) - position + generator.uniform(-1, 1, position.shape)
+    return problem(velocity, np.ones(len(position)), contacts)

@@ -1,0 +1,1122 @@
+// The core without Python: both solvers, the projection in rounds, several ranks, random numbers
+// and the .npz writer. Small, because it is there to be run under the address and
+// undefined-behaviour sanitizers; the solvers are judged in test_solver*.py. Returns 1 when a check
+// failed.
+
+#include "contact_problem.h"
+#include "contact_set.h"
+#include "host.h"
+#include "npz.h"
+#include "projection.h"
+#include "random.h"
+#include "solver.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+using namespace inelastic;
+
+namespace {
+
+/* ----------------------------------------------------------------------
+   checks
+------------------------------------------------------------------------- */
+
+std::atomic<int> failures{0};
+
+void fail(int line, const std::string &expression, const std::string &values)
+{
+  ++failures;
+  std::ostringstream message;
+  message << "core_test.cpp:" << line << ": " << expression << '\n';
+  if (!values.empty()) message << "    " << values << '\n';
+  std::cerr << message.str();
+}
+
+template <typename Actual, typename Expected>
+std::string both(const Actual &actual, const Expected &expected)
+{
+  std::ostringstream text;
+  text.precision(17);
+  text << "left: " << actual << ", right: " << expected;
+  return text.str();
+}
+
+void check_near(int line, const std::string &expression, double actual, double expected,
+                double bound)
+{
+  if (std::abs(actual - expected) <= bound) return;    // false if one of them is not a number
+  std::ostringstream text;
+  text << both(actual, expected) << ", off by " << std::abs(actual - expected) << ", allowed "
+       << bound;
+  fail(line, expression, text.str());
+}
+
+// Names the worst offender.
+void check_all_near(int line, const std::string &expression, const std::vector<double> &actual,
+                    const std::vector<double> &expected, double bound)
+{
+  if (actual.size() != expected.size()) {
+    fail(line, expression + ": sizes", both(actual.size(), expected.size()));
+    return;
+  }
+  const auto difference = [&](std::size_t k) {
+    const double value = std::abs(actual[k] - expected[k]);
+    return std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+  };
+  std::size_t worst = 0;
+  for (std::size_t k = 1; k < actual.size(); ++k)
+    if (difference(k) > difference(worst)) worst = k;
+  if (!actual.empty())
+    check_near(line, expression + " at " + std::to_string(worst), actual[worst], expected[worst],
+               bound);
+}
+
+#define CHECK(condition)                                   \
+  do {                                                     \
+    if (!(condition)) fail(__LINE__, #condition, "false"); \
+  } while (false)
+
+#define CHECK_COMPARED(actual, comparison, expected)                            \
+  do {                                                                          \
+    const auto &left = (actual);                                                \
+    const auto &right = (expected);                                             \
+    if (!(left comparison right))                                               \
+      fail(__LINE__, #actual " " #comparison " " #expected, both(left, right)); \
+  } while (false)
+
+#define CHECK_EQUAL(actual, expected) CHECK_COMPARED(actual, ==, expected)
+#define CHECK_AT_MOST(actual, bound) CHECK_COMPARED(actual, <=, bound)
+#define CHECK_ABOVE(actual, bound) CHECK_COMPARED(actual, >, bound)
+
+#define CHECK_NEAR(actual, expected, bound) \
+  check_near(__LINE__, #actual " near " #expected, actual, expected, bound)
+
+#define CHECK_ALL_NEAR(actual, expected, bound) \
+  check_all_near(__LINE__, #actual " near " #expected, actual, expected, bound)
+
+/* ----------------------------------------------------------------------
+   problems
+------------------------------------------------------------------------- */
+
+constexpr int WALL = -1;
+constexpr double UP[3] = {0.0, 0.0, 1.0};
+constexpr double TIMESTEP = 0.01;
+// [length] 1e-9 of the motion of one step.
+constexpr double TOLERANCE = 1.0e-11;
+// Numbers near 1 after a few dozen additions.
+constexpr double ROUNDING = 1.0e-13;
+
+const std::vector<std::string> SOLVERS = {"apgd", "uzawa"};
+
+ContactProblem make_problem(const std::vector<double> &velocity,
+                            const std::vector<double> &inverse_mass)
+{
+  ContactProblem problem;
+  problem.timestep = TIMESTEP;
+  problem.resize(static_cast<int>(inverse_mass.size()));
+  std::copy(velocity.begin(), velocity.end(), problem.predicted_velocity.begin());
+  std::copy(inverse_mass.begin(), inverse_mass.end(), problem.inverse_mass.begin());
+  return problem;
+}
+
+void add_contact(ContactProblem &problem, int first, int second, const double *normal, double gap)
+{
+  problem.contacts.add(first, second == WALL ? problem.particles : second, normal, gap, 0.0);
+}
+
+// Unit spheres on top of each other, the lowest on a floor, all falling at g h = 0.1. With the
+// contacts or, for a source to find them, without.
+ContactProblem make_column(int count, bool with_contacts)
+{
+  const std::size_t size = static_cast<std::size_t>(count);
+  ContactProblem problem = make_problem(std::vector<double>(3 * size, 0.0),
+                                        std::vector<double>(size, 1.0));
+  for (int i = 0; i < count; ++i) {
+    problem.predicted_velocity[3 * static_cast<std::size_t>(i) + 2] = -0.1;
+    if (with_contacts) add_contact(problem, i, i - 1, UP, 0.0);    // i - 1 is WALL for the lowest
+  }
+  return problem;
+}
+
+// Weight, times h, that each contact of the column carries.
+std::vector<double> column_weights(int count)
+{
+  std::vector<double> weights;
+  for (int i = 0; i < count; ++i) weights.push_back(0.1 * (count - i));
+  return weights;
+}
+
+// A cube of side^3 touching spheres with random velocities on a floor.
+ContactProblem make_crystal(int side)
+{
+  const int count = side * side * side;
+  ContactProblem problem =
+      make_problem({}, std::vector<double>(static_cast<std::size_t>(count), 1.0));
+  for (int i = 0; i < count; ++i) {
+    const auto velocity = uniform_vector(1, static_cast<std::uint64_t>(i), 0);
+    std::copy(velocity.begin(), velocity.end(), problem.predicted_velocity.begin() + 3 * i);
+    const int place[3] = {i / (side * side), i / side % side, i % side};
+    const int stride[3] = {side * side, side, 1};
+    for (int axis = 0; axis < 3; ++axis) {
+      double normal[3] = {0.0, 0.0, 0.0};
+      normal[axis] = 1.0;
+      if (place[axis] > 0) add_contact(problem, i, i - stride[axis], normal, 0.0);
+      if (place[axis] == 0 && axis == 2) add_contact(problem, i, WALL, normal, 0.0);
+    }
+  }
+  return problem;
+}
+
+// V* + M^-1 G^T lambda, by the formula and not by the operator.
+std::vector<double> velocity_of(const ContactProblem &problem)
+{
+  std::vector<double> velocity = problem.predicted_velocity;
+  const ContactSet &contacts = problem.contacts;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const auto i = static_cast<std::size_t>(contacts.first[c]);
+    const auto j = static_cast<std::size_t>(contacts.second[c]);
+    for (std::size_t d = 0; d < 3; ++d) {
+      const double push = contacts.impulse[c] * contacts.normal[3 * c + d];
+      velocity[3 * i + d] += problem.inverse_mass[i] * push;
+      velocity[3 * j + d] -= problem.inverse_mass[j] * push;
+    }
+  }
+  velocity.resize(3 * static_cast<std::size_t>(problem.particles));
+  return velocity;
+}
+
+// Gaps at the end of the step, by the formula.
+std::vector<double> gaps_of(const ContactProblem &problem, std::vector<double> velocity)
+{
+  velocity.resize(velocity.size() + 3, 0.0);    // walls
+  const ContactSet &contacts = problem.contacts;
+  std::vector<double> gaps = contacts.gap;
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    for (std::size_t d = 0; d < 3; ++d)
+      gaps[c] += problem.timestep * contacts.normal[3 * c + d] *
+          (velocity[3 * static_cast<std::size_t>(contacts.first[c]) + d] -
+           velocity[3 * static_cast<std::size_t>(contacts.second[c]) + d]);
+  return gaps;
+}
+
+std::vector<double> without_dummy(std::vector<double> per_particle)
+{
+  per_particle.resize(per_particle.size() - 3);
+  return per_particle;
+}
+
+// Adds nothing.
+class AllContactsKnown final : public ConstraintSource {
+ public:
+  long refine(const std::vector<double> &, ContactProblem &) override
+  {
+    ++looks;
+    return 0;
+  }
+  int looks = 0;
+};
+
+/* ----------------------------------------------------------------------
+   one rank
+------------------------------------------------------------------------- */
+
+void test_empty_problems()
+{
+  SerialHost host;
+  for (const std::string &name : SOLVERS)
+    for (const std::size_t particles : {0, 2}) {
+      const auto solver = make_solver(name);
+      std::vector<double> given(3 * particles, 0.25);
+      ContactProblem problem = make_problem(given, std::vector<double>(particles, 1.0));
+      const SolverResult solved = solver->solve(problem, {TOLERANCE, 10}, host);
+      CHECK(solved.converged);
+      CHECK_EQUAL(solved.iterations, 0L);
+      CHECK_EQUAL(solved.residual.feasibility, 0.0);
+      CHECK_EQUAL(solved.residual.complementarity, 0.0);
+
+      AllContactsKnown source;
+      std::vector<double> velocity(7, -1.0);    // of another size before
+      const ProjectionResult result =
+          project(problem, source, *solver, {TOLERANCE, 10}, 5, host, velocity);
+      CHECK(result.converged && result.complete);
+      CHECK_EQUAL(result.rounds, 1);
+      CHECK_EQUAL(source.looks, 1);
+      CHECK(velocity == given);
+      CHECK_EQUAL(largest_eigenvalue(problem, host), 0.0);
+    }
+  const Residual nothing = residual(nullptr, nullptr, 0);
+  CHECK_EQUAL(nothing.feasibility, 0.0);
+  CHECK_EQUAL(nothing.complementarity, 0.0);
+}
+
+void test_contact_set()
+{
+  ContactSet contacts;
+  CHECK_EQUAL(contacts.size(), std::size_t{0});
+  const double normal[3] = {0.6, 0.0, 0.8};
+  contacts.add(3, 5, normal, -0.5, 2.0);
+  CHECK_EQUAL(contacts.size(), std::size_t{1});
+  CHECK(contacts.first == std::vector<int>{3} && contacts.second == std::vector<int>{5});
+  CHECK(contacts.normal == std::vector<double>(normal, normal + 3));
+  CHECK(contacts.gap == std::vector<double>{-0.5} && contacts.impulse == std::vector<double>{2.0});
+  contacts.clear();
+  CHECK_EQUAL(contacts.size(), std::size_t{0});
+  CHECK(contacts.first.empty() && contacts.second.empty() && contacts.normal.empty());
+  CHECK(contacts.gap.empty() && contacts.impulse.empty());
+}
+
+void test_resize_keeps_the_dummy_particle_still()
+{
+  ContactProblem problem;
+  for (const int particles : {3, 1, 4, 0}) {
+    problem.resize(particles);
+    CHECK_EQUAL(problem.particles, particles);
+    CHECK_EQUAL(problem.inverse_mass.size(), static_cast<std::size_t>(particles) + 1);
+    CHECK_EQUAL(problem.predicted_velocity.size(), 3 * (static_cast<std::size_t>(particles) + 1));
+    CHECK_EQUAL(problem.inverse_mass.back(), 0.0);
+    for (int d = 1; d <= 3; ++d) CHECK_EQUAL(*(problem.predicted_velocity.end() - d), 0.0);
+    std::fill(problem.inverse_mass.begin(), problem.inverse_mass.end(), 9.0);
+    std::fill(problem.predicted_velocity.begin(), problem.predicted_velocity.end(), 9.0);
+  }
+}
+
+void test_residual()
+{
+  const double gaps[3] = {-0.1, 0.2, 0.3};
+  const double impulses[3] = {0.0, 0.0, 1.0};
+  const Residual worst = residual(gaps, impulses, 3);
+  CHECK_EQUAL(worst.feasibility, 0.1);
+  CHECK_EQUAL(worst.complementarity, 0.3);
+  const Residual without_last = residual(gaps, impulses, 2);
+  CHECK_EQUAL(without_last.complementarity, 0.0);
+}
+
+void test_gap_operator()
+{
+  SerialHost host;
+  ContactProblem problem = make_crystal(3);
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c)
+    problem.contacts.impulse[c] = 0.1 * static_cast<double>(c % 7);
+  GapOperator gap_operator;
+  gap_operator.prepare(problem);
+  CHECK_ALL_NEAR(gap_operator.free_gap(),
+                 gaps_of(problem, without_dummy(problem.predicted_velocity)), ROUNDING);
+  std::vector<double> gaps(problem.contacts.size());
+  gap_operator.apply(problem, problem.contacts.impulse.data(), gaps.data(), host);
+  CHECK_ALL_NEAR(gaps, gaps_of(problem, velocity_of(problem)), ROUNDING);
+  std::vector<double> velocity(3 * static_cast<std::size_t>(problem.particles));
+  gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
+  CHECK_ALL_NEAR(velocity, velocity_of(problem), ROUNDING);
+}
+
+void test_sphere_falling_on_the_floor()
+{
+  SerialHost host;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_problem({0.5, 0.0, -3.0}, {0.5});
+    add_contact(problem, 0, WALL, UP, 0.01);
+    const SolverResult result = make_solver(name)->solve(problem, {TOLERANCE, 1000}, host);
+    CHECK(result.converged);
+    // m (-gap / h - v), to the tolerance over the step, times the mass.
+    CHECK_NEAR(problem.contacts.impulse[0], 4.0, 2.0 * TOLERANCE / TIMESTEP);
+  }
+}
+
+void test_frozen_particle()
+{
+  SerialHost host;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_problem({0.0, 0.0, -1.0, 0.0, 0.0, 0.5}, {1.0, 0.0});
+    add_contact(problem, 0, 1, UP, 0.0);
+    AllContactsKnown source;
+    std::vector<double> velocity;
+    const auto solver = make_solver(name);
+    project(problem, source, *solver, {TOLERANCE, 1000}, 1, host, velocity);
+    CHECK_ALL_NEAR(velocity, std::vector<double>({0.0, 0.0, 0.5, 0.0, 0.0, 0.5}),
+                   TOLERANCE / TIMESTEP);
+  }
+}
+
+void test_column()
+{
+  SerialHost host;
+  constexpr int COUNT = 8;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_column(COUNT, true);
+    const SolverResult result = make_solver(name)->solve(problem, {TOLERANCE, 10000}, host);
+    CHECK(result.converged);
+    CHECK_AT_MOST(result.residual.feasibility, TOLERANCE);
+    // Relative velocities add up to velocities, and those to impulses.
+    CHECK_ALL_NEAR(problem.contacts.impulse, column_weights(COUNT),
+                   COUNT * COUNT * TOLERANCE / TIMESTEP);
+  }
+}
+
+void test_crystal()
+{
+  SerialHost host;
+  std::vector<double> other_solver;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_crystal(4);
+    const SolverResult result = make_solver(name)->solve(problem, {TOLERANCE, 10000}, host);
+    CHECK(result.converged);
+    const std::vector<double> gaps = gaps_of(problem, velocity_of(problem));
+    const Residual worst = residual(gaps.data(), problem.contacts.impulse.data(), gaps.size());
+    CHECK_AT_MOST(worst.feasibility, TOLERANCE + ROUNDING * TIMESTEP);
+    CHECK_AT_MOST(worst.complementarity, TOLERANCE + ROUNDING * TIMESTEP);
+    CHECK_NEAR(result.residual.feasibility, worst.feasibility, ROUNDING * TIMESTEP);
+    CHECK_NEAR(result.residual.complementarity, worst.complementarity, ROUNDING * TIMESTEP);
+    for (const double impulse : problem.contacts.impulse) CHECK(impulse >= 0.0);
+    // Two answers differ by a few times the tolerance over the step along each of 100 contacts.
+    if (!other_solver.empty())
+      CHECK_ALL_NEAR(velocity_of(problem), other_solver, 100.0 * TOLERANCE / TIMESTEP);
+    other_solver = velocity_of(problem);
+  }
+}
+
+void test_iteration_limit()
+{
+  SerialHost host;
+  for (const std::string &name : SOLVERS)
+    for (const long limit : {0L, 1L, 5L}) {
+      ContactProblem problem = make_crystal(3);
+      const SolverResult result = make_solver(name)->solve(problem, {TOLERANCE, limit}, host);
+      CHECK(!result.converged);
+      CHECK_EQUAL(result.iterations, limit);
+    }
+}
+
+// One solver for steps with other numbers of particles and contacts, as in a run.
+void test_solver_is_used_again()
+{
+  SerialHost host;
+  for (const std::string &name : SOLVERS) {
+    const auto solver = make_solver(name);
+    for (const int count : {5, 1, 0, 12, 3}) {
+      ContactProblem problem = make_column(count, true);
+      CHECK(solver->solve(problem, {TOLERANCE, 10000}, host).converged);
+      CHECK_ALL_NEAR(problem.contacts.impulse, column_weights(count),
+                     count * count * TOLERANCE / TIMESTEP + ROUNDING);
+    }
+  }
+}
+
+void test_first_guess()
+{
+  SerialHost host;
+  ContactProblem problem = make_column(5, true);
+  problem.contacts.impulse = column_weights(5);
+  CHECK_EQUAL(make_solver("apgd")->solve(problem, {TOLERANCE, 1000}, host).iterations, 0L);
+  CHECK_ABOVE(make_solver("uzawa")->solve(problem, {TOLERANCE, 1000}, host).iterations, 0L);
+}
+
+void test_largest_eigenvalue()
+{
+  SerialHost host;
+  ContactProblem problem = make_problem(std::vector<double>(9, 1.0), {1.0, 1.0, 1.0});
+  add_contact(problem, 1, 0, UP, 0.3);
+  add_contact(problem, 2, 1, UP, 0.3);
+  // h [[2, -1], [-1, 2]], to about 1e-3.
+  CHECK_NEAR(largest_eigenvalue(problem, host), 3.0 * TIMESTEP, 2.0e-3 * 3.0 * TIMESTEP);
+}
+
+void test_names_of_solvers()
+{
+  for (const std::string &name : SOLVERS) CHECK(make_solver(name) != nullptr);
+  CHECK(make_solver("") == nullptr);
+  CHECK(make_solver("APGD") == nullptr);
+}
+
+/* ----------------------------------------------------------------------
+   constraints that are found on the way
+------------------------------------------------------------------------- */
+
+// Knows all contacts of a problem and hands out those that a velocity violates.
+class HiddenContacts final : public ConstraintSource {
+ public:
+  explicit HiddenContacts(const ContactProblem &all)
+      : all_(all), known_(all.contacts.size(), false)
+  {
+  }
+
+  long refine(const std::vector<double> &velocity, ContactProblem &problem) override
+  {
+    CHECK_EQUAL(velocity.size(), 3 * static_cast<std::size_t>(problem.particles));
+    const std::vector<double> gaps = gaps_of(all_, velocity);
+    const ContactSet &hidden = all_.contacts;
+    long added = 0;
+    for (std::size_t c = 0; c < gaps.size(); ++c) {
+      if (known_[c] || gaps[c] >= -TOLERANCE) continue;
+      problem.contacts.add(hidden.first[c], hidden.second[c], &hidden.normal[3 * c], hidden.gap[c],
+                           0.0);
+      known_[c] = true;
+      ++added;
+    }
+    return added;
+  }
+
+ private:
+  ContactProblem all_;
+  std::vector<bool> known_;
+};
+
+// A falling column finds its contacts one by one from below: while the lower spheres rest, those
+// above still fall side by side.
+void test_contacts_are_found_in_rounds()
+{
+  SerialHost host;
+  constexpr int COUNT = 6;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_column(COUNT, false);
+    HiddenContacts source(make_column(COUNT, true));
+    std::vector<double> velocity;
+    const auto solver = make_solver(name);
+    const ProjectionResult result =
+        project(problem, source, *solver, {TOLERANCE, 100000}, 100, host, velocity);
+    CHECK(result.converged);
+    CHECK(result.complete);
+    CHECK_EQUAL(result.rounds, COUNT + 1);    // the last one finds nothing
+    CHECK_ABOVE(result.iterations, long{COUNT - 1});
+    CHECK_AT_MOST(result.residual.feasibility, TOLERANCE);
+    CHECK_ALL_NEAR(problem.contacts.impulse, column_weights(COUNT),
+                   COUNT * COUNT * TOLERANCE / TIMESTEP);
+    CHECK_ALL_NEAR(velocity, std::vector<double>(3 * COUNT, 0.0), COUNT * TOLERANCE / TIMESTEP);
+  }
+}
+
+void test_same_answer_as_with_all_contacts()
+{
+  SerialHost host;
+  const ContactProblem all = make_crystal(4);
+  std::vector<double> at_once, in_rounds;
+  const auto solver = make_solver("apgd");
+  ContactProblem complete = all;
+  AllContactsKnown nothing_to_add;
+  project(complete, nothing_to_add, *solver, {TOLERANCE, 10000}, 10, host, at_once);
+  ContactProblem growing = all;
+  growing.contacts.clear();
+  HiddenContacts source(all);
+  const ProjectionResult result =
+      project(growing, source, *solver, {TOLERANCE, 10000}, 100, host, in_rounds);
+  CHECK(result.converged && result.complete);
+  CHECK_ABOVE(result.rounds, 2);
+  CHECK(growing.contacts.size() < all.contacts.size());
+  // As in test_crystal.
+  CHECK_ALL_NEAR(in_rounds, at_once, 100.0 * TOLERANCE / TIMESTEP);
+}
+
+void test_round_limit()
+{
+  SerialHost host;
+  const auto solver = make_solver("apgd");
+  for (const int limit : {0, 1, 3}) {
+    ContactProblem problem = make_column(6, false);
+    HiddenContacts source(make_column(6, true));
+    std::vector<double> velocity;
+    const ProjectionResult result =
+        project(problem, source, *solver, {TOLERANCE, 100000}, limit, host, velocity);
+    CHECK_EQUAL(result.rounds, limit);
+    CHECK(!result.complete);
+    CHECK_EQUAL(result.converged, limit > 0);
+    CHECK_EQUAL(velocity.size(), std::size_t{18});
+  }
+}
+
+void test_iterations_of_all_rounds_are_limited()
+{
+  SerialHost host;
+  const auto solver = make_solver("apgd");
+  ContactProblem problem = make_column(6, false);
+  HiddenContacts source(make_column(6, true));
+  std::vector<double> velocity;
+  const ProjectionResult result =
+      project(problem, source, *solver, {TOLERANCE, 40}, 100, host, velocity);
+  CHECK_EQUAL(result.iterations, 40L);
+  CHECK(!result.converged);
+  CHECK(!result.complete);
+  // The velocities are those of the impulses reached.
+  CHECK_ALL_NEAR(velocity, velocity_of(problem), ROUNDING);
+}
+
+// A particle inside a round pipe of radius 1 about the z axis, linearised about where it ends up.
+class Pipe final : public ConstraintSource {
+ public:
+  Pipe(double x, double y) : x_(x), y_(y) {}
+
+  long refine(const std::vector<double> &velocity, ContactProblem &problem) override
+  {
+    const double x = x_ + TIMESTEP * velocity[0], y = y_ + TIMESTEP * velocity[1];
+    const double from_axis = std::hypot(x, y);
+    overlap = from_axis - 1.0;
+    if (overlap <= TOLERANCE) return 0;
+    const double normal[3] = {-x / from_axis, -y / from_axis, 0.0};
+    // So that gap + h n . V is the true gap for this velocity.
+    const double gap = -overlap - TIMESTEP * (normal[0] * velocity[0] + normal[1] * velocity[1]);
+    problem.contacts.clear();
+    problem.contacts.add(0, problem.particles, normal, gap, 0.0);
+    return 1;
+  }
+
+  double overlap = 0.0;
+
+ private:
+  double x_, y_;
+};
+
+void test_concave_wall_is_linearised_again()
+{
+  SerialHost host;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_problem({30.0, 40.0, 1.0}, {0.5});
+    const double inwards[3] = {-1.0, 0.0, 0.0};
+    add_contact(problem, 0, WALL, inwards, 0.2);    // the pipe as seen from the start
+    Pipe pipe(0.8, 0.0);
+    std::vector<double> velocity;
+    const auto solver = make_solver(name);
+    const ProjectionResult result =
+        project(problem, pipe, *solver, {TOLERANCE, 10000}, 50, host, velocity);
+    CHECK(result.converged && result.complete);
+    CHECK_ABOVE(result.rounds, 2);
+    CHECK_AT_MOST(pipe.overlap, TOLERANCE);
+    // The nearest point of the pipe to (0.8 + 0.3, 0.4). An error along the wall shows in the
+    // overlap only squared: the root of the tolerance, over the step.
+    const double distance = std::hypot(1.1, 0.4);
+    const double accuracy = std::sqrt(2.0 * TOLERANCE) / TIMESTEP;
+    CHECK_ALL_NEAR(velocity,
+                   std::vector<double>({(1.1 / distance - 0.8) / TIMESTEP,
+                                        0.4 / distance / TIMESTEP, 1.0}),
+                   accuracy);
+  }
+}
+
+/* ----------------------------------------------------------------------
+   several ranks: threads, each with a part of the problem and copies of others' particles
+------------------------------------------------------------------------- */
+
+// Which particles a rank has: owned ones first, then copies.
+struct Share {
+  std::vector<int> particles;
+  int owned = 0;
+};
+
+class Ranks {
+ public:
+  Ranks(std::vector<Share> shares, int particles)
+      : shares_(std::move(shares)), particles_(particles), arrays_(shares_.size())
+  {
+  }
+
+  struct Arrays {
+    double *per_particle = nullptr;
+    double *sums = nullptr, *maxima = nullptr;
+    int number_of_sums = 0, number_of_maxima = 0;
+  };
+
+  // Waits until every rank has made the same call, then does it for all of them.
+  void call(const std::string &name, std::size_t rank, const Arrays &arrays,
+            const std::function<void(Ranks &)> &exchange)
+  {
+    constexpr auto PATIENCE = std::chrono::seconds(20);
+    std::unique_lock<std::mutex> lock(mutex_);
+    arrays_[rank] = arrays;
+    if (waiting_ == 0)
+      calls.push_back(name);
+    else if (calls.back() != name)
+      give_up("one rank calls " + calls.back() + ", another " + name);
+    if (++waiting_ == static_cast<int>(shares_.size())) {
+      exchange(*this);
+      waiting_ = 0;
+      ++exchanges_;
+      all_here_.notify_all();
+      return;
+    }
+    const long mine = exchanges_;
+    if (!all_here_.wait_for(lock, PATIENCE, [&] { return exchanges_ > mine; }))
+      give_up("one rank waits in " + name + " for the others");
+  }
+
+  void sum_over_copies()
+  {
+    std::vector<double> sums(3 * static_cast<std::size_t>(particles_), 0.0);
+    for_each_value(false, [&](double &mine, std::size_t k) { sums[k] += mine; });
+    for_each_value(false, [&](double &mine, std::size_t k) { mine = sums[k]; });
+  }
+
+  void share_with_copies()
+  {
+    std::vector<double> owned(3 * static_cast<std::size_t>(particles_), 0.0);
+    for_each_value(true, [&](double &mine, std::size_t k) { owned[k] = mine; });
+    for_each_value(false, [&](double &mine, std::size_t k) { mine = owned[k]; });
+  }
+
+  void reduce()
+  {
+    for (int k = 0; k < arrays_[0].number_of_sums; ++k) {
+      double sum = 0.0;
+      for (const Arrays &rank : arrays_) sum += rank.sums[k];
+      for (const Arrays &rank : arrays_) rank.sums[k] = sum;
+    }
+    for (int k = 0; k < arrays_[0].number_of_maxima; ++k) {
+      double most = arrays_[0].maxima[k];
+      for (const Arrays &rank : arrays_) most = std::max(most, rank.maxima[k]);
+      for (const Arrays &rank : arrays_) rank.maxima[k] = most;
+    }
+  }
+
+  const std::vector<Share> &shares() const { return shares_; }
+
+  std::vector<std::string> calls;    // each once, not once per rank
+
+ private:
+  void for_each_value(bool owned_only, const std::function<void(double &, std::size_t)> &visit)
+  {
+    for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
+      const Share &share = shares_[rank];
+      const std::size_t count =
+          owned_only ? static_cast<std::size_t>(share.owned) : share.particles.size();
+      for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t d = 0; d < 3; ++d)
+          visit(arrays_[rank].per_particle[3 * i + d],
+                3 * static_cast<std::size_t>(share.particles[i]) + d);
+    }
+  }
+
+  // The other threads wait for ever: nothing can be tidied up.
+  [[noreturn]] static void give_up(const std::string &reason)
+  {
+    std::cerr << "core_test.cpp: " << reason << std::endl;
+    std::_Exit(1);
+  }
+
+  std::vector<Share> shares_;
+  int particles_;
+  std::vector<Arrays> arrays_;
+  std::mutex mutex_;
+  std::condition_variable all_here_;
+  int waiting_ = 0;
+  long exchanges_ = 0;
+};
+
+class RankHost final : public Host {
+ public:
+  RankHost(Ranks &ranks, std::size_t rank) : ranks_(ranks), rank_(rank) {}
+
+  void sum_over_copies(double *per_particle) override
+  {
+    Ranks::Arrays arrays;
+    arrays.per_particle = per_particle;
+    ranks_.call("sum_over_copies", rank_, arrays, &Ranks::sum_over_copies);
+  }
+
+  void share_with_copies(double *per_particle) override
+  {
+    Ranks::Arrays arrays;
+    arrays.per_particle = per_particle;
+    ranks_.call("share_with_copies", rank_, arrays, &Ranks::share_with_copies);
+  }
+
+  void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override
+  {
+    const Ranks::Arrays arrays = {nullptr, sums, maxima, number_of_sums, number_of_maxima};
+    ranks_.call("reduce " + std::to_string(number_of_sums) + " sums and " +
+                    std::to_string(number_of_maxima) + " maxima",
+                rank_, arrays, &Ranks::reduce);
+  }
+
+ private:
+  Ranks &ranks_;
+  std::size_t rank_;
+};
+
+// What one rank has of a problem: its particles, the contacts that are given to it, and copies of
+// the particles of other ranks that those touch. The copies' velocities come from the host.
+ContactProblem part_of(const ContactProblem &whole, const Share &share,
+                       const std::vector<std::size_t> &contacts)
+{
+  std::vector<int> local(static_cast<std::size_t>(whole.particles), WALL);
+  std::vector<double> velocity, inverse_mass;
+  for (std::size_t k = 0; k < share.particles.size(); ++k) {
+    const auto i = static_cast<std::size_t>(share.particles[k]);
+    if (local[i] == WALL) local[i] = static_cast<int>(k);
+    const bool owned = k < static_cast<std::size_t>(share.owned);
+    for (std::size_t d = 0; d < 3; ++d)
+      velocity.push_back(owned ? whole.predicted_velocity[3 * i + d]
+                               : std::numeric_limits<double>::quiet_NaN());
+    inverse_mass.push_back(whole.inverse_mass[i]);
+  }
+  ContactProblem part = make_problem(velocity, inverse_mass);
+  for (const std::size_t c : contacts) {
+    const int second = whole.contacts.second[c];
+    add_contact(part, local[static_cast<std::size_t>(whole.contacts.first[c])],
+                second == whole.particles ? WALL : local[static_cast<std::size_t>(second)],
+                &whole.contacts.normal[3 * c], whole.contacts.gap[c]);
+  }
+  return part;
+}
+
+struct RankOutcome {
+  ProjectionResult result;
+  std::vector<double> velocity;
+};
+
+// Solves on as many ranks as there are shares; contacts[r] are those of rank r, known to it from the
+// start or to be found.
+std::vector<RankOutcome> solve_on_ranks(const ContactProblem &whole, Ranks &ranks,
+                                        const std::vector<std::vector<std::size_t>> &contacts,
+                                        const std::string &solver_name, double tolerance,
+                                        bool hide_contacts)
+{
+  std::vector<RankOutcome> outcomes(ranks.shares().size());
+  std::vector<std::thread> threads;
+  for (std::size_t rank = 0; rank < outcomes.size(); ++rank)
+    threads.emplace_back([&, rank] {
+      RankHost host(ranks, rank);
+      ContactProblem problem = part_of(whole, ranks.shares()[rank], contacts[rank]);
+      host.share_with_copies(problem.predicted_velocity.data());
+      const auto solver = make_solver(solver_name);
+      RankOutcome &outcome = outcomes[rank];
+      if (hide_contacts) {
+        HiddenContacts source(problem);
+        problem.contacts.clear();
+        outcome.result =
+            project(problem, source, *solver, {tolerance, 100000}, 100, host, outcome.velocity);
+      } else {
+        AllContactsKnown source;
+        outcome.result =
+            project(problem, source, *solver, {tolerance, 100000}, 100, host, outcome.velocity);
+      }
+    });
+  for (std::thread &thread : threads) thread.join();
+  return outcomes;
+}
+
+std::vector<double> solve_on_one_rank(ContactProblem problem, const std::string &solver_name,
+                                      double tolerance)
+{
+  SerialHost host;
+  AllContactsKnown source;
+  std::vector<double> velocity;
+  const auto solver = make_solver(solver_name);
+  project(problem, source, *solver, {tolerance, 100000}, 1, host, velocity);
+  return velocity;
+}
+
+// All ranks agree on the course of things, and copies on the velocities of their owners.
+void check_agreement(const std::vector<RankOutcome> &outcomes, const Ranks &ranks,
+                     const std::vector<double> &expected, double bound)
+{
+  for (std::size_t rank = 0; rank < outcomes.size(); ++rank) {
+    const ProjectionResult &mine = outcomes[rank].result, &first = outcomes[0].result;
+    CHECK(mine.converged && mine.complete);
+    CHECK_EQUAL(mine.iterations, first.iterations);
+    CHECK_EQUAL(mine.rounds, first.rounds);
+    CHECK_EQUAL(mine.residual.feasibility, first.residual.feasibility);
+    CHECK_EQUAL(mine.residual.complementarity, first.residual.complementarity);
+    const Share &share = ranks.shares()[rank];
+    std::vector<double> expected_here;
+    for (const int i : share.particles)
+      for (std::size_t d = 0; d < 3; ++d)
+        expected_here.push_back(expected[3 * static_cast<std::size_t>(i) + d]);
+    CHECK_ALL_NEAR(outcomes[rank].velocity, expected_here, bound);
+    for (std::size_t other = 0; other < outcomes.size(); ++other) {
+      const Share &owner = ranks.shares()[other];
+      for (std::size_t k = 0; k < share.particles.size(); ++k)
+        for (std::size_t o = 0; o < static_cast<std::size_t>(owner.owned); ++o)
+          if (owner.particles[o] == share.particles[k])
+            CHECK(std::equal(&outcomes[rank].velocity[3 * k], &outcomes[rank].velocity[3 * k] + 3,
+                             &outcomes[other].velocity[3 * o]));
+    }
+  }
+}
+
+long count_calls(const Ranks &ranks, const std::string &start)
+{
+  return std::count_if(ranks.calls.begin(), ranks.calls.end(),
+                       [&](const std::string &call) { return call.rfind(start, 0) == 0; });
+}
+
+// Gives every particle i to rank owner(i) and contact c between two ranks to either in turn.
+struct Division {
+  std::vector<Share> shares;
+  std::vector<std::vector<std::size_t>> contacts;
+};
+
+Division divide(const ContactProblem &whole, const std::function<int(int)> &owner)
+{
+  Division division;
+  division.shares.resize(2);
+  division.contacts.resize(2);
+  for (int i = 0; i < whole.particles; ++i) {
+    Share &share = division.shares[static_cast<std::size_t>(owner(i))];
+    share.particles.push_back(i);
+    ++share.owned;
+  }
+  for (std::size_t c = 0; c < whole.contacts.size(); ++c) {
+    const int first = whole.contacts.first[c], second = whole.contacts.second[c];
+    const bool wall = second == whole.particles;
+    const int rank = wall || c % 2 == 0 ? owner(first) : owner(second);
+    division.contacts[static_cast<std::size_t>(rank)].push_back(c);
+    std::vector<int> &here = division.shares[static_cast<std::size_t>(rank)].particles;
+    for (const int i : {first, wall ? first : second})
+      if (std::find(here.begin(), here.end(), i) == here.end()) here.push_back(i);
+  }
+  return division;
+}
+
+void test_two_ranks()
+{
+  // Rounding in another order moves the last iteration by no more than the tolerance; along a few
+  // contacts that is less than 100 times the tolerance over the step.
+  constexpr double BOUND = 100.0 * TOLERANCE / TIMESTEP;
+  const ContactProblem whole = make_crystal(3);
+  const std::vector<std::function<int(int)>> owners = {
+      [](int i) { return i / 18; },    // two layers and one
+      [](int i) { return i % 2; },     // every neighbour is on the other rank
+      [](int) { return 1; },           // nothing on rank 0
+  };
+  for (const std::string &name : SOLVERS)
+    for (const auto &owner : owners)
+      for (const bool hide_contacts : {false, true}) {
+        const Division division = divide(whole, owner);
+        Ranks ranks(division.shares, whole.particles);
+        const auto outcomes =
+            solve_on_ranks(whole, ranks, division.contacts, name, TOLERANCE, hide_contacts);
+        check_agreement(outcomes, ranks, solve_on_one_rank(whole, name, TOLERANCE), BOUND);
+        CHECK_EQUAL(outcomes[0].result.rounds > 1, hide_contacts);
+
+        // Only the test itself shares the predicted velocities.
+        CHECK_EQUAL(count_calls(ranks, "share_with_copies"), 1L);
+        if (name == "apgd") {
+          // One exchange and one reduction for every iteration; in each round one more for the
+          // first guess, an exchange for the velocities and a reduction of what the source added.
+          const ProjectionResult &result = outcomes[0].result;
+          CHECK_EQUAL(count_calls(ranks, "sum_over_copies"), result.iterations + 2 * result.rounds);
+          CHECK_EQUAL(count_calls(ranks, "reduce"), result.iterations + 2 * result.rounds);
+          CHECK_EQUAL(count_calls(ranks, "reduce 1 sums and 0 maxima"), long{result.rounds});
+        }
+      }
+}
+
+// No rank has anything at all.
+void test_two_ranks_with_nothing()
+{
+  const ContactProblem nothing = make_problem({}, {});
+  for (const std::string &name : SOLVERS) {
+    Ranks ranks(std::vector<Share>(2), 0);
+    const auto outcomes = solve_on_ranks(nothing, ranks, {{}, {}}, name, TOLERANCE, false);
+    check_agreement(outcomes, ranks, {}, 0.0);
+  }
+}
+
+// One rank whose only copies are periodic images of its own particles: a closed ring of spheres can
+// only turn as a whole, at the mean speed.
+void test_periodic_images()
+{
+  constexpr int COUNT = 7;
+  const double along[3] = {1.0, 0.0, 0.0};
+  for (const std::string &name : SOLVERS) {
+    Share share;
+    std::vector<double> inverse_mass;
+    double momentum = 0.0, mass = 0.0;
+    for (int i = 0; i < COUNT; ++i) {
+      share.particles.push_back(i);
+      inverse_mass.push_back(1.0 / (1 + i % 3));
+      mass += 1 + i % 3;
+      momentum += (1 + i % 3) * 0.1 * (i * i % 5);
+    }
+    share.owned = COUNT;
+    share.particles.push_back(0);    // the image of the first, behind the last
+    inverse_mass.push_back(inverse_mass[0]);
+    ContactProblem problem = make_problem({}, inverse_mass);
+    for (int i = 0; i < COUNT; ++i) {
+      problem.predicted_velocity[3 * static_cast<std::size_t>(i)] = 0.1 * (i * i % 5);
+      add_contact(problem, i + 1, i, along, 0.0);
+    }
+    Ranks ranks({share}, COUNT);
+    RankHost host(ranks, 0);
+    host.share_with_copies(problem.predicted_velocity.data());
+    AllContactsKnown source;
+    std::vector<double> velocity;
+    const auto solver = make_solver(name);
+    const ProjectionResult result =
+        project(problem, source, *solver, {TOLERANCE, 100000}, 1, host, velocity);
+    CHECK(result.converged);
+    std::vector<double> expected;
+    for (int i = 0; i <= COUNT; ++i) expected.insert(expected.end(), {momentum / mass, 0.0, 0.0});
+    // Relative velocities add up along the ring, and add up to zero round it.
+    CHECK_ALL_NEAR(velocity, expected, COUNT * COUNT * TOLERANCE / TIMESTEP);
+  }
+}
+
+void test_largest_eigenvalue_on_two_ranks()
+{
+  const ContactProblem whole = make_crystal(3);
+  SerialHost serial;
+  const double expected = largest_eigenvalue(whole, serial);
+  const Division division = divide(whole, [](int i) { return i % 2; });
+  Ranks ranks(division.shares, whole.particles);
+  std::array<double, 2> found{};
+  std::vector<std::thread> threads;
+  for (std::size_t rank = 0; rank < 2; ++rank)
+    threads.emplace_back([&, rank] {
+      RankHost host(ranks, rank);
+      found[rank] =
+          largest_eigenvalue(part_of(whole, division.shares[rank], division.contacts[rank]), host);
+    });
+  for (std::thread &thread : threads) thread.join();
+  CHECK_EQUAL(found[0], found[1]);
+  CHECK_NEAR(found[0], expected, 2.0e-3 * expected);    // both to about 1e-3
+}
+
+/* ----------------------------------------------------------------------
+   random numbers
+------------------------------------------------------------------------- */
+
+// Random123's tests/kat_vectors, lines "philox4x32 10".
+void test_philox_known_answers()
+{
+  using Words = std::array<std::uint32_t, 4>;
+  CHECK((philox({0, 0, 0, 0}, {0, 0}) == Words{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
+  CHECK((philox({0xffffffff, 0xffffffff, 0xffffffff, 0xffffffff}, {0xffffffff, 0xffffffff}) ==
+         Words{0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}));
+  CHECK((philox({0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344}, {0xa4093822, 0x299f31d0}) ==
+         Words{0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}));
+}
+
+void test_uniform_vector()
+{
+  for (std::uint64_t k = 0; k < 1000; ++k)
+    for (const double value : uniform_vector(3, k << 40, ~k)) CHECK(std::abs(value) <= 1.0);
+  CHECK(uniform_vector(1, 2, 3) == uniform_vector(1, 2, 3));
+  CHECK(uniform_vector(1, 2, 3) != uniform_vector(2, 2, 3));
+  CHECK(uniform_vector(1, 2, 3) != uniform_vector(1, 3, 2));
+  CHECK(uniform_vector(1, 2, 3) != uniform_vector(1, 2 + (std::uint64_t{1} << 32), 3));
+  CHECK(uniform_vector(1, 2, 3) != uniform_vector(1, 2, 3 + (std::uint64_t{1} << 32)));
+}
+
+/* ----------------------------------------------------------------------
+   .npz
+------------------------------------------------------------------------- */
+
+std::string contents(const std::string &path)
+{
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// Whether the archive has this member, with this type and shape and these bytes of data.
+bool has_member(const std::string &archive, const std::string &name, const std::string &type,
+                const std::string &shape, const std::string &data)
+{
+  const std::size_t start = archive.find(name + ".npy\x93NUMPY");    // local header, then data
+  if (start == std::string::npos) return false;
+  const std::size_t member = start + name.size() + 4;
+  const std::size_t header_size = static_cast<unsigned char>(archive[member + 8]) +
+      256 * static_cast<std::size_t>(static_cast<unsigned char>(archive[member + 9]));
+  const std::string header = archive.substr(member + 10, header_size);
+  return (10 + header_size) % 64 == 0 && header.back() == '\n' &&
+      header.find("'descr': '" + type + "'") != std::string::npos &&
+      header.find("'fortran_order': False") != std::string::npos &&
+      header.find("'shape': " + shape) != std::string::npos &&
+      archive.compare(member + 10 + header_size, data.size(), data) == 0;
+}
+
+template <typename Value> std::string bytes_of(const std::vector<Value> &values)
+{
+  std::string bytes(values.size() * sizeof(Value), '\0');
+  if (!values.empty()) std::memcpy(&bytes[0], values.data(), bytes.size());
+  return bytes;
+}
+
+void test_npz()
+{
+  const std::string path = "core_test.npz";
+  const std::vector<double> values = {1.0, -0.0, 1.0e300, 4.0, 5.0, 6.0};
+  const std::vector<std::int64_t> indices = {-1, std::int64_t{1} << 40};
+  NpzWriter writer;
+  writer.add("values", values);
+  writer.add("rows", values, 3);
+  writer.add("indices", indices);
+  writer.add("timestep", 0.005);
+  writer.add("none", std::vector<double>());
+  writer.add("no_rows", std::vector<double>(), 3);
+  writer.add("no_indices", std::vector<std::int64_t>());
+  CHECK(writer.write(path));
+  const std::string archive = contents(path);
+  CHECK(archive.rfind("PK\x03\x04", 0) == 0);
+  CHECK(has_member(archive, "values", "<f8", "(6,)", bytes_of(values)));
+  CHECK(has_member(archive, "rows", "<f8", "(2, 3)", bytes_of(values)));
+  CHECK(has_member(archive, "indices", "<i8", "(2,)", bytes_of(indices)));
+  CHECK(has_member(archive, "timestep", "<f8", "()", bytes_of(std::vector<double>{0.005})));
+  CHECK(has_member(archive, "none", "<f8", "(0,)", ""));
+  CHECK(has_member(archive, "no_rows", "<f8", "(0, 3)", ""));
+  CHECK(has_member(archive, "no_indices", "<i8", "(0,)", ""));
+
+  CHECK(writer.write(path));    // over itself
+  CHECK(contents(path) == archive);
+  CHECK(!std::ifstream(path + ".part").good());
+
+  errno = 0;
+  CHECK(!writer.write("no such folder/core_test.npz"));
+  CHECK_EQUAL(errno, ENOENT);
+
+  CHECK(NpzWriter().write(path));
+  CHECK_EQUAL(contents(path).size(), std::size_t{22});    // the end record of an empty archive
+  std::remove(path.c_str());
+}
+
+}    // namespace
+
+int main()
+{
+  test_empty_problems();
+  test_contact_set();
+  test_resize_keeps_the_dummy_particle_still();
+  test_residual();
+  test_gap_operator();
+  test_sphere_falling_on_the_floor();
+  test_frozen_particle();
+  test_column();
+  test_crystal();
+  test_iteration_limit();
+  test_solver_is_used_again();
+  test_first_guess();
+  test_largest_eigenvalue();
+  test_names_of_solvers();
+  test_contacts_are_found_in_rounds();
+  test_same_answer_as_with_all_contacts();
+  test_round_limit();
+  test_iterations_of_all_rounds_are_limited();
+  test_concave_wall_is_linearised_again();
+  test_two_ranks();
+  test_two_ranks_with_nothing();
+  test_periodic_images();
+  test_largest_eigenvalue_on_two_ranks();
+  test_philox_known_answers();
+  test_uniform_vector();
+  test_npz();
+  if (failures > 0) std::cerr << failures << " checks failed\n";
+  return failures > 0 ? 1 : 0;
+}

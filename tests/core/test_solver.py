@@ -1,0 +1,237 @@
+"""The solvers where the answer can be worked out by hand, and a few that must not be solved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from contact_problems import UP, WALL, assert_within, column, problem, residual_left, row
+from scipy.optimize import isotonic_regression
+
+# [diameters] 1e-9 of one step's motion, far above the rounding of gaps near 0.01.
+TOLERANCE = 1e-11
+# Velocities and impulses near 1 after a few dozen additions.
+ROUNDING = 1e-14
+
+
+@pytest.fixture(params=["apgd", "uzawa"])
+def solve(request):
+    """Return a function that solves a problem and says how accurate the result is.
+
+    It gives the projection and the speed to which the relative velocity of a pressed contact is
+    right: what is left of the residuals in one step (Uzawa's complementarity can be any number).
+    """
+
+    def solved(given):
+        projection = given.project(TOLERANCE, solver=request.param)
+        assert projection.converged
+        assert projection.feasibility <= TOLERANCE
+        if request.param == "apgd":
+            assert projection.complementarity <= TOLERANCE
+        return projection, residual_left(projection) / given.timestep + ROUNDING
+
+    return solved
+
+
+def test_sphere_falling_on_the_floor(solve):
+    # It may use up the gap: V = -gap / h = -1, and m (-1 - (-3)) stops the rest.
+    projection, accuracy = solve(problem([(0.5, 0, -3)], [2], [(0, WALL, UP, 0.01)]))
+    assert_within(projection.velocity, [[0.5, 0, -1]], accuracy)
+    assert_within(projection.impulse, [4], 2 * accuracy)
+
+
+def test_uzawa_solves_one_contact_in_one_step():
+    # Its step, one over the only eigenvalue, is exact.
+    given = problem([(0, 0, -1), (0, 0, 1)], [1, 3], [(0, 1, UP, 0)])
+    projection = given.project(TOLERANCE, solver="uzawa")
+    assert projection.iterations == 1
+    assert_within(projection.velocity, [(0, 0, 0.5)] * 2, ROUNDING)
+
+
+def test_overlap_is_pushed_out(solve):
+    # An overlap of 0.02 is undone in one step of 0.01: speed 2.
+    projection, accuracy = solve(problem([(0, 0, 0)], [3], [(0, WALL, UP, -0.02)]))
+    assert_within(projection.velocity, [[0, 0, 2]], accuracy)
+    assert_within(projection.impulse, [6], 3 * accuracy)
+
+
+def test_free_flight_is_untouched(solve):
+    velocity = [(0.1, -0.2, 0.3), (1 / 3, 1e-300, -1e10)]
+    projection, _ = solve(problem(velocity, [1, 2], []))
+    assert np.array_equal(projection.velocity, velocity)
+    assert projection.impulse.shape == (0,)
+    assert projection.iterations == 0
+
+
+def test_contact_out_of_reach_is_untouched(solve):
+    # Speed 3 uses up 0.03 of the gap of 0.04.
+    projection, _ = solve(problem([(0.1, 0.2, -3)], [1], [(0, WALL, UP, 0.04)]))
+    assert np.array_equal(projection.velocity, [(0.1, 0.2, -3)])
+    assert np.array_equal(projection.impulse, [0])
+    assert projection.iterations == 0
+
+
+def test_nothing_at_all(solve):
+    projection, _ = solve(problem([], [], []))
+    assert projection.velocity.shape == (0, 3)
+    assert projection.impulse.shape == (0,)
+
+
+@pytest.mark.parametrize(("light", "heavy"), [(1, 1), (1, 3), (1e-3, 1e3)])
+def test_head_on_pair_moves_on_together(solve, light, heavy):
+    given = problem([(2, 1, 0), (-1, 0, 0)], [light, heavy], [(1, 0, (1, 0, 0), 0)])
+    projection, accuracy = solve(given)
+    common = (2 * light - heavy) / (light + heavy)
+    assert_within(projection.velocity, [(common, 1, 0), (common, 0, 0)], accuracy)
+    # Their reduced mass changes its relative velocity from 3 to 0.
+    reduced = light * heavy / (light + heavy)
+    assert_within(projection.impulse, [3 * reduced], reduced * accuracy)
+
+
+def test_head_on_pair_uses_up_the_gap(solve):
+    # Each may go on at half of gap / h = 1.
+    given = problem([(2, 0, 0), (-2, 0, 0)], [1, 1], [(1, 0, (1, 0, 0), 0.01)])
+    projection, accuracy = solve(given)
+    assert_within(projection.velocity, [(0.5, 0, 0), (-0.5, 0, 0)], accuracy)
+
+
+@pytest.mark.parametrize("mass", [np.ones(10), np.linspace(1, 4, 7), [1, 0.1, 5, 0.1, 1]])
+def test_column_carries_the_weight_above(solve, mass):
+    mass = np.array(mass)
+    fall = 0.1  # g h
+    projection, accuracy = solve(column(mass, [-fall] * mass.size))
+    # A sphere's velocity is the sum of the relative velocities below it.
+    accuracy *= mass.size
+    assert_within(projection.velocity, np.zeros((mass.size, 3)), accuracy)
+    weight_above = fall * np.cumsum(mass[::-1])[::-1]
+    assert_within(projection.impulse, weight_above, mass.sum() * accuracy)
+
+
+def test_heavy_sphere_on_a_light_one():
+    # A mass ratio of 1e6; only apgd, because Uzawa would take millions of iterations.
+    projection = column([1e-6, 1], [0, -1]).project(TOLERANCE)
+    assert projection.converged
+    assert_within(projection.velocity, np.zeros((2, 3)), 2 * TOLERANCE / 0.01 + ROUNDING)
+    assert_within(projection.impulse, [1, 1], 2 * TOLERANCE / 0.01 + ROUNDING)
+
+
+@pytest.mark.parametrize("slopes", [(45, 45), (30, 60), (80, 20), (10, 10)])
+def test_sphere_in_a_wedge(solve, slopes):
+    left, right = np.deg2rad(slopes)
+    normals = np.array([(np.sin(left), 0, np.cos(left)), (-np.sin(right), 0, np.cos(right))])
+    mass, fall = 2, 0.7
+    projection, accuracy = solve(
+        problem([(0, 0.3, -fall)], [mass], [(0, WALL, normal, 0) for normal in normals])
+    )
+    # Two relative velocities fix the two components across the wedge; no friction along it.
+    inverse_norm = np.linalg.norm(np.linalg.inv(normals[:, ::2]), np.inf)
+    assert_within(projection.velocity, [(0, 0.3, 0)], inverse_norm * accuracy)
+    # Equilibrium of three forces: the law of sines.
+    impulse = mass * fall * np.sin([right, left]) / np.sin(left + right)
+    inverse_norm_of_forces = np.linalg.norm(np.linalg.inv(normals[:, ::2].T), np.inf)
+    assert_within(
+        projection.impulse, impulse, mass * inverse_norm_of_forces * inverse_norm * accuracy
+    )
+
+
+def test_sphere_leaves_the_wall_that_it_moves_away_from(solve):
+    # Along the left wall of a wedge, down to nothing: only that wall pushes.
+    left = (np.sqrt(0.5), 0, np.sqrt(0.5))
+    right = (-np.sqrt(0.5), 0, np.sqrt(0.5))
+    given = problem([(-1, 0, 0)], [1], [(0, WALL, left, 0), (0, WALL, right, 0)])
+    projection, accuracy = solve(given)
+    assert_within(projection.velocity, [(-0.5, 0, 0.5)], accuracy)
+    assert_within(projection.impulse, [np.sqrt(0.5), 0], accuracy)
+
+
+@pytest.mark.parametrize("count", [2, 5, 20])
+def test_cradle_without_bounce_shares_the_momentum(solve, count):
+    projection, accuracy = solve(row(np.ones(count), [1, *[0] * (count - 1)]))
+    accuracy *= count  # relative velocities add up along the row
+    assert_within(projection.velocity, [(1 / count, 0, 0)] * count, accuracy)
+    # What passes each contact is the momentum of all spheres beyond it.
+    beyond = np.arange(count - 1, 0, -1) / count
+    assert_within(projection.impulse, beyond, count * accuracy)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_row_of_random_speeds_is_isotonic_regression(solve, seed):
+    # The nearest speeds that do not decrease along the row: SciPy pools adjacent violators.
+    generator = np.random.default_rng(seed)
+    mass, speed = generator.uniform(0.5, 2, 30), generator.uniform(-1, 1, 30)
+    projection, accuracy = solve(row(mass, speed))
+    expected = isotonic_regression(speed, weights=mass).x
+    # Relative velocities add up along a pool of spheres; random speeds leave no contact undecided.
+    assert_within(projection.velocity[:, 0], expected, speed.size * accuracy)
+
+
+def test_frozen_particle_acts_like_a_wall(solve):
+    velocity = [(0.2, 0.1, -3), (0, 0, 0)]
+    on_particle, _ = solve(problem(velocity, [2, np.inf], [(0, 1, UP, 0.01)]))
+    on_wall, _ = solve(problem(velocity, [2, np.inf], [(0, WALL, UP, 0.01)]))
+    assert np.array_equal(on_particle.velocity, on_wall.velocity)
+    assert np.array_equal(on_particle.impulse, on_wall.impulse)
+
+
+def test_frozen_particle_keeps_its_velocity(solve):
+    frozen = (0.3, 0, 0.7)
+    # It comes from below, first as the second side of the contact, then as the first.
+    down = (0, 0, -1)
+    for contact in [(0, 1, UP, 0), (1, 0, down, 0)]:
+        projection, accuracy = solve(problem([(0, 0, -1), frozen], [1, np.inf], [contact]))
+        assert np.array_equal(projection.velocity[1], frozen)
+        assert_within(projection.velocity[0], (0, 0, 0.7), accuracy)
+        assert_within(projection.impulse, [1.7], accuracy)
+
+
+def test_moving_wall_is_in_the_gap(solve):
+    # A floor that rises at 0.7 will be 0.007 higher at the end of the step.
+    projection, accuracy = solve(problem([(0, 0, -1)], [1], [(0, WALL, UP, -0.007)]))
+    assert_within(projection.velocity, [(0, 0, 0.7)], accuracy)
+    assert_within(projection.impulse, [1.7], accuracy)
+
+
+def test_contact_given_three_times(solve):
+    contact = (0, WALL, UP, 0.01)
+    projection, accuracy = solve(problem([(0, 0, -3)], [2], [contact] * 3))
+    assert_within(projection.velocity, [(0, 0, -1)], accuracy)
+    assert_within(projection.impulse.sum(), 4, 2 * accuracy)
+    assert np.all(projection.impulse >= 0)
+
+
+@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+def test_no_room_is_not_converged(solver):
+    # Two walls leave 0.01 less than a diameter: one overlap is at least half of that.
+    given = problem([(0, 0, 0)], [1], [(0, WALL, UP, 0), (0, WALL, (0, 0, -1), -0.01)])
+    projection = given.project(TOLERANCE, solver=solver, max_iterations=100)
+    assert not projection.converged
+    assert projection.iterations == 100
+    assert projection.feasibility >= 0.005 - ROUNDING
+
+
+def test_uzawa_looks_at_feasibility_only():
+    # Ten equal floors make the first step small for the eleventh contact, a steep wall, which is
+    # still pressed when the floors' push has lifted the sphere off it.
+    steep = (np.sin(0.5), 0, np.cos(0.5))
+    contacts = [(0, WALL, UP, -0.01)] * 10 + [(0, WALL, steep, -0.001)]
+    given = problem([(0, 0, 0)], [1], contacts)
+    tolerance = 1e-3
+    uzawa = given.project(tolerance, solver="uzawa")
+    assert uzawa.converged
+    assert uzawa.feasibility <= tolerance
+    assert uzawa.complementarity > 5 * tolerance
+    apgd = given.project(tolerance)
+    assert apgd.complementarity <= tolerance
+
+
+def test_uzawa_with_one_stiff_contact_among_many():
+    # The largest eigenvalue (a light sphere on the floor) hides behind 20,000 others (pairs at
+    # rest); a step of twice 1 / L would make the light sphere bounce back at its own speed.
+    pairs = 20_000
+    contacts = [(2 * k, 2 * k + 1, UP, 0) for k in range(pairs)] + [(2 * pairs, WALL, UP, 0)]
+    velocity = np.zeros((2 * pairs + 1, 3))
+    velocity[-1, 2] = -1
+    mass = np.ones(2 * pairs + 1)
+    mass[-1] = 0.25
+    projection = problem(velocity, mass, contacts).project(TOLERANCE, solver="uzawa")
+    # The step may be wrong by as much as the eigenvalue's documented accuracy, about 1e-3.
+    assert_within(projection.velocity[-1], (0, 0, 0), 2e-3)

@@ -1,0 +1,234 @@
+"""What the core's Python module refuses, and how it says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lammps_inelastic import core
+
+NOT_FINITE = [np.nan, np.inf, -np.inf]
+
+
+def arguments(**changes) -> dict:
+    """Return a good problem, two particles and a floor, with some arguments changed."""
+    return {
+        "predicted_velocity": np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]),
+        "inverse_mass": np.array([1.0, 0.5]),
+        "first": np.array([0, 1]),
+        "second": np.array([1, -1]),
+        "normal": np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]),
+        "gap": np.array([0.0, 0.1]),
+        "timestep": 0.01,
+        "tolerance": 1e-9,
+        **changes,
+    }
+
+
+def project(**changes) -> core.Projection:
+    return core.project(**arguments(**changes))
+
+
+def residual(**changes) -> tuple[float, float]:
+    given = arguments(**{"impulse": np.zeros(2), **changes})
+    del given["tolerance"]
+    return core.residual(**given)
+
+
+def largest_eigenvalue(**changes) -> float:
+    given = arguments(**changes)
+    for name in ("predicted_velocity", "gap", "tolerance"):
+        del given[name]
+    return core.largest_eigenvalue(**given)
+
+
+ALL = pytest.mark.parametrize("function", [project, residual, largest_eigenvalue])
+
+
+def test_these_arguments_are_fine():
+    assert project().converged
+    assert residual() == (pytest.approx(0.02, abs=1e-15), 0)  # both approach at 1: 2 h
+    assert largest_eigenvalue() > 0
+
+
+@pytest.mark.parametrize("length", [0, 1, 3])
+@pytest.mark.parametrize(
+    ("function", "name"),
+    [
+        (project, "inverse_mass"),
+        (project, "first"),
+        (project, "second"),
+        (project, "normal"),
+        (project, "impulse"),
+        (residual, "inverse_mass"),
+        (residual, "impulse"),
+        (largest_eigenvalue, "second"),
+        (largest_eigenvalue, "normal"),
+    ],
+)
+def test_wrong_length(function, name, length):
+    wrong = np.zeros(
+        (length, 3) if name == "normal" else length,
+        np.int64 if name in ("first", "second") else float,
+    )
+    with pytest.raises(ValueError, match=f"{name} must have length 2, not {length}"):
+        function(**{name: wrong})
+
+
+@pytest.mark.parametrize(
+    ("function", "name", "message"),
+    [
+        (project, "gap", "first must have length 3, not 2"),
+        (project, "predicted_velocity", "inverse_mass must have length 3, not 2"),
+        (largest_eigenvalue, "first", "second must have length 3, not 2"),
+    ],
+)
+def test_one_too_many(function, name, message):
+    good = arguments()[name]
+    with pytest.raises(ValueError, match=message):
+        function(**{name: np.concatenate([good, good[:1]])})
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("predicted_velocity", (2, 2)),
+        ("predicted_velocity", (6,)),
+        ("inverse_mass", (2, 1)),
+        ("first", (2, 1)),
+        ("second", ()),
+        ("normal", (3, 2)),
+        ("normal", (6,)),
+        ("gap", (1, 2)),
+        ("impulse", (2, 1)),
+    ],
+)
+def test_wrong_shape(name, shape):
+    wrong = np.zeros(shape, np.int64 if name in ("first", "second") else float)
+    # nanobind looks for a function that takes such an array: a TypeError that lists the shapes.
+    with pytest.raises((ValueError, TypeError), match="shape"):
+        project(**{name: wrong})
+
+
+@pytest.mark.parametrize("value", NOT_FINITE)
+@pytest.mark.parametrize("name", ["predicted_velocity", "inverse_mass", "normal", "gap", "impulse"])
+def test_not_finite_in_an_array(name, value):
+    array = np.ones(2) if name == "impulse" else arguments()[name].copy()
+    array.flat[-1] = value
+    with pytest.raises(ValueError, match=r"finite|cannot move"):
+        project(**{name: array})
+
+
+@pytest.mark.parametrize("value", NOT_FINITE)
+def test_not_finite_without_contacts(value):
+    none = {
+        "first": np.zeros(0, np.int64),
+        "second": np.zeros(0, np.int64),
+        "normal": np.zeros((0, 3)),
+        "gap": np.zeros(0),
+    }
+    with pytest.raises(ValueError, match="finite"):
+        project(**none, inverse_mass=np.array([1.0, value]))
+    with pytest.raises(ValueError, match="finite"):
+        project(**none, predicted_velocity=np.full((2, 3), value))
+
+
+@ALL
+@pytest.mark.parametrize("value", [0.0, -0.01, *NOT_FINITE])
+def test_timestep(function, value):
+    with pytest.raises(ValueError, match="timestep must be"):
+        function(timestep=value)
+
+
+@pytest.mark.parametrize("value", [0.0, -1e-9, *NOT_FINITE])
+def test_tolerance(value):
+    with pytest.raises(ValueError, match="tolerance must be"):
+        project(tolerance=value)
+
+
+@pytest.mark.parametrize("name", ["", "APGD", "gauss-seidel"])
+def test_unknown_solver(name):
+    with pytest.raises(ValueError, match=f"solver must be apgd or uzawa, not {name}"):
+        project(solver=name)
+
+
+@ALL
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("first", -1),
+        ("first", 2),
+        ("second", -2),
+        ("second", 2),
+        ("first", 2**40),
+        ("second", 2**40),
+    ],
+)
+def test_index_out_of_range(function, name, value):
+    indices = arguments()[name].copy()
+    indices[1] = value
+    with pytest.raises(ValueError, match=r"contact 1 names a particle outside 0 \.\.\. 1"):
+        function(**{name: indices})
+
+
+@ALL
+def test_contact_between_frozen_particles(function):
+    # Contact 0 is between both, contact 1 between particle 1 and the floor.
+    with pytest.raises(ValueError, match="contact 0 is between particles that cannot move"):
+        function(inverse_mass=np.zeros(2))
+    with pytest.raises(ValueError, match="contact 1 is between particles that cannot move"):
+        function(inverse_mass=np.array([1.0, 0.0]))
+
+
+@ALL
+def test_negative_mass(function):
+    # Particle 0 makes the sum over contact 0 positive.
+    with pytest.raises(ValueError, match="inverse_mass"):
+        function(inverse_mass=np.array([2.0, -1.0]), second=np.array([1, 0]))
+
+
+@ALL
+def test_contact_of_a_particle_with_itself(function):
+    with pytest.raises(ValueError, match="contact 1"):
+        function(second=np.array([1, 1]))
+
+
+@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+def test_negative_first_guess_does_not_pull(solver):
+    # The floor is far below: with this guess it would pull, and the residual would be zero.
+    impulse, gap = np.array([0.0, -1.0]), np.array([10.0, 10.0])
+    projection = project(impulse=impulse, gap=gap, solver=solver)
+    assert projection.impulse.min() >= 0
+
+
+@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+def test_overflow_is_not_convergence(solver):
+    # h V overflows: gaps are -inf, then not numbers.
+    projection = project(
+        predicted_velocity=np.array([[0.0, 0.0, -1e300], [0.0, 0.0, 0.0]]),
+        timestep=1e300,
+        solver=solver,
+        max_iterations=10,
+    )
+    assert not projection.converged
+    assert not projection.feasibility <= 1e-9
+
+
+def test_arguments_may_be_strided_and_are_not_changed():
+    good = arguments()
+    expected = core.project(**good)
+    strided = dict(good)
+    for name in ("predicted_velocity", "inverse_mass", "first", "second", "normal", "gap"):
+        twice = np.repeat(good[name], 2, axis=0)
+        strided[name] = twice[::2]
+        strided[name].setflags(write=False)
+    projection = core.project(**strided)
+    assert np.array_equal(projection.velocity, expected.velocity)
+    for name, value in arguments().items():
+        assert np.array_equal(good[name], value)
+
+
+def test_first_guess_is_not_changed():
+    guess = np.array([1.0, 1.0])
+    project(impulse=guess)
+    assert np.array_equal(guess, [1.0, 1.0])

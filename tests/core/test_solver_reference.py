@@ -1,0 +1,142 @@
+"""The solvers against an interior-point method, the largest eigenvalue against LAPACK."""
+
+from __future__ import annotations
+
+import clarabel
+import numpy as np
+import pytest
+from contact_problems import (
+    Problem,
+    assert_within,
+    column,
+    cubic_crystal,
+    dense_crystal,
+    heap,
+    problem,
+    row,
+)
+from scipy import sparse
+
+from lammps_inelastic import core
+
+# [diameters] A ten-thousand-millionth of one step's motion, not far above what float64 resolves.
+TOLERANCE = 1e-13
+
+
+def reference(given: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities and impulses from the primal problem, in y = M^1/2 (V - V*) and in speeds:
+
+    minimise 1/2 y . y  subject to  (gap / h + G V*) + G M^-1/2 y >= 0
+
+    Clarabel's dual variables are the impulses: y - M^-1/2 G^T z = 0.
+    """
+    root = np.sqrt(np.repeat(given.inverse_mass, 3))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    solution = clarabel.DefaultSolver(
+        sparse.identity(root.size, format="csc"),
+        np.zeros(root.size),
+        sparse.csc_matrix(-given.jacobian() * root),
+        given.gap_at_end(given.predicted_velocity) / given.timestep,
+        [clarabel.NonnegativeConeT(given.gap.size)],
+        settings,
+    ).solve()
+    assert solution.status == clarabel.SolverStatus.Solved
+    change = (root * solution.x).reshape(-1, 3)
+    return given.predicted_velocity + change, np.array(solution.z)
+
+
+def three_times(given: Problem) -> Problem:
+    return given.with_contacts(np.repeat(np.arange(given.gap.size), 3))
+
+
+PROBLEMS = {
+    **{f"heap {seed}": heap(seed) for seed in range(5)},
+    **{f"overlapping {seed}": heap(seed, overlap=0.01) for seed in range(5)},
+    "large": heap(5, particles=200, overlap=0.01),
+    "without a floor": heap(6, floor=False, overlap=0.01),
+    "frozen": heap(7, frozen=10),
+    "mass ratio 100": heap(8, overlap=0.01, mass_ratio=1e2),
+    "mass ratio 1e6": heap(9, mass_ratio=1e6),
+    "every contact three times": three_times(heap(10, overlap=0.01)),
+    "crystal on a floor": cubic_crystal(4, 11),
+    "crystal in a box": cubic_crystal(4, 12, walls=6),
+    "dense crystal": dense_crystal(5, 13),
+    "dense crystal, every contact three times": three_times(dense_crystal(4, 14)),
+}
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_velocities_of_an_interior_point_method(name):
+    given = PROBLEMS[name]
+    velocity, _ = reference(given)
+    projection = given.project(TOLERANCE)
+    assert projection.converged
+    # The interior-point method's own error: the root of its duality gap, 1e-11 of the energy.
+    assert_within(projection.velocity, velocity, 1e-6 * given.fastest)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_impulses_of_an_interior_point_method(seed):
+    # Only where they are unique: the pressed contacts are independent.
+    given = PROBLEMS[f"overlapping {seed}"]
+    _, impulse = reference(given)
+    projection = given.project(TOLERANCE)
+    pressed = projection.impulse > 0
+    softest = np.linalg.eigvalsh(given.delassus()[np.ix_(pressed, pressed)])[0]
+    assert softest > 1e-6
+    # A (lambda - lambda') = w - w', of which both solvers leave less than ten times TOLERANCE.
+    assert_within(projection.impulse, impulse, 10 * TOLERANCE * pressed.sum() / softest)
+
+
+def test_uzawa_gives_the_same_velocities():
+    given = PROBLEMS["overlapping 0"]
+    velocity, _ = reference(given)
+    projection = given.project(TOLERANCE, solver="uzawa")
+    assert projection.converged
+    assert_within(projection.velocity, velocity, 1e-6 * given.fastest)
+
+
+# Of the largest eigenvalue, relative: documented as "about 1e-3".
+EIGENVALUE_ACCURACY = 2e-3
+
+
+def largest_eigenvalue(given: Problem) -> float:
+    return core.largest_eigenvalue(*given.arguments[1:5], timestep=given.timestep)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [*(given for name, given in PROBLEMS.items() if "overlapping" not in name)]
+    + [column(np.ones(count), np.zeros(count)) for count in (3, 10, 30, 100)],
+    ids=[*(name for name in PROBLEMS if "overlapping" not in name)]
+    + [f"column of {count}" for count in (3, 10, 30, 100)],
+)
+def test_largest_eigenvalue(given):
+    estimate = largest_eigenvalue(given)
+    exact = np.linalg.eigvalsh(given.delassus())[-1]
+    # A Rayleigh quotient is never above the largest eigenvalue, except for rounding.
+    assert (1 - EIGENVALUE_ACCURACY) * exact <= estimate <= (1 + 1e-13) * exact
+
+
+def test_largest_eigenvalues_known_by_hand():
+    timestep = 0.01
+    one = problem([(0, 0, 0)], [4], [(0, -1, (0, 0, 1), 0)])
+    assert_within(largest_eigenvalue(one), timestep / 4, 1e-17)  # one rounding of 0.0025
+    pair = problem([(0, 0, 0)] * 2, [4, 1], [(0, 1, (0, 0, 1), 0)])
+    assert_within(largest_eigenvalue(pair), timestep * 1.25, 1e-17)  # the same
+    three = row([1, 1, 1], [0, 0, 0])  # h [[2, -1], [-1, 2]]
+    assert_within(largest_eigenvalue(three), 3 * timestep, EIGENVALUE_ACCURACY * 3 * timestep)
+    assert largest_eigenvalue(problem([], [], [])) == 0
+
+
+def test_largest_eigenvalue_of_one_contact_among_many():
+    # Its share of the start vector is below 1e-4, the change of the estimate to stop at.
+    pairs = 20_000
+    contacts = [(2 * k, 2 * k + 1, (0, 0, 1), 0) for k in range(pairs)]
+    contacts.append((2 * pairs, -1, (0, 0, 1), 0))
+    mass = np.ones(2 * pairs + 1)
+    mass[-1] = 0.25
+    given = problem(np.zeros((mass.size, 3)), mass, contacts, timestep=1.0)
+    assert_within(largest_eigenvalue(given), 4, 4 * EIGENVALUE_ACCURACY)

@@ -1,0 +1,119 @@
+"""Runs real LAMMPS on decks that the tests write."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+BIN = Path(sys.executable).parent
+# An mpiexec around pytest must not reach the runs (they would join its job).
+OF_A_LAUNCHER = ("PMI_", "PMIX_", "HYDI_", "HYDRA_", "MPI_", "MPICH_", "OMPI_")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One call of lmp.
+
+    Attributes
+    ----------
+    status : exit code
+    screen : all that it printed
+    errors : the lines that start with ERROR, each once
+    warnings : the lines that start with WARNING
+    runs : thermo output of each `run`: name of a column -> its values
+    folder : where it ran; the deck's files are there
+    """
+
+    status: int
+    screen: str
+    errors: tuple[str, ...]
+    warnings: tuple[str, ...]
+    runs: tuple[dict[str, NDArray[np.float64]], ...]
+    folder: Path
+
+    @property
+    def thermo(self) -> dict[str, NDArray[np.float64]]:
+        """The last run's thermo output."""
+        return self.runs[-1]
+
+
+Runner = Callable[..., Run]
+
+
+def run_lmp(
+    folder: Path,
+    deck: str,
+    ranks: int = 1,
+    variables: Mapping[str, object] | None = None,
+    timeout: float = 60.0,
+    must_pass: bool = True,
+) -> Run:
+    """Run a deck in a folder; fail the test if it fails, unless it may."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "deck.in").write_text(deck)
+    command = [str(BIN / "lmp"), "-in", "deck.in", "-log", "none", "-nocite"]
+    for name, value in (variables or {}).items():
+        command += ["-var", name, str(value)]
+    if ranks > 1:
+        command = [str(BIN / "mpiexec"), "-bind-to", "core", "-n", str(ranks), *command]
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith(OF_A_LAUNCHER)
+    } | {"OMP_NUM_THREADS": "1"}
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,
+        text=True,
+    )
+    try:
+        screen, _ = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        screen, _ = process.communicate()
+        pytest.fail(f"still running after {timeout} s:\n{deck}\n{screen[-2000:]}")
+    lines = screen.splitlines()
+    result = Run(
+        status=process.returncode,
+        screen=screen,
+        errors=tuple(dict.fromkeys(line for line in lines if line.startswith("ERROR"))),
+        warnings=tuple(line for line in lines if line.startswith("WARNING")),
+        runs=_thermo(lines),
+        folder=folder,
+    )
+    if must_pass and (result.status != 0 or result.errors):
+        pytest.fail(f"exit code {result.status}:\n{screen[-3000:]}")
+    return result
+
+
+def _thermo(lines: list[str]) -> tuple[dict[str, NDArray[np.float64]], ...]:
+    runs = []
+    names: list[str] = []
+    rows: list[list[float]] = []
+    for line in lines:
+        if re.match(r"\s*Step\b", line):
+            names, rows = line.split(), []
+            runs.append((names, rows))
+        elif line.startswith(("Loop time", "ERROR")):
+            names = []
+        elif names:
+            fields = line.split()
+            if len(fields) == len(names) and re.match(r"[-+0-9.]", fields[0]):
+                rows.append([float(field) for field in fields])
+    return tuple(
+        dict(zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True))
+        for names, rows in runs
+    )

@@ -1,0 +1,237 @@
+"""Periodic boxes, groups and every way in which LAMMPS divides the work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lammps_run import Runner
+from scenes import (
+    DUMP_CONTACTS,
+    DUMP_FORCES,
+    DUMP_PARTICLES,
+    Frame,
+    deepest_in_box,
+    deepest_pair,
+    mass,
+    random_points,
+    read_dump,
+    scene,
+)
+
+RADIUS = 0.06
+EPS = 0.0005 * RADIUS
+SLACK = 1 + 1e-6  # round-off of positions
+# Summation orders differ between decompositions; contacts amplify that. At this tolerance 100 steps
+# agree within SAME (the design's equality).
+EXACT = 5e-9 * RADIUS
+SAME = 0.0005 * RADIUS
+
+
+def bed(seed: int = 1, count: int = 60) -> np.ndarray:
+    """A loose bed that has fallen and hit the floor after 60 steps."""
+    return random_points(count, ((0.07, 0.53), (0.07, 0.9), (0.07, 0.53)), 2 * RADIUS, seed)
+
+
+BOX = ((0.0, 0.6), (0.0, 1.0), (0.0, 0.6))
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("newton", ["on", "off"])
+def test_periodic_sides_and_a_floor(ranks: int, newton: str, tmp_path: Path, lmp: Runner) -> None:
+    deck = scene(
+        random_points(60, ((0, 0.6), (0.07, 1.5), (0, 0.6)), 3 * RADIUS, seed=2),
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        box=BOX,
+        boundary="p f p",
+        setup=f"newton {newton}\nregion floor plane 0 0 0 0 1 0",
+        options="region floor",
+        velocities=np.random.default_rng(3).normal(0, 2, (60, 3)),
+    )
+    deck = deck.replace("newton", "newton", 1)
+    result = lmp(deck + DUMP_PARTICLES + DUMP_FORCES + "run 150\n", ranks=ranks)
+    for frame in read_dump(tmp_path / "particles.dump"):
+        radii = frame["radius"]
+        assert deepest_pair(frame.positions, radii, [0.6, 0, 0.6]) <= EPS * SLACK
+        assert np.min(frame.positions[:, 1] - radii) >= -EPS * SLACK
+    assert result.thermo["f_contact[5]"][-1] > 20
+    # Nothing pushes along x and z but the spheres themselves: the momentum stays.
+    frames = read_dump(tmp_path / "particles.dump")
+    for axis in (0, 2):
+        momentum = [frame.velocities[:, axis].sum() for frame in frames]
+        assert momentum == pytest.approx(np.full(len(frames), momentum[0]), abs=1e-11)  # round-off
+    # Each contact is counted at both ends.
+    counts = [frame["particles"].sum() for frame in read_dump(tmp_path / "forces.dump")]
+    assert (np.array(counts) == 2 * result.thermo["f_contact[5]"]).all()
+
+
+@pytest.mark.parametrize("newton", ["on", "off"])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_pair_meets_across_the_periodic_boundary(
+    newton: str, ranks: int, tmp_path: Path, lmp: Runner
+) -> None:
+    deck = scene(
+        [[0.15, 0.5, 0.3], [0.85, 0.5, 0.3]],
+        [RADIUS, 2 * RADIUS],
+        tmp_path,
+        tolerance=1e-12,
+        box=((0, 1), (0, 1), (0, 1)),
+        boundary="p p p",
+        setup=f"newton {newton}",
+        gravity=False,
+        options="",
+        velocities=[[-1, 0, 0], [1, 0, 0]],
+    )
+    lmp(deck + DUMP_PARTICLES + DUMP_CONTACTS + "run 40\n", ranks=ranks)
+    end = read_dump(tmp_path / "particles.dump")[-1]
+    gap = (end["x"][0] - end["x"][1]) % 1.0 - 3 * RADIUS
+    assert gap == pytest.approx(0, abs=1e-11)  # the tolerance, and round-off of the positions
+    m = mass([RADIUS, 2 * RADIUS])
+    assert end["vx"] == pytest.approx(np.full(2, (m[1] - m[0]) / m.sum()), abs=1e-9)  # eps / h
+    hit = [frame for frame in read_dump(tmp_path / "contacts.dump") if len(frame.rows)]
+    assert hit
+    for frame in hit:
+        assert len(frame.rows) == 1
+        normal = frame["nx"][0] if frame["id1"][0] == 1 else -frame["nx"][0]
+        assert normal == pytest.approx(1, abs=1e-15)  # round-off
+
+
+def test_atoms_outside_the_group_are_ignored(tmp_path: Path, lmp: Runner) -> None:
+    # 1 and 2 meet; 3 is not in the group and lies in between, outside the region as well.
+    deck = scene(
+        [[0.2, 0.5, 0.3], [0.6, 0.5, 0.3], [0.4, 0.5, 0.3], [0.5, -0.5, 0.3]],
+        [RADIUS, RADIUS, 3 * RADIUS, RADIUS],
+        tmp_path,
+        tolerance=1e-12,
+        box=((0, 1), (0, 1), (0, 1)),
+        gravity=False,
+        velocities=[[1, 0, 0], [-1, 0, 0], [0, 0, 0], [0, 0, 0]],
+        motion="fix motion all nve\ngroup some id 1 2",
+        group="some",
+    )
+    result = lmp(deck + DUMP_PARTICLES + DUMP_FORCES + "run 60\n")
+    end = read_dump(tmp_path / "particles.dump")[-1]
+    assert end.velocities == pytest.approx(np.zeros((4, 3)), abs=1e-9)  # tolerance / h
+    assert end["x"][1] - end["x"][0] == pytest.approx(2 * RADIUS, abs=1e-11)  # tolerance
+    assert (end.positions[2:] == [[0.4, 0.5, 0.3], [0.5, -0.5, 0.3]]).all()
+    assert result.thermo["f_contact[6]"].max() == 0
+    assert read_dump(tmp_path / "forces.dump")[-1].rows[2:, 1:].any() == np.False_
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
+    """Return the bed's frames on one rank, with LAMMPS's defaults."""
+    from lammps_run import run_lmp
+
+    folder = tmp_path_factory.mktemp("reference")
+    deck = scene(bed(), RADIUS, folder, tolerance=EXACT, box=BOX)
+    result = run_lmp(folder, deck + DUMP_PARTICLES + "run 100\n")
+    assert result.thermo["f_contact[5]"][-1] > 60
+    return read_dump(folder / "particles.dump")
+
+
+DIVISIONS = {
+    "default": ("", "", 2),
+    "x": ("processors 2 1 1", "", 2),
+    "height": ("processors 1 2 1", "", 2),
+    "z": ("processors 1 1 2", "", 2),
+    "newton-off": ("newton off", "", 2),
+    "newton-off-one-rank": ("newton off", "", 1),
+    "tiled": ("comm_style tiled", "", 2),
+    "rcb": ("comm_style tiled", "fix balance all balance 10 1.0 rcb", 2),
+    "rcb-newton-off": ("comm_style tiled\nnewton off", "fix balance all balance 10 1.0 rcb", 2),
+    "shift": ("processors 1 2 1", "fix balance all balance 7 1.0 shift y 10 1.0", 2),
+    "sorted-rarely": ("atom_modify sort 7 0.1", "", 1),
+    "multi": ("comm_modify mode multi", "", 2),
+}
+
+
+@pytest.mark.parametrize("name", DIVISIONS)
+def test_the_division_does_not_matter(
+    name: str, reference: list[Frame], tmp_path: Path, lmp: Runner
+) -> None:
+    setup, balance, ranks = DIVISIONS[name]
+    deck = scene(bed(), RADIUS, tmp_path, tolerance=EXACT, box=BOX, setup=setup, fixes=balance)
+    if name == "height":
+        # A tall box: the upper rank is empty from the start of the fall's end.
+        deck += "change_box all y final -1 6 boundary f f f\n"
+    lmp(deck + DUMP_PARTICLES + "run 100\n", ranks=ranks)
+    frames = read_dump(tmp_path / "particles.dump")
+    assert len(frames) == len(reference)
+    for frame, other in zip(frames, reference, strict=True):
+        assert np.abs(frame.positions - other.positions).max() <= SAME
+
+
+def test_balance_after_the_fix_and_before(tmp_path: Path, lmp: Runner) -> None:
+    """The balance fix exchanges atoms before and after the contact fix has its turn."""
+    ends = []
+    for place in ("before", "after"):
+        balance = "fix balance all balance 3 1.0 shift xy 10 1.0\n"
+        deck = scene(
+            bed(),
+            RADIUS,
+            tmp_path / place,
+            tolerance=EXACT,
+            box=BOX,
+            fixes=balance if place == "before" else "",
+        )
+        deck += balance if place == "after" else ""
+        lmp(deck + DUMP_PARTICLES + "run 100\n", ranks=2, into=place)
+        ends.append(read_dump(tmp_path / place / "particles.dump")[-1].positions)
+    assert np.abs(ends[0] - ends[1]).max() <= SAME
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_one_rank_empty_or_no_sphere_at_all(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    deck = scene(
+        [[0.2, 0.2, 0.2], [0.2, 0.4, 0.2]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        box=BOX,
+        setup="processors * 1 1",
+    )
+    result = lmp(
+        deck + DUMP_PARTICLES + DUMP_CONTACTS + "run 60\ndelete_atoms group all\nrun 5\n",
+        ranks=ranks,
+    )
+    assert result.runs[0]["f_contact[5]"][-1] + result.runs[0]["f_contact[6]"][-1] == 2
+    assert result.runs[1]["f_contact[4]"][-1] == 0
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_atoms_that_come_and_go(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    deck = scene(
+        bed(count=5),
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        box=((0, 0.6), (0, 2), (0, 0.6)),
+        setup="region slot block 0.1 0.5 1.6 1.9 0.1 0.5",
+        fixes="fix rain all deposit 25 1 8 4711 region slot near 0.13 vy -3 -3",
+        options="region container shorten yes",
+    )
+    # fix deposit makes spheres of diameter 1 and density 1 unless told otherwise.
+    deck = deck.replace(
+        "fix rain all deposit 25 1 8 4711 region slot near 0.13 vy -3 -3",
+        "molecule drop drop.mol\n"
+        "fix rain all deposit 25 0 8 4711 region slot near 0.13 vy -3 -3 mol drop",
+    )
+    (tmp_path / "drop.mol").write_text(
+        "one sphere\n\n1 atoms\n\nCoords\n\n1 0 0 0\n\nTypes\n\n1 1\n\n"
+        f"Diameters\n\n1 {2 * RADIUS}\n\nMasses\n\n1 {float(mass(RADIUS))}\n"
+    )
+    deck += "region hole block -1 0.2 -1 0.2 -1 1\nfix sink all evaporate 50 1 hole 99\n"
+    result = lmp(deck + DUMP_PARTICLES + "run 300\n", ranks=ranks)
+    sizes = set()
+    for frame in read_dump(tmp_path / "particles.dump"):
+        sizes.add(len(frame.rows))
+        radii = frame["radius"]
+        assert deepest_pair(frame.positions, radii) <= EPS * SLACK
+        depth = deepest_in_box(frame.positions, radii, ((0, 0.6), (0, 2), (0, 0.6)))
+        assert depth <= EPS * SLACK
+    assert max(sizes) > 20
+    assert result.thermo["f_contact[5]"][-1] > 5

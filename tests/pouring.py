@@ -1,0 +1,135 @@
+"""Runs inputs/spheres.in for the benchmark, the validation tests and the tables of the documentation."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lammps_inelastic.analysis import (
+    CoordinationNumber,
+    PackingFraction,
+    contact_counts,
+    coordination_number,
+    iterate_contact_frames,
+    packing_fraction,
+    particles_inside,
+    read_particle_frame,
+)
+
+BULK = np.array([[0.25, 0.75]] * 3)  # the paper's box
+
+
+def spheres_deck() -> str:
+    """Text of the installed inputs/spheres.in."""
+    return (files("lammps_inelastic.inputs") / "spheres.in").read_text()
+
+
+def run_deck(folder: Path, deck: str, variables: Mapping[str, object]) -> str:
+    """Run a deck on one core in `folder`, which becomes its `out`; return the log.
+
+    Raises RuntimeError with the end of the output when lmp fails.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "deck.in").write_text(deck)
+    command = [str(Path(sys.executable).parent / "lmp"), "-in", "deck.in", "-var", "out", "."]
+    for name, value in variables.items():
+        command += ["-var", name, str(value)]
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise RuntimeError("\n".join(done.stdout.splitlines()[-15:]))
+    return (folder / "log.lammps").read_text()
+
+
+@dataclass(frozen=True)
+class Projections:
+    """What fix inelastic says at the end of a `run`."""
+
+    projections: int
+    iterations: int
+    seconds: float
+
+
+def projections(log: str) -> list[Projections]:
+    """One entry for every `run` of a log."""
+    pattern = re.compile(
+        r"^Fix inelastic: (\d+) projections, (\d+) iterations.*?^Loop time of ([-+.\de]+)",
+        re.MULTILINE | re.DOTALL,
+    )
+    return [Projections(int(a), int(b), float(c)) for a, b, c in pattern.findall(log)]
+
+
+@dataclass(frozen=True)
+class Packing:
+    """The paper's two numbers for one run."""
+
+    packing_fraction: PackingFraction
+    coordination_number: CoordinationNumber
+
+
+def measure(folder: Path) -> Packing:
+    """Packing fraction and coordination number in the paper's box."""
+    frame = read_particle_frame(folder / "particles.lammpsdump")
+    chosen = particles_inside(frame.positions, BULK)
+    counts = (
+        contact_counts(contacts.ids, frame.ids).particles
+        for contacts in iterate_contact_frames(folder / "contacts.lammpsdump")
+    )
+    return Packing(
+        packing_fraction(frame.positions, frame.radii, BULK),
+        coordination_number(counts, chosen),
+    )
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A contact problem that `fix inelastic ... record` wrote, with indices instead of IDs."""
+
+    arrays: Mapping[str, NDArray[np.float64]]
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]  # -1 for a wall
+
+    @property
+    def timestep(self) -> float:
+        return float(self.arrays["timestep"])
+
+    @property
+    def tolerance(self) -> float:
+        return float(self.arrays["tolerance"])
+
+
+def read_record(path: Path) -> Recorded:
+    """Read one recorded problem."""
+    with np.load(path) as file:
+        arrays = dict(file)
+    identifiers = arrays["id"]
+    first = np.searchsorted(identifiers, arrays["id1"])
+    second = np.where(arrays["id2"] > 0, np.searchsorted(identifiers, arrays["id2"]), -1)
+    return Recorded(arrays, first.astype(np.int64), second.astype(np.int64))
+
+
+def records(folder: Path) -> list[Path]:
+    """Return the recorded problems of a folder in the order of their steps."""
+    return sorted(folder.glob("problem.*.npz"), key=lambda path: int(path.name.split(".")[1]))
+
+
+def recording(deck: str, every: int) -> str:
+    """Let the deck's contact fix (not the one that prepares the start) record problems."""
+    before, line, after = deck.rpartition("fix             contact all inelastic")
+    command, newline, rest = after.partition("\n")
+    return f"{before}{line}{command} record problem.*.npz every {every}{newline}{rest}"
