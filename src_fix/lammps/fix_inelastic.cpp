@@ -77,7 +77,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0),  
     list_(nullptr), margin_(-1.0), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr),
     largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
-    spread_at_start_(0.0), regular_timestep_(0.0), expecting_(false), kick_(0.0), output_{},
+    spread_at_start_(0.0), regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
     wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
     run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0), run_shortened_(0),
     exchanged_(nullptr), memory_exchange_size_(0)
@@ -298,6 +298,12 @@ void FixInelastic::post_force(int vflag)
 void FixInelastic::post_run()
 {
   if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
+  // Restart files and the next run start from the momentum alone.
+  for (int i = 0; i < atom->nlocal; ++i)
+    for (int d = 0; d < 3; ++d) {
+      atom->v[i][d] -= state_[i][PUSH_HELD + d];
+      state_[i][PUSH_HELD + d] = 0.0;
+    }
   if (comm->me != 0) return;
   utils::logmesg(lmp,
                  "Fix inelastic: {} projections, {:.0f} iterations, largest overlap {:.6g} = {:.4g} "
@@ -393,28 +399,17 @@ void FixInelastic::predict(double kick_steps)
   }
   for (int i = 0; i < nlocal; ++i) {
     const double kick_per_force = kick_ * force->ftm2v * problem_.inverse_mass[i];
-    const double *const push = pushed_velocity(i, kick_steps);
+    // What pushed overlaps apart is no momentum; between runs it is not in the velocity.
+    const double *const push = state_[i] + PUSH_NEXT;
     for (int d = 0; d < 3; ++d)
-      problem_.predicted_velocity[3 * i + d] =
-          atom->v[i][d] - push[d] + kick_per_force * atom->f[i][d];
+      problem_.predicted_velocity[3 * i + d] = atom->v[i][d] -
+          (kick_steps == 1.0 ? push[d] : 0.0) + kick_per_force * atom->f[i][d];
   }
   share_with_copies(problem_.predicted_velocity.data());
   message_.clear();
   for (int i = 0; i < nlocal; ++i)
     if (!std::isfinite(norm(&problem_.predicted_velocity[3 * i])))
       message_ = fmt::format("the force on atom {} or its velocity is not a finite number", atom->tag[i]);
-}
-
-// The part of atom i's present velocity that is no momentum. Between runs a command may have set
-// another velocity, of which none is.
-const double *FixInelastic::pushed_velocity(int i, double kick_steps) const
-{
-  static constexpr double none[3] = {0.0, 0.0, 0.0};
-  const double *const state = state_[i];
-  if (kick_steps == 1.0) return state + PUSH_NEXT;
-  const double *const v = atom->v[i];
-  const double change[3] = {v[0] - state[HELD_V], v[1] - state[HELD_V + 1], v[2] - state[HELD_V + 2]};
-  return norm(change) <= EXPECTED_RELATIVE * norm(v) ? state + PUSH_HELD : none;
 }
 
 void FixInelastic::collect()
@@ -719,10 +714,7 @@ void FixInelastic::apply_forces(double kick_steps)
       }
       const double push =
           bad_overlap_ && moves ? v - problem_.predicted_velocity[3 * i + d] : 0.0;
-      if (kick_steps == 1.0) {
-        state[PUSH_HELD + d] = 0.5 * (state[PUSH_NEXT + d] + push);
-        state[HELD_V + d] = 0.5 * (atom->v[i][d] + v);
-      }
+      if (kick_steps == 1.0) state[PUSH_HELD + d] = 0.5 * (state[PUSH_NEXT + d] + push);
       state[PUSH_NEXT + d] = push;
       state[EXPECTED_V + d] = v;
       state[EXPECTED_X + d] = atom->x[i][d] + h * v;
@@ -827,14 +819,23 @@ double FixInelastic::spread_since_build(const double *velocity)
   return spread(displacement_.data()) + 2.0 * growth;
 }
 
+// The timestep command, also where no init() follows (run pre no). The fix's own changes return to
+// the regular step.
+void FixInelastic::reset_dt()
+{
+  if (!setting_timestep_) regular_timestep_ = update->dt;
+}
+
 void FixInelastic::set_timestep(double timestep)
 {
+  setting_timestep_ = true;
   update->update_time();
   update->dt = timestep;
   update->dt_default = 0;
   if (force->pair) force->pair->reset_dt();
   for (Fix *fix : modify->get_fix_list()) fix->reset_dt();
   output->reset_dt();
+  setting_timestep_ = false;
 }
 
 void FixInelastic::shorten_step(double factor)

@@ -43,6 +43,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void post_neighbor() override;
   void post_force(int) override;
   void post_run() override;
+  void reset_dt() override;
 
   void grow_arrays(int) override;
   void copy_arrays(int, int, int) override;
@@ -98,15 +99,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool bad_overlap_;
 
   // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the last
-  // move (NEXT) and as LAMMPS holds it between runs, half a kick earlier (HELD, with HELD_V all of it).
-  enum StateColumn {
-    EXPECTED_X = 0,
-    EXPECTED_V = 3,
-    PUSH_NEXT = 6,
-    PUSH_HELD = 9,
-    HELD_V = 12,
-    STATE_SIZE = 15
-  };
+  // move (NEXT) and at whole steps (HELD).
+  enum StateColumn { EXPECTED_X = 0, EXPECTED_V = 3, PUSH_NEXT = 6, PUSH_HELD = 9, STATE_SIZE = 12 };
   double **state_;
   ContactMemory memory_;
 
@@ -117,7 +111,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double spread_at_start_;    // largest relative displacement since the list was built
   std::vector<double> position_at_build_, radius_at_build_, displacement_;
 
-  double regular_timestep_;
+  double regular_timestep_;    // as the deck sets it
+  bool setting_timestep_;      // the fix itself is changing it
   bool expecting_;    // state_ holds a prediction to compare with
   double kick_;       // time for which the force acts before the next move
 
@@ -168,7 +163,6 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void advance(int vflag, double kick_steps);
   void check_expected();
   void predict(double kick_steps);
-  const double *pushed_velocity(int i, double kick_steps) const;
   void collect();
   void push_apart(inelastic::ProjectionResult &);
   void apply_forces(double kick_steps);

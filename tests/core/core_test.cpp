@@ -781,8 +781,8 @@ struct RankOutcome {
   std::vector<double> velocity;
 };
 
-// Solves on as many ranks as there are shares; contacts[r] are those of rank r, known to it from the
-// start or to be found.
+// Solves on as many ranks as there are shares; contacts[r] are those of rank r, which it knows from
+// the start or has to find.
 std::vector<RankOutcome> solve_on_ranks(const ContactProblem &whole, Ranks &ranks,
                                         const std::vector<std::vector<std::size_t>> &contacts,
                                         const std::string &solver_name, double tolerance,

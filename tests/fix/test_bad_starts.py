@@ -1,0 +1,139 @@
+"""Starts that overlap are pushed apart at a bounded speed, and that speed is no momentum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lammps_run import Runner
+from scenes import (
+    DUMP_PARTICLES,
+    deepest_in_box,
+    deepest_pair,
+    mass,
+    random_points,
+    read_dump,
+    scene,
+)
+
+RADIUS = 0.055
+EPS = 0.0005 * RADIUS
+STEP = 0.005
+SLACK = 1 + 1e-6  # round-off of positions
+LARGEST_PUSH = 0.05 * 2 * RADIUS  # per step, of the sum of radii: the fix's documented bound
+
+
+@pytest.mark.parametrize("overlap", [0.001, 0.01, 0.1, 0.5, 1.9])
+def test_two_spheres(overlap: float, tmp_path: Path, lmp: Runner) -> None:
+    direction = np.array([2, -1, 2]) / 3
+    half = RADIUS * (1 - overlap / 2) * direction
+    deck = scene(
+        [[0.5, 2, 0.5] - half, [0.5, 2, 0.5] + half],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        gravity=False,
+    )
+    lmp(deck + DUMP_PARTICLES + "run 60\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    depth = [deepest_pair(frame.positions, frame["radius"]) for frame in frames]
+    assert depth[0] == pytest.approx(overlap * RADIUS, rel=1e-9)  # round-off
+    assert np.diff(depth).max() <= 1e-15  # round-off: never deeper
+    assert max(-np.diff(depth)) <= LARGEST_PUSH + 2 * EPS
+    assert depth[-1] <= EPS * SLACK
+    # The centre of mass stays, and so do both spheres in the end: to the tolerance over h.
+    assert frames[-1].positions.mean(axis=0) == pytest.approx([0.5, 2, 0.5], abs=1e-14)
+    assert np.abs(frames[-1].velocities).max() <= 2 * EPS / STEP
+
+
+@pytest.mark.parametrize("options", ["", " shorten yes", " solver uzawa"])
+def test_two_hundred_random_points(options: str, tmp_path: Path, lmp: Runner) -> None:
+    deck = scene(
+        np.random.default_rng(1).uniform((0.01, 0.01, 0.01), (0.99, 1.99, 0.99), (200, 3)),
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        gravity=False,
+        skin=0.11,
+        options="region container" + options,
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 80\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    start = deepest_pair(frames[0].positions, frames[0]["radius"])
+    assert start > 0.5 * RADIUS
+    end = frames[-1]
+    assert deepest_pair(end.positions, end["radius"]) <= EPS * SLACK
+    assert deepest_in_box(end.positions, end["radius"]) <= EPS * SLACK
+    # No sphere gets away: in the end each contact leaves at most the tolerance over h.
+    assert np.abs(end.velocities).max() <= 5 * EPS / STEP
+    # While they are pushed, the bound on each contact's push bounds the motion of a sphere: a
+    # sphere is moved by several at once.
+    assert max(np.abs(frame.velocities).max() for frame in frames) <= 10 * LARGEST_PUSH / STEP
+    assert result.thermo["f_contact[4]"][-1] <= EPS * SLACK
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_different_radii_fall_while_they_are_pushed(
+    ranks: int, tmp_path: Path, lmp: Runner
+) -> None:
+    random = np.random.default_rng(2)
+    points = random_points(80, ((0.08, 0.92), (0.08, 1.2), (0.08, 0.92)), 0.09, seed=4)
+    radii = random.uniform(0.04, 0.075, 80)
+    deck = scene(points, radii, tmp_path, tolerance=EPS, skin=0.12)
+    lmp(deck + DUMP_PARTICLES + "run 100\n", ranks=ranks)
+    frames = read_dump(tmp_path / "particles.dump")
+    assert deepest_pair(frames[0].positions, radii) > 0.3 * radii.min()
+    m = mass(radii)
+    energy = [
+        0.5 * m @ (frame.velocities**2).sum(axis=1) + 9.81 * m @ frame.positions[:, 1]
+        for frame in frames
+    ]
+    # Pushing lifts some spheres; nothing else may add energy. The bound is a tenth of the
+    # largest radius for the mean height.
+    assert max(energy) <= energy[0] + 9.81 * m.sum() * 0.1 * radii.max()
+    end = frames[-1]
+    assert deepest_pair(end.positions, radii) <= EPS * SLACK
+    assert deepest_in_box(end.positions, radii) <= EPS * SLACK
+
+
+def test_walls_push_too(tmp_path: Path, lmp: Runner) -> None:
+    deck = scene(
+        [[0.02, 0.01, 0.05], [0.5, 4.98, 0.999]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        gravity=False,
+    )
+    lmp(deck + DUMP_PARTICLES + "run 60\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    depth = [deepest_in_box(frame.positions, frame["radius"]) for frame in frames]
+    assert np.diff(depth).max() <= 1e-15  # round-off: never deeper
+    assert depth[-1] <= EPS * SLACK
+    assert np.abs(frames[-1].velocities).max() <= 2 * EPS / STEP
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_coincident_centres_are_refused(
+    ranks: int, tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    deck = scene([[0.5, 1, 0.5]] * 2 + [[0.2, 1, 0.5]], RADIUS, tmp_path, tolerance=EPS)
+    error = refused(deck + "run 1\n", ranks=ranks)
+    assert "centres of atoms" in error
+    assert "1 and 2" in error or "2 and 1" in error
+
+
+def test_a_sphere_that_overlaps_its_own_image_is_refused(
+    tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    deck = scene(
+        [[0.05, 0.5, 0.05]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        box=((0, 0.1), (0, 1), (0, 0.5)),
+        boundary="p f p",
+        options="",
+    )
+    assert "periodic image" in refused(deck + "run 1\n")

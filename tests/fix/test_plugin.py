@@ -1,0 +1,36 @@
+"""The plugin itself: how LAMMPS finds it, and what it does in the wrong LAMMPS."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from lammps_run import Runner
+
+HERE = b"stable_22Jul2025_update4"
+ELSEWHERE = b"stable_22Jul2025_update2"
+
+
+def plugin_file() -> Path:
+    """The file that the entry point leads LAMMPS to."""
+    (entry,) = entry_points(group="lammps.plugins", name="inelastic")
+    return Path(entry.load()()) / "inelasticplugin.so"
+
+
+def test_found_without_a_plugin_command(lmp: Runner) -> None:
+    """`lmp` knows both fixes at once."""
+    listed = lmp("plugin list").screen
+    assert "fix style plugin inelastic" in listed
+    assert "fix style plugin random/force" in listed
+
+
+def test_built_for_another_lammps(lmp: Runner, tmp_path: Path) -> None:
+    """A plugin of another build says so in one line and registers nothing."""
+    compiled = plugin_file().read_bytes()
+    assert compiled.count(HERE) == 1
+    (tmp_path / "otherplugin.so").write_bytes(compiled.replace(HERE, ELSEWHERE))
+    result = lmp("plugin clear\nplugin load ./otherplugin.so\nplugin list\n")
+    (warning,) = (line for line in result.warnings if "fix inelastic is not available" in line)
+    assert ELSEWHERE.decode() in warning
+    assert HERE.decode() in warning
+    assert "Currently loaded plugins: 0" in result.screen

@@ -1,0 +1,308 @@
+"""Every mistake ends with one line that says what is wrong, an exit code, and no hanging rank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lammps_run import Runner
+from scenes import (
+    DUMP_PARTICLES,
+    deepest_in_box,
+    deepest_pair,
+    random_points,
+    read_dump,
+    scene,
+)
+
+RADIUS = 0.05
+EPS = 0.0005 * RADIUS
+POINTS = random_points(30, ((0.06, 0.5), (0.06, 0.9), (0.06, 0.5)), 2 * RADIUS, seed=1)
+BOX = ((0.0, 0.57), (0.0, 2.0), (0.0, 0.57))
+Refused = Callable[..., str]
+
+
+def deck(folder: Path, **options: object) -> str:
+    """Return a small scene that runs."""
+    defaults: dict[str, object] = {"tolerance": EPS, "box": BOX}
+    return scene(POINTS, RADIUS, folder, **(defaults | options))  # type: ignore[arg-type]
+
+
+def with_fix(folder: Path, line: str) -> str:
+    """Return the scene with another line for the contact fix, up to its first run."""
+    text = deck(folder)
+    start = text.index("fix contact")
+    rest = text[text.index("\n", start) :]
+    return text[:start] + line + rest[: rest.index("thermo ")] + "run 2\n"
+
+
+def test_the_scene_itself_runs(tmp_path: Path, lmp: Runner) -> None:
+    lmp(deck(tmp_path) + "run 20\n")
+    lmp(with_fix(tmp_path, "fix contact all inelastic 1e-5 region container"))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("fix contact all inelastic", ["fix inelastic", "missing"]),
+        ("fix contact all inelastic 0 region container", ["tolerance", "greater than 0", "not 0"]),
+        ("fix contact all inelastic -1 region container", ["tolerance", "not -1"]),
+        ("fix contact all inelastic nan region container", ["nan"]),
+        ("fix contact all inelastic inf region container", ["inf"]),
+        ("fix contact all inelastic region container", ["region"]),
+        ("fix contact all inelastic 1e-5 1e-6", ["1e-6", "keyword"]),
+        ("fix contact all inelastic 1e-5 regions container", ["regions", "keyword", "record"]),
+        ("fix contact all inelastic 1e-5 region", ["region"]),
+        ("fix contact all inelastic 1e-5 region nowhere", ["region", "nowhere", "not exist"]),
+        ("fix contact all inelastic 1e-5 region container nowhere", ["nowhere", "not exist"]),
+        ("fix contact all inelastic 1e-5 region container region container", ["container"]),
+        ("fix contact all inelastic 1e-5 solver newton", ["newton", "apgd", "uzawa"]),
+        ("fix contact all inelastic 1e-5 solver", ["solver"]),
+        ("fix contact all inelastic 1e-5 maxiter 0", ["maxiter", "0"]),
+        ("fix contact all inelastic 1e-5 maxiter -5", ["maxiter", "-5"]),
+        ("fix contact all inelastic 1e-5 maxiter 1.5", ["1.5"]),
+        ("fix contact all inelastic 1e-5 maxiter warn", ["warn"]),
+        ("fix contact all inelastic 1e-5 maxiter 10 warning", ["warning", "keyword"]),
+        ("fix contact all inelastic 1e-5 frozen nobody", ["frozen", "nobody", "not exist"]),
+        ("fix contact all inelastic 1e-5 frozen", ["frozen"]),
+        ("fix contact all inelastic 1e-5 shorten maybe", ["maybe"]),
+        ("fix contact all inelastic 1e-5 shorten", ["shorten"]),
+        ("fix contact all inelastic 1e-5 record a*.npz", ["record FILE every N"]),
+        ("fix contact all inelastic 1e-5 record a*.npz every 0", ["every", "at least 1"]),
+        ("fix contact all inelastic 1e-5 record a.npz every 1", ["a.npz", "*"]),
+        ("fix contact nobody inelastic 1e-5", ["nobody"]),
+        (
+            "fix contact all inelastic 1e-5\nfix contact2 all inelastic 1e-5",
+            ["More than one fix inelastic"],
+        ),
+        ("fix contact all inelastic 1e-5\nfix_modify contact tolerance 0", ["greater than 0"]),
+        ("fix contact all inelastic 1e-5\nfix_modify contact tolerance", ["tolerance"]),
+        ("fix contact all inelastic 1e-5\nfix_modify contact tolerance x", ["x"]),
+        ("fix contact all inelastic 1e-5\nfix_modify contact maxiter 10", ["maxiter"]),
+        ("fix contact all inelastic 1e-5\nrun_style respa 2 2 pair 1", ["respa", "verlet"]),
+        ("fix contact all inelastic 1e-5\nminimize 0 1e-4 10 10", ["minimize", "unfix"]),
+        ("fix contact all inelastic 1e-5\nset atom 3 diameter 0", ["no radius", "diameter"]),
+        (
+            "fix contact all inelastic 1e-5 region container\npair_coeff * * 0.05",
+            ["neighbour list", "pair_style zero", "0.1"],
+        ),
+        (
+            "fix contact all inelastic 1e-5 region container\nset atom 3 diameter 0.5",
+            ["neighbour list", "pair_style zero", "0.5"],
+        ),
+        ("fix contact all inelastic 1e-5 region container\npair_style none", ["pair_style zero"]),
+        (
+            "fix contact all inelastic 1e-5 region container\nset atom 3 x 0.7",
+            ["centre", "atom 3", "region container"],
+        ),
+        (
+            "fix contact all inelastic 1e-5 region container\nset atom 3 y 0",
+            ["centre", "atom 3", "region container"],
+        ),
+        (
+            "fix contact all inelastic 1e-5 region container\nset atom 3 vx 1e300",
+            ["atom 3", "finite"],
+        ),
+        ("fix contact all inelastic 1e-5 region container\nregion container delete", ["container"]),
+    ],
+)
+def test_one_line_says_what_is_wrong(
+    line: str, words: list[str], tmp_path: Path, refused: Refused
+) -> None:
+    error = refused(with_fix(tmp_path, line), timeout=20)
+    for word in words:
+        assert word.lower() in error.lower(), error
+
+
+def test_atom_style_without_radius(tmp_path: Path, refused: Refused) -> None:
+    text = """
+units lj
+region container block 0 1 0 1 0 1
+create_box 1 container
+create_atoms 1 single 0.5 0.5 0.5
+mass 1 1
+pair_style zero 0.2
+pair_coeff * *
+fix motion all nve
+fix contact all inelastic 1e-5 region container
+run 1
+"""
+    error = refused(text)
+    assert "radius" in error
+    assert "atom_style sphere" in error
+
+
+CHANGES = {
+    "no integrator": ("fix motion all nve\n", "", [], "position"),
+    "a later force": (
+        "thermo 1\n",
+        "fix wind all addforce 1e-6 0 0\nthermo 1\n",
+        ["wind (addforce)", "before fix contact"],
+        "",
+    ),
+    "a later setforce": (
+        "thermo 1\n",
+        "fix hold all setforce 0 NULL NULL\nthermo 1\n",
+        ["hold (setforce)"],
+        "",
+    ),
+    "gravity afterwards": (
+        "thermo 1\n",
+        "fix more all gravity 1 vector 1 0 0\nthermo 1\n",
+        ["more (gravity)"],
+        "",
+    ),
+    "rescaled velocities": (
+        "thermo 1\n",
+        "fix cool all temp/rescale 1 0.001 0.001 0 1\nthermo 1\n",
+        ["cool (temp/rescale)"],
+        "",
+    ),
+    "momentum": (
+        "thermo 1\n",
+        "fix drift all momentum 1 linear 1 1 1\nthermo 1\n",
+        ["drift (momentum)"],
+        "",
+    ),
+    "another integrator": ("all nve", "all nve/limit 1e-4", [], ""),
+    "thermostat": ("fix motion all nve", "fix motion all nvt/sphere temp 1 1 0.1", [], ""),
+    "two integrators": ("fix motion all nve", "fix motion all nve\nfix again all nve", [], ""),
+    "fix dt/reset": (
+        "thermo 1\n",
+        "fix dt all dt/reset 1 0.001 0.002 0.001\nthermo 1\n",
+        [],
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_something_else_moves_the_spheres(
+    name: str, ranks: int, tmp_path: Path, refused: Refused
+) -> None:
+    if ranks == 2 and name not in ("no integrator", "a later setforce"):
+        pytest.skip("the message travels the same way for all of them")
+    old, new, words, what = CHANGES[name]
+    text = deck(tmp_path)
+    assert old in text
+    error = refused(text.replace(old, new, 1) + "run 50\n", ranks=ranks)
+    for word in ("did not move as predicted", what, *words):
+        assert word in error, error
+
+
+def test_fixes_in_the_right_order_are_accepted(tmp_path: Path, lmp: Runner) -> None:
+    fixes = (
+        "fix wind all addforce 1e-4 0 0\nfix drag all viscous 0.001\n"
+        "fix noise all langevin 0.001 0.001 1.0 48 zero yes\n"
+        "fix spring all spring/self 0.001\n"
+    )
+    text = deck(tmp_path, fixes=fixes, motion="fix motion all nve/sphere", skin=0.1)
+    text += (
+        "fix stop all halt 10 f_contact[4] > 1\nfix mean all ave/time 1 10 10 f_contact[4]\n"
+        "fix count all ave/atom 1 10 10 f_contact[1]\ncompute largest all reduce max f_contact[2]\n"
+    )
+    lmp(text.replace("fix stop all halt 10 f_contact[4] > 1\n", "") + "run 60\n")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_too_few_iterations(ranks: int, tmp_path: Path, refused: Refused, lmp: Runner) -> None:
+    text = deck(tmp_path, options="region container maxiter 3")
+    error = refused(text + "run 100\n", ranks=ranks)
+    for word in ("3 iterations", "maxiter", "tolerance", "step"):
+        assert word in error, error
+    text = deck(tmp_path, options="region container maxiter 3 warn")
+    result = lmp(text + "run 100\n", ranks=ranks)
+    over = (result.thermo["f_contact[2]"] > EPS) | (result.thermo["f_contact[3]"] > EPS)
+    assert over.sum() > 5
+    said = [warning for warning in result.warnings if "3 iterations" in warning]
+    # Each time, once.
+    assert len(said) == over.sum()
+    assert f"{over.sum()} projections did not reach the tolerance" in result.screen
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_list_that_does_not_reach(
+    ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
+) -> None:
+    velocities = np.random.default_rng(2).normal(0, 4, POINTS.shape)
+    fast = {"velocities": velocities, "skin": 0.01}
+    error = refused(deck(tmp_path, **fast) + "run 50\n", ranks=ranks)
+    for word in ("neighbour list", "skin", "timestep", "shorten yes"):
+        assert word in error, error
+
+    thermo = "step time dt ke f_contact[4] f_contact[10]"
+    text = deck(tmp_path, options="region container shorten yes", thermo=thermo, **fast)
+    result = lmp(text + DUMP_PARTICLES + "run 300\nrun 10\n", ranks=ranks)
+    for frame in read_dump(tmp_path / "particles.dump"):
+        radii = frame["radius"]
+        # Round-off of positions.
+        assert deepest_pair(frame.positions, radii) <= EPS * (1 + 1e-6)
+        assert deepest_in_box(frame.positions, radii, BOX) <= EPS * (1 + 1e-6)
+    first, second = result.runs
+    assert first["f_contact[10]"][-1] > 10
+    assert first["Time"][-1] < 299 * 0.005
+    assert np.diff(first["Time"]).min() > 0
+    # The regular step is back as soon as it can be, and simulated time goes on where it was.
+    assert second["Time"][0] == pytest.approx(first["Time"][-1], rel=1e-12)  # round-off
+    assert result.runs[1]["Dt"][-1] <= 0.005
+    # Free flight covers the simulated time: energy is right, not only the positions' overlaps.
+    frames = read_dump(tmp_path / "particles.dump")
+    times = first["Time"]
+    moved = np.diff([frame.positions for frame in frames[:31]], axis=0)
+    steps = np.diff(times[:31])
+    speed = np.linalg.norm(moved, axis=2) / steps[:, None]
+    assert speed.max() <= 1.5 * np.linalg.norm(velocities, axis=1).max()
+
+
+def test_a_free_fall_with_shortened_steps_takes_its_time(tmp_path: Path, lmp: Runner) -> None:
+    """One sphere falls while two others race: its path belongs to the time that LAMMPS shows."""
+    points = [[0.1, 1.8, 0.1], [0.3, 0.5, 0.3], [0.3, 0.7, 0.3]]
+    deck_text = scene(
+        points,
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        box=((0, 0.57), (-50, 50), (0, 0.57)),
+        velocities=[[0, 0, 0], [0, -9, 0], [0, 9, 0]],
+        skin=0.02,
+        options="shorten yes",
+        thermo="step time f_contact[10]",
+    )
+    result = lmp(deck_text + DUMP_PARTICLES + "run 100\n")
+    time = result.thermo["Time"]
+    assert result.thermo["f_contact[10]"][-1] > 50
+    y = np.array([frame["y"][0] for frame in read_dump(tmp_path / "particles.dump")])
+    # Velocity-Verlet with steps that change is exact to first order in a step at worst.
+    assert y == pytest.approx(1.8 - 9.81 * time**2 / 2, abs=9.81 * time[-1] * 0.005)
+
+
+@pytest.mark.parametrize("what", ["wrong side", "far outside", "on the wall", "moved away"])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_centre_outside_the_region(
+    what: str, ranks: int, tmp_path: Path, refused: Refused
+) -> None:
+    place = {
+        "wrong side": "set atom 7 y -0.01",
+        "far outside": "set atom 7 y -0.9",
+        "on the wall": "set atom 7 y 0.0",
+        "moved away": "run 1\ndisplace_atoms all move 0 -0.95 0",
+    }[what]
+    error = refused(deck(tmp_path) + place + "\nrun 5\n", ranks=ranks)
+    assert "centre of atom" in error
+    assert "region container" in error
+
+
+def test_a_wall_that_jumps_over_a_centre_is_no_silent_mistake(
+    tmp_path: Path, refused: Refused
+) -> None:
+    text = deck(
+        tmp_path,
+        setup="variable up equal 0.3*step\n"
+        "region lift block 0 0.57 0 3 0 0.57 rotate v_up 0.2 1 0.2 0 0 1",
+        options="region lift",
+    )
+    error = refused(text + "run 5\n")
+    assert "region lift" in error
