@@ -13,7 +13,8 @@ class Host {
   // ranks own): add the copies' values to their owners, then give every copy its owner's sum.
   virtual void sum_over_copies(double *per_particle) = 0;
 
-  // Per-particle vectors: give every copy its owner's value.
+  // Per-particle vectors: give every copy its owner's value. For those who set up a problem: the copies
+  // need predicted velocities too.
   virtual void share_with_copies(double *per_particle) = 0;
 
   // Global sums and global maxima of a few numbers, in one communication.

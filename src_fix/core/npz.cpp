@@ -1,7 +1,9 @@
 #include "npz.h"
 
 #include <array>
+#include <cerrno>
 #include <cstdio>
+#include <utility>
 
 namespace inelastic {
 
@@ -109,7 +111,11 @@ bool NpzWriter::write(const std::string &path) const
   if (!file) return false;
   const bool written = std::fwrite(archive.data(), 1, archive.size(), file) == archive.size();
   const bool closed = std::fclose(file) == 0;
-  return written && closed && std::rename(temporary.c_str(), path.c_str()) == 0;
+  if (written && closed && std::rename(temporary.c_str(), path.c_str()) == 0) return true;
+  const int cause = errno;
+  std::remove(temporary.c_str());
+  errno = cause;
+  return false;
 }
 
 }    // namespace inelastic

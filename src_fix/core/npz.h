@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@ namespace inelastic {
 
 class NpzWriter {
  public:
-  // `columns` = 0 gives shape (n,), otherwise (n / columns, columns).
+  // `columns` = 0 gives shape (n,), otherwise (n / columns, columns). Below 4 GB in all.
   void add(const std::string &name, const std::vector<double> &values, std::size_t columns = 0);
   void add(const std::string &name, const std::vector<std::int64_t> &values);
   void add(const std::string &name, double value);    // shape ()

@@ -4,13 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace inelastic {
+
+namespace {
+
+constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
+                               std::numeric_limits<double>::infinity()};
+
+}    // namespace
 
 Residual residual(const double *gap_at_end, const double *impulse, std::size_t count)
 {
   Residual worst;
   for (std::size_t c = 0; c < count; ++c) {
+    // A value that is no number satisfies nothing.
+    if (!std::isfinite(gap_at_end[c]) || !std::isfinite(impulse[c])) return UNSOLVED;
     worst.feasibility = std::max(worst.feasibility, -gap_at_end[c]);
     if (impulse[c] > 0.0) worst.complementarity = std::max(worst.complementarity, gap_at_end[c]);
   }
@@ -19,8 +29,9 @@ Residual residual(const double *gap_at_end, const double *impulse, std::size_t c
 
 double largest_eigenvalue(const ContactProblem &problem, Host &host)
 {
-  constexpr double RELATIVE_CHANGE = 1.0e-4;    // of the estimate, per iteration, to stop at
-  constexpr int MAX_ITERATIONS = 1000;
+  constexpr double RELATIVE_CHANGE = 1.0e-6;    // of the estimate, per iteration, to stop at
+  constexpr int MIN_ITERATIONS = 50;    // a stiff mode of few constraints grows before it is seen
+  constexpr int MAX_ITERATIONS = 2000;
 
   // With the constraint values at zero the gap operator is the linear map A itself.
   ContactProblem linear = problem;
@@ -46,7 +57,8 @@ double largest_eigenvalue(const ContactProblem &problem, Host &host)
     double rayleigh = 0.0;
     for (std::size_t c = 0; c < count; ++c) rayleigh += direction[c] * image[c];
     host.reduce(&rayleigh, 1, nullptr, 0);
-    const bool settled = std::abs(rayleigh - estimate) <= RELATIVE_CHANGE * rayleigh;
+    const bool settled =
+        k >= MIN_ITERATIONS && std::abs(rayleigh - estimate) <= RELATIVE_CHANGE * rayleigh;
     estimate = rayleigh;
     if (settled) break;
     direction.swap(image);
@@ -104,7 +116,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
   // connected, and raised with a margin when a step shows it too small.
   constexpr double RELAXATION = 0.99;
   constexpr double MARGIN = 1.02;
-  constexpr double FIRST_CURVATURE = 2.0;    // two spheres in contact; denser packings raise it
+  constexpr double FIRST_CURVATURE = 2.0;    // of a few contacts; a first step far too long costs more
 
   ContactSet &contacts = problem.contacts;
   const std::size_t count = contacts.size();
@@ -115,7 +127,8 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
     diagonal_[c] = problem.timestep *
         (problem.inverse_mass[contacts.first[c]] + problem.inverse_mass[contacts.second[c]]);
 
-  impulse_ = contacts.impulse;
+  impulse_.resize(count);
+  for (std::size_t c = 0; c < count; ++c) impulse_[c] = std::max(0.0, contacts.impulse[c]);
   impulse_before_.resize(count);
   impulse_next_.resize(count);
   gap_.resize(count);
@@ -132,6 +145,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
     return r.feasibility <= limits.tolerance && r.complementarity <= limits.tolerance;
   };
   result.converged = done(result.residual);
+  if (!std::isfinite(result.residual.feasibility)) return result;
 
   curvature_ = curvature_ == 0.0 ? FIRST_CURVATURE : std::max(1.0, RELAXATION * curvature_);
   double momentum_time = 1.0;
@@ -148,6 +162,10 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
     double maxima[2] = {outcome.residual.feasibility, outcome.residual.complementarity};
     double sums[3] = {advance.uphill, advance.change_squared, outcome.curved};
     host.reduce(sums, 3, maxima, 2);
+    if (!std::isfinite(sums[2])) {
+      result.residual = UNSOLVED;
+      break;
+    }
 
     // A step that was longer than the curvature along it allows is kept: the next ones undo its harm,
     // and dropping it with its momentum was measured to cost a quarter more iterations.
@@ -190,7 +208,9 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
     host.reduce(nullptr, 0, maxima, 2);
     result.residual = {maxima[0], maxima[1]};
     result.converged = result.residual.feasibility <= limits.tolerance;
-    if (result.converged || result.iterations >= limits.max_iterations) return result;
+    if (result.converged || result.iterations >= limits.max_iterations ||
+        !std::isfinite(result.residual.feasibility))
+      return result;
     if (step == 0.0) step = 1.0 / largest_eigenvalue(problem, host);
     for (std::size_t c = 0; c < count; ++c)
       contacts.impulse[c] = std::max(0.0, contacts.impulse[c] - step * gap_[c]);

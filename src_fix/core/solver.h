@@ -4,8 +4,8 @@
 //   feasibility       max over all constraints of       -w_c      (overlap left at the end of the step)
 //   complementarity   max over constraints with impulse of w_c    (gap left where a force acts)
 //
-// A solver takes its first guess from ContactSet::impulse if it warm-starts, and leaves its result
-// there.
+// A solver takes its first guess from ContactSet::impulse if it warm-starts (what is negative there
+// counts as zero), and leaves its result there.
 
 #pragma once
 
@@ -21,7 +21,7 @@ struct Residual {
   double complementarity = 0.0;    // [length], >= 0
 };
 
-// Local to this rank unless a host reduces it.
+// Local to this rank unless a host reduces it. Infinite when a number is not finite.
 Residual residual(const double *gap_at_end, const double *impulse, std::size_t count);
 
 struct SolverLimits {
@@ -80,7 +80,8 @@ class Uzawa final : public Solver {
   std::vector<double> gap_, product_;
 };
 
-// Largest eigenvalue of A = h G M^-1 G^T [time / mass], to a relative accuracy of about 1e-3.
+// Largest eigenvalue of A = h G M^-1 G^T [time / mass] by power iteration, from below and mostly to
+// 1e-3.
 double largest_eigenvalue(const ContactProblem &problem, Host &host);
 
 // "apgd" or "uzawa"; nullptr for any other name.

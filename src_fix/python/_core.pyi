@@ -3,8 +3,9 @@
 n particles, m contacts. ``first`` and ``second`` are int64 arrays (m,) of particle indices, second
 = -1 for a wall; ``normal`` (m, 3) are unit vectors from second to first; ``gap`` (m,) [length] is
 negative for an overlap. ``inverse_mass`` (n,) [1 / mass], zero for a frozen particle. Arrays are
-float64 and C-contiguous. ValueError for wrong shapes, indices out of range, numbers that are not
-finite and contacts between two particles that cannot move.
+float64 and C-contiguous. TypeError for arrays of another dimension; ValueError for wrong lengths,
+indices out of range, numbers that are not finite, negative masses, normals that have not length 1, a
+contact of a particle with itself and contacts between two particles that cannot move.
 """
 
 import numpy as np
@@ -65,7 +66,7 @@ def largest_eigenvalue(
     *,
     timestep: float,
 ) -> float:
-    """Largest eigenvalue of h G M^-1 G^T [time / mass], to about 1e-3."""
+    """Largest eigenvalue of h G M^-1 G^T [time / mass], from below and mostly to 1e-3."""
 
 def uniform_vector(seed: int, particle: int, step: int) -> tuple[float, float, float]:
     """The three numbers, uniform in [-1, 1], that ``fix random/force`` gives one particle."""

@@ -11,6 +11,7 @@
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -48,6 +49,15 @@ template <typename Array> void require_length(const Array &array, std::size_t le
                               .c_str());
 }
 
+template <typename Array> void require_finite(const Array &array, const char *name)
+{
+  for (std::size_t k = 0; k < array.size(); ++k)
+    if (!std::isfinite(array.data()[k]))
+      throw nb::value_error((std::string(name) + " holds a number that is not finite").c_str());
+}
+
+constexpr double NOT_UNIT = 1.0e-6;    // of a squared length: far above round-off
+
 inelastic::ContactProblem make_problem(const Vectors &predicted_velocity, const Scalars &inverse_mass,
                                        const Indices &first, const Indices &second,
                                        const Vectors &normal, const Scalars &gap, double timestep,
@@ -60,7 +70,15 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity, const 
   require_length(second, count, "second");
   require_length(normal, count, "normal");
   if (impulse) require_length(*impulse, count, "impulse");
-  if (!(timestep > 0.0)) throw nb::value_error("timestep must be greater than 0");
+  if (!(timestep > 0.0) || std::isinf(timestep))
+    throw nb::value_error("timestep must be finite and greater than 0");
+  require_finite(predicted_velocity, "predicted_velocity");
+  require_finite(inverse_mass, "inverse_mass");
+  require_finite(normal, "normal");
+  require_finite(gap, "gap");
+  if (impulse) require_finite(*impulse, "impulse");
+  for (std::size_t i = 0; i < particles; ++i)
+    if (inverse_mass.data()[i] < 0.0) throw nb::value_error("inverse_mass must not be negative");
 
   inelastic::ContactProblem problem;
   problem.timestep = timestep;
@@ -75,19 +93,19 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity, const 
       throw nb::value_error(("contact " + std::to_string(c) + " names a particle outside 0 ... " +
                              std::to_string(limit - 1))
                                 .c_str());
+    if (i == j)
+      throw nb::value_error(("contact " + std::to_string(c) + " is of a particle with itself").c_str());
+    const double *const n = normal.data() + 3 * c;
+    if (std::abs(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0) > NOT_UNIT)
+      throw nb::value_error(("the normal of contact " + std::to_string(c) + " has not length 1").c_str());
     const double w =
         problem.inverse_mass[i] + (j < 0 ? 0.0 : problem.inverse_mass[static_cast<std::size_t>(j)]);
     if (!(w > 0.0))
       throw nb::value_error(
           ("contact " + std::to_string(c) + " is between particles that cannot move").c_str());
     problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j),
-                         normal.data() + 3 * c, gap.data()[c], impulse ? impulse->data()[c] : 0.0);
+                         n, gap.data()[c], impulse ? impulse->data()[c] : 0.0);
   }
-  for (const std::vector<double> *values :
-       {&problem.predicted_velocity, &problem.inverse_mass, &problem.contacts.normal,
-        &problem.contacts.gap, &problem.contacts.impulse})
-    for (const double value : *values)
-      if (!std::isfinite(value)) throw nb::value_error("every number must be finite");
   return problem;
 }
 
@@ -114,7 +132,9 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
                    const Scalars &gap, double timestep, double tolerance, const std::string &solver_name,
                    long max_iterations, const std::optional<Scalars> &impulse)
 {
-  if (!(tolerance > 0.0)) throw nb::value_error("tolerance must be greater than 0");
+  if (!(tolerance > 0.0) || std::isinf(tolerance))
+    throw nb::value_error("tolerance must be finite and greater than 0");
+  if (max_iterations < 0) throw nb::value_error("max_iterations must not be negative");
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
   inelastic::ContactProblem problem = make_problem(predicted_velocity, inverse_mass, first, second,

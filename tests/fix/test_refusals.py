@@ -57,7 +57,6 @@ def test_the_scene_itself_runs(tmp_path: Path, lmp: Runner) -> None:
         ("fix contact all inelastic 1e-5 region", ["region"]),
         ("fix contact all inelastic 1e-5 region nowhere", ["region", "nowhere", "not exist"]),
         ("fix contact all inelastic 1e-5 region container nowhere", ["nowhere", "not exist"]),
-        ("fix contact all inelastic 1e-5 region container region container", ["container"]),
         ("fix contact all inelastic 1e-5 solver newton", ["newton", "apgd", "uzawa"]),
         ("fix contact all inelastic 1e-5 solver", ["solver"]),
         ("fix contact all inelastic 1e-5 maxiter 0", ["maxiter", "0"]),
@@ -217,7 +216,7 @@ def test_too_few_iterations(ranks: int, tmp_path: Path, refused: Refused, lmp: R
     result = lmp(text + "run 100\n", ranks=ranks)
     over = (result.thermo["f_contact[2]"] > EPS) | (result.thermo["f_contact[3]"] > EPS)
     assert over.sum() > 5
-    said = [warning for warning in result.warnings if "3 iterations" in warning]
+    said = [warning for warning in result.warnings if "iterations left" in warning]
     # Each time, once.
     assert len(said) == over.sum()
     assert f"{over.sum()} projections did not reach the tolerance" in result.screen
