@@ -31,10 +31,10 @@ struct ProjectionResult {
   bool complete = false;     // the last round left nothing to add or change
   long iterations = 0;       // over all rounds
   int rounds = 0;
-  Residual residual;         // of the last round
+  Residual residual;         // over all constraints that came to light
 };
 
-// On return `velocity` (3 per particle, copies included) holds the projection of
+// Solves at least once. On return `velocity` (3 per particle, copies included) holds the projection of
 // problem.predicted_velocity and problem.contacts.impulse the impulses. When the result is not
 // complete, `velocity` knows nothing of the constraints that were added last.
 ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,

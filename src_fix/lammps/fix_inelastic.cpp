@@ -351,7 +351,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (record_every_ > 0 && kick_steps == 1.0 && update->ntimestep % record_every_ == 0)
       record_problem(result);
     if (bad_overlap_) push_apart(result);
-    if (!result.converged) unconverged(result);
+    if (!result.converged || !result.complete) unconverged(result);
     if (!list_reaches(velocity_)) {
       if (!shorten_) {
         const double needed = spread_at_start_ + problem_.timestep * spread(velocity_.data());
@@ -683,10 +683,12 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
   }
   const std::vector<double> kept = velocity_;
   const inelastic::ProjectionResult pushed =
-      inelastic::project(problem_, *this, *solver_, {tolerance_, max_iterations_}, MAX_ROUNDS, *this,
-                         velocity_);
+      inelastic::project(problem_, *this, *solver_,
+                         {tolerance_, std::max(0L, max_iterations_ - result.iterations)}, MAX_ROUNDS,
+                         *this, velocity_);
   result.iterations += pushed.iterations;
   result.converged = result.converged && pushed.converged;
+  result.complete = result.complete && pushed.complete;
   result.residual.feasibility = std::max(result.residual.feasibility, pushed.residual.feasibility);
   result.residual.complementarity =
       std::max(result.residual.complementarity, pushed.residual.complementarity);

@@ -531,7 +531,7 @@ void test_round_limit()
 {
   SerialHost host;
   const auto solver = make_solver("apgd");
-  for (const int limit : {0, 1, 3}) {
+  for (const int limit : {1, 3}) {
     ContactProblem problem = make_column(6, false);
     HiddenContacts source(make_column(6, true));
     std::vector<double> velocity;
@@ -539,7 +539,8 @@ void test_round_limit()
         project(problem, source, *solver, {TOLERANCE, 100000}, limit, host, velocity);
     CHECK_EQUAL(result.rounds, limit);
     CHECK(!result.complete);
-    CHECK_EQUAL(result.converged, limit > 0);
+    CHECK(result.converged);
+    CHECK_ABOVE(result.residual.feasibility, TOLERANCE);    // of what was found and not solved
     CHECK_EQUAL(velocity.size(), std::size_t{18});
   }
 }

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
 from lammps_run import Run, Runner, run_lmp
 
 

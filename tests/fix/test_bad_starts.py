@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from lammps_run import Runner
 from scenes import (
     DUMP_PARTICLES,
@@ -29,8 +30,9 @@ LARGEST_PUSH = 0.05 * 2 * RADIUS  # per step, of the sum of radii: the fix's doc
 def test_two_spheres(overlap: float, tmp_path: Path, lmp: Runner) -> None:
     direction = np.array([2, -1, 2]) / 3
     half = RADIUS * (1 - overlap / 2) * direction
+    middle = np.array([0.5, 2, 0.5])
     deck = scene(
-        [[0.5, 2, 0.5] - half, [0.5, 2, 0.5] + half],
+        [middle - half, middle + half],
         RADIUS,
         tmp_path,
         tolerance=EPS,
@@ -44,7 +46,7 @@ def test_two_spheres(overlap: float, tmp_path: Path, lmp: Runner) -> None:
     assert max(-np.diff(depth)) <= LARGEST_PUSH + 2 * EPS
     assert depth[-1] <= EPS * SLACK
     # The centre of mass stays, and so do both spheres in the end: to the tolerance over h.
-    assert frames[-1].positions.mean(axis=0) == pytest.approx([0.5, 2, 0.5], abs=1e-14)
+    assert frames[-1].positions.mean(axis=0) == pytest.approx(middle, abs=1e-14)
     assert np.abs(frames[-1].velocities).max() <= 2 * EPS / STEP
 
 

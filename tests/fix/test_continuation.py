@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from lammps_inelastic import core
 from lammps_run import Runner, run_lmp
 from scenes import (
@@ -172,9 +173,7 @@ def test_against_a_few_lines_of_numpy(
     random = np.random.default_rng(10)
     radii = random.uniform(0.05, 0.075, len(points))
     velocities = random.normal(0, 0.5, points.shape)
-    deck = scene(
-        points, radii, tmp_path, tolerance=EXACT, velocities=velocities, box=BOX, skin=0.1
-    )
+    deck = scene(points, radii, tmp_path, tolerance=EXACT, velocities=velocities, box=BOX, skin=0.1)
     deck += DUMP_PARTICLES
     for count, step in runs:
         deck += f"timestep {step}\nrun {count}\n"
@@ -190,9 +189,7 @@ def test_against_a_few_lines_of_numpy(
 
 def test_a_new_timestep_without_set_up_is_no_silent_mistake(tmp_path: Path, lmp: Runner) -> None:
     deck = cloud(tmp_path, tolerance=1e-5)
-    result = lmp(
-        deck + DUMP_PARTICLES + "run 10\ntimestep 0.01\nrun 10 pre no\n", must_pass=False
-    )
+    result = lmp(deck + DUMP_PARTICLES + "run 10\ntimestep 0.01\nrun 10 pre no\n", must_pass=False)
     # LAMMPS's manual tells users not to do this. If it works, then with the new step.
     if result.status == 0:
         frames = read_dump(tmp_path / "particles.dump")

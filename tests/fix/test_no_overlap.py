@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from lammps_inelastic.analysis import largest_pair_overlap
 from lammps_run import Run, Runner
 from scenes import (
@@ -216,23 +218,35 @@ def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runn
     )
 
 
-def test_edges_inside_a_union_are_warned_of_and_give_no_energy(tmp_path: Path, lmp: Runner) -> None:
-    """LAMMPS shows a cone's wall only to centres inside the cone: no fix can see it from above."""
+@pytest.mark.parametrize("axis", ["y", "z"])
+def test_edges_inside_a_union_are_warned_of_and_give_no_energy(
+    axis: str, tmp_path: Path, lmp: Runner
+) -> None:
+    """LAMMPS shows a cone's wall only to centres inside the cone: no fix can see it from above.
+
+    It may still refuse such a region, but not throw the sphere about.
+    """
+    down = "xyz".index(axis)
     deck = scene(
-        [0.7, 2, 0],
+        np.roll([2, 0, 0.7], down),
         0.2,
         tmp_path,
         tolerance=EPS,
-        box=((-1, 1), (0, 4), (-1, 1)),
-        setup="region upper cylinder y 0 0 1 1 4\nregion lower cone y 0 0 0.3 1 0.3 1\n"
-        "region hopper union 2 upper lower",
+        gravity=False,
+        box=((-1, 4),) * 3,
+        fixes="fix pull all gravity 9.81 vector {} {} {}".format(*(-np.eye(3)[down])),
+        setup=f"region upper cylinder {axis} 0 0 1 1 4\n"
+        f"region lower cone {axis} 0 0 0.3 1 0.3 1\nregion hopper union 2 upper lower",
         options="region hopper",
     )
-    result = lmp(deck + DUMP_PARTICLES + "run 400\n")
+    result = lmp(deck + DUMP_PARTICLES + "run 400\n", must_pass=False)
+    if result.status != 0:
+        assert "union" in result.errors[0], result.errors
+        return
     assert any("re-entrant" in warning for warning in result.warnings)
     frames = read_dump(tmp_path / "particles.dump")
     energy = [
-        0.5 * (frame.velocities**2).sum() + GRAVITY * frame.positions[0, 1] for frame in frames
+        0.5 * (frame.velocities**2).sum() + GRAVITY * frame.positions[0, down] for frame in frames
     ]
     # Per mass. A push out of an overlap lifts the sphere by at most its depth, below its radius.
     assert max(energy) <= energy[0] + GRAVITY * 0.2
@@ -275,6 +289,33 @@ def test_flat_faces_hold_a_sphere(
     contact = read_dump(tmp_path / "contacts.dump")[-1]
     assert contact["id2"].tolist() == [-wall]
     assert contact.vectors("nx ny nz")[0] == pytest.approx(-pull, abs=1e-15)  # round-off
+
+
+@pytest.mark.parametrize(("region", "wall", "axis", "sign", "distance"), FACES)
+def test_faces_of_a_turned_region(
+    region: str, wall: int, axis: int, sign: int, distance: float, tmp_path: Path, lmp: Runner
+) -> None:
+    about = np.array([1, 2, -1]) / np.sqrt(6)
+    turn = Rotation.from_rotvec(0.7 * about)
+    pull = turn.apply(sign * np.eye(3)[axis])
+    start = 0.2 * pull
+    deck = scene(
+        start,
+        0.1,
+        tmp_path,
+        tolerance=EPS,
+        gravity=False,
+        box=((-1, 1),) * 3,
+        fixes="fix pull all gravity 9.81 vector {:.17g} {:.17g} {:.17g}".format(*pull),
+        setup=f"variable turn equal 0.7\nregion tub {region} rotate v_turn 0 0 0 1 2 -1",
+        options="region tub",
+    )
+    lmp(deck + DUMP_PARTICLES + DUMP_CONTACTS + "run 60\n")
+    end = read_dump(tmp_path / "particles.dump")[-1].positions[0]
+    assert end == pytest.approx(pull * (distance - 0.1), abs=2 * EPS * SLACK)
+    contact = read_dump(tmp_path / "contacts.dump")[-1]
+    assert contact["id2"].tolist() == [-wall]
+    assert contact.vectors("nx ny nz")[0] == pytest.approx(-pull, abs=1e-9)  # off-axis look
 
 
 def test_a_sphere_on_the_axis_of_a_cone_sees_its_side(tmp_path: Path, lmp: Runner) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from lammps_inelastic import core
 from lammps_run import Runner
 from scenes import FloatArray, mass, read_dump, scene
@@ -46,9 +47,7 @@ def expected(amplitude: float, seed: int, steps: range) -> FloatArray:
     return amplitude * mass(RADII)[:, None] * np.array(uniform)
 
 
-def test_force_is_amplitude_times_mass_times_the_cores_numbers(
-    tmp_path: Path, lmp: Runner
-) -> None:
+def test_force_is_amplitude_times_mass_times_the_cores_numbers(tmp_path: Path, lmp: Runner) -> None:
     lmp(deck(tmp_path, "fix shake all random/force 2.5 987654321") + DUMP + "run 3\n")
     # Equal but for the order of two multiplications.
     assert forces(tmp_path) == pytest.approx(expected(2.5, 987654321, range(4)), rel=1e-14)

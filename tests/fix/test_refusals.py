@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from lammps_run import Runner
 from scenes import (
     DUMP_PARTICLES,

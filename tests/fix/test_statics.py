@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lammps_run import Runner
+
 from lammps_inelastic.analysis import iterate_contact_frames
+from lammps_run import Runner
 from scenes import (
     DEFAULT_BOX,
     DUMP_CONTACTS,
