@@ -12,9 +12,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from pouring import projections, read_record, recording, records, run_deck, spheres_deck
-
 from lammps_inelastic import core
+from pouring import projections, read_record, recording, records, run_deck, spheres_deck
 
 FEWEST_ACTIVE = 100  # smaller problems say little about a solver
 
@@ -40,7 +39,8 @@ def sedimentation() -> None:
     iterations = sum(run.iterations for run in runs)
     seconds = sum(run.seconds for run in runs)
     print(
-        f"10,000 spheres, 500 steps of 0.005 at 0.0005 r: {iterations} iterations, {seconds:.1f} s, "
+        "10,000 spheres, 500 steps of 0.005 at 0.0005 r: "
+        f"{iterations} iterations, {seconds:.1f} s, "
         f"{1e3 * seconds / iterations:.3f} ms an iteration all told",
         flush=True,
     )
@@ -88,10 +88,10 @@ def solvers(every: int) -> None:
             )
     quartiles = statistics.quantiles(ratios, n=4)
     print(
-        f"1,000 spheres, {len(ratios)} recorded problems with more than {FEWEST_ACTIVE} contacts: Uzawa "
-        f"needs {quartiles[1]:.1f} times the iterations of apgd (median; quartiles "
-        f"{quartiles[0]:.1f}, {quartiles[2]:.1f}); its time, both from zero, is "
-        f"{statistics.median(time_ratios):.1f} times as long"
+        f"1,000 spheres, {len(ratios)} recorded problems with more than {FEWEST_ACTIVE} contacts: "
+        f"Uzawa needs {quartiles[1]:.1f} times the iterations of apgd (median; quartiles "
+        f"{quartiles[0]:.1f} and {quartiles[2]:.1f}) and, both from zero, "
+        f"{statistics.median(time_ratios):.1f} times its time"
     )
 
 

@@ -1,4 +1,4 @@
-"""Runs inputs/spheres.in for the benchmark, the validation tests and the tables of the documentation."""
+"""Runs inputs/spheres.in for the benchmark, the validation tests and the tables."""
 
 from __future__ import annotations
 

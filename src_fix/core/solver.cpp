@@ -106,7 +106,7 @@ AcceleratedProjectedGradient::compare(std::size_t count) const
     least = gap_next[c] < least ? gap_next[c] : least;
     most = under_force > most ? under_force : most;
   }
-  return {curved, {-least, most}};
+  return {curved, {std::max(0.0, -least), most}};
 }
 
 SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const SolverLimits &limits,

@@ -77,7 +77,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0),  
     list_(nullptr), margin_(-1.0), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr),
     largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
-    spread_at_start_(0.0), regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
+    spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
     wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
     run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0), run_shortened_(0),
     exchanged_(nullptr), memory_exchange_size_(0)
@@ -222,6 +222,7 @@ void FixInelastic::init()
     error->all(FLERR, "Fix inelastic does not work with minimize: unfix it first");
 
   walls_->init();
+  walls_->warn();
   wall_force_.assign(3 * static_cast<std::size_t>(walls_->number_of_walls()), 0.0);
   wall_force_total_ = wall_force_;
   wall_force_step_ = -1;
@@ -336,7 +337,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
     spread_at_start_ = spread_since_build(nullptr);
     // The prediction moves nearly as far as the projection will: where the list cannot reach that far
     // there is no use in solving first.
-    if (shorten_ && !list_reaches(problem_.predicted_velocity)) {
+    if (shorten_ && spread_at_start_ < list_reach_ && !list_reaches(problem_.predicted_velocity)) {
       shorten_step(room_in_list(problem_.predicted_velocity));
       continue;
     }
@@ -353,7 +354,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (bad_overlap_) push_apart(result);
     if (!result.converged || !result.complete) unconverged(result);
     if (!list_reaches(velocity_)) {
-      if (!shorten_) {
+      if (!shorten_ || spread_at_start_ >= list_reach_) {
         const double needed = spread_at_start_ + problem_.timestep * spread(velocity_.data());
         error->all(FLERR,
                    "Fix inelastic: step {}: spheres move by up to {:.6g} relative to one another, further "
@@ -376,7 +377,8 @@ void FixInelastic::advance(int vflag, double kick_steps)
   // Rebuild before the list could fall short, with room for the next step to be half as fast again.
   const double next_start = spread_since_build(velocity_.data());
   const double motion = problem_.timestep * spread(velocity_.data());
-  next_reneighbor = next_start + 1.5 * motion > list_reach_ ? update->ntimestep + 1 : -1;
+  const bool short_of_reach = next_start + 1.5 * motion > list_reach_ || growth_ > 0.0;
+  next_reneighbor = short_of_reach ? update->ntimestep + 1 : -1;
 
   // More pairs at once when the last projection had to come back for some, fewer otherwise.
   margin_ *= result.rounds > 1 ? 1.1 : 0.95;
@@ -814,11 +816,11 @@ double FixInelastic::spread_since_build(const double *velocity)
     for (int d = 0; d < 3; ++d)
       displacement_[3 * i + d] = atom->x[i][d] - position_at_build_[3 * i + d] +
           (velocity ? problem_.timestep * velocity[3 * i + d] : 0.0);
-  double growth = 0.0;
+  growth_ = 0.0;
   for (int i = 0; i < atom->nlocal; ++i)
-    growth = std::max(growth, atom->radius[i] - radius_at_build_[i]);
-  reduce(nullptr, 0, &growth, 1);
-  return spread(displacement_.data()) + 2.0 * growth;
+    growth_ = std::max(growth_, atom->radius[i] - radius_at_build_[i]);
+  reduce(nullptr, 0, &growth_, 1);
+  return spread(displacement_.data()) + 2.0 * growth_;
 }
 
 // The timestep command, also where no init() follows (run pre no). The fix's own changes return to
@@ -1138,7 +1140,7 @@ void FixInelastic::fail_together(const std::string &message)
 {
   int speaker = message.empty() ? comm->nprocs : comm->me;
   if (comm->nprocs > 1) {
-    const int mine = speaker;
+    int mine = speaker;
     MPI_Allreduce(&mine, &speaker, 1, MPI_INT, MPI_MIN, world);
   }
   if (speaker == comm->nprocs) return;
@@ -1247,9 +1249,9 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
   fail_together(message);
 }
 
-std::vector<double> FixInelastic::gather(const std::vector<double> &mine) const
+std::vector<double> FixInelastic::gather(std::vector<double> mine) const
 {
-  const int count = static_cast<int>(mine.size());
+  int count = static_cast<int>(mine.size());
   std::vector<int> counts(comm->nprocs), offsets(comm->nprocs, 0);
   MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, world);
   for (int rank = 1; rank < comm->nprocs; ++rank) offsets[rank] = offsets[rank - 1] + counts[rank - 1];

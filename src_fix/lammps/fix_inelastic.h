@@ -109,6 +109,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool one_cutoff_;       // the list is by one cutoff for all pairs, not by their radii
   double list_reach_;     // gap beyond which a pair may be missing from a fresh list
   double spread_at_start_;    // largest relative displacement since the list was built
+  double growth_;             // of a radius since then
   std::vector<double> position_at_build_, radius_at_build_, displacement_;
 
   double regular_timestep_;    // as the deck sets it
@@ -200,7 +201,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void share_virial();
   void unconverged(const inelastic::ProjectionResult &);
   void fail_together(const std::string &message);
-  std::vector<double> gather(const std::vector<double> &mine) const;
+  std::vector<double> gather(std::vector<double> mine) const;
   double mass(int i) const;
 };
 

@@ -54,24 +54,29 @@ void RegionWalls::init()
     const bool convex_obstacle = !region->interior && !region->openflag &&
         strcmp(region->style, "union") != 0 && strcmp(region->style, "intersect") != 0;
     const bool exact = flat || convex_obstacle;
-    if (strcmp(region->style, region->interior ? "union" : "intersect") == 0 && comm->me == 0)
-      error->warning(FLERR,
-                     "Fix inelastic: LAMMPS shows the walls of region {} only to spheres whose centre is in the "
-                     "same part of it: spheres can overlap its re-entrant edges. Where each part can be a "
-                     "container of its own, list the parts instead: region A B",
-                     id);
-    const bool cone = strcmp(region->style, "cone") == 0;
+    if (strcmp(region->style, "ellipsoid") == 0)
+      error->all(FLERR,
+                 "Fix inelastic: region {} is an ellipsoid, whose wall LAMMPS shows too late: use a sphere, a "
+                 "cylinder or a cone",
+                 id);
+    // Cones can also be parts of these.
+    const bool joined = strcmp(region->style, "union") == 0 || strcmp(region->style, "intersect") == 0;
+    const bool cone = joined || strcmp(region->style, "cone") == 0;
     obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, cone});
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
   }
 }
 
-std::string RegionWalls::wall_name(int wall) const
+void RegionWalls::warn() const
 {
-  std::size_t which = 0;
-  while (which + 1 < obstacles_.size() && obstacles_[which + 1].first_wall <= wall) ++which;
-  return "wall " + std::to_string(wall) + " (region " + ids_[which] + ")";
+  for (const Obstacle &obstacle : obstacles_)
+    if (strcmp(obstacle.region->style, obstacle.region->interior ? "union" : "intersect") == 0 &&
+        comm->me == 0)
+      error->warning(FLERR,
+                     "Fix inelastic: LAMMPS shows the walls of region {} only to spheres whose centre is in the "
+                     "same part of it: spheres can overlap the re-entrant edges where parts of this union meet",
+                     obstacle.region->id);
 }
 
 void RegionWalls::view(const std::vector<Look> &looks, bool inexact_only,
@@ -108,25 +113,40 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
   return count > 0 || region->match(x[0], x[1], x[2]) != 0;
 }
 
-// LAMMPS turns the vector to the caps of a cone along y to z (update 4 of 22 Jul 2025). A vector is
-// right if the wall is half as far from half way.
+// LAMMPS points the vector to the caps of a cone along y in the wrong direction (update 4 of 22 Jul
+// 2025), though their distance is right. A vector is right if the wall is half as far from half way;
+// otherwise it is the gradient of the distance, which is linear for a cap.
 void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallView &view) const
 {
-  Region *region = obstacle.region;
-  auto leads_to_wall = [&](const double *normal) {
-    double half_way[3];
-    for (int d = 0; d < 3; ++d) half_way[d] = x[d] - 0.5 * view.distance * normal[d];
-    const int count =
-        region->surface(half_way[0], half_way[1], half_way[2], 2.0 * view.distance);
+  constexpr double PROBE = 1.0e-3;         // of the distance: stays on the same side of the wall
+  constexpr double SAME_DISTANCE = 1.0e-6;    // relative; round-off is far below
+  auto distance_from = [&](const double *point) {
+    Region *region = obstacle.region;
+    const int count = region->surface(point[0], point[1], point[2], 2.0 * view.distance);
     for (int k = 0; k < count; ++k)
-      if (obstacle.first_wall + region->contact[k].iwall == view.wall &&
-          std::abs(region->contact[k].r - 0.5 * view.distance) < 1.0e-6 * view.distance)
-        return true;
-    return false;
+      if (obstacle.first_wall + region->contact[k].iwall == view.wall) return region->contact[k].r;
+    return -1.0;
   };
-  if (leads_to_wall(view.normal)) return;
-  const double turned[3] = {view.normal[0], view.normal[2], view.normal[1]};
-  if (leads_to_wall(turned)) std::copy_n(turned, 3, view.normal);
+  double half_way[3];
+  for (int d = 0; d < 3; ++d) half_way[d] = x[d] - 0.5 * view.distance * view.normal[d];
+  if (std::abs(distance_from(half_way) - 0.5 * view.distance) < SAME_DISTANCE * view.distance) return;
+
+  double gradient[3];
+  double length_squared = 0.0;
+  for (int d = 0; d < 3; ++d) {
+    double step = PROBE * view.distance;
+    double point[3] = {x[0], x[1], x[2]};
+    point[d] += step;
+    double there = distance_from(point);
+    if (there < 0.0) {    // beyond another wall, from where this one is not seen
+      step = -step;
+      point[d] = x[d] + step;
+      there = distance_from(point);
+    }
+    gradient[d] = (there - view.distance) / step;
+    length_squared += gradient[d] * gradient[d];
+  }
+  for (int d = 0; d < 3; ++d) view.normal[d] = gradient[d] / std::sqrt(length_squared);
 }
 
 void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Look> &looks,

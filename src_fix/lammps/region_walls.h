@@ -26,13 +26,14 @@ class RegionWalls : protected Pointers {
  public:
   RegionWalls(class LAMMPS *lmp, std::vector<std::string> region_ids);
 
-  // Finds the regions and numbers their walls. Errors: a region that does not exist.
+  // Finds the regions and numbers their walls. Errors: a region that does not exist, an ellipsoid.
   void init();
 
   bool empty() const { return ids_.empty(); }
   int number_of_walls() const { return number_of_walls_; }
-  // 1 for the first region's first wall and so on; for messages.
-  std::string wall_name(int wall) const;
+
+  // Warns of regions that LAMMPS cannot show in full.
+  void warn() const;
 
   // All walls flat (or convex obstacles): the linearised constraint is exact or on the safe side, and
   // no look at the end of the step is needed.

@@ -4,8 +4,8 @@ n particles, m contacts. ``first`` and ``second`` are int64 arrays (m,) of parti
 = -1 for a wall; ``normal`` (m, 3) are unit vectors from second to first; ``gap`` (m,) [length] is
 negative for an overlap. ``inverse_mass`` (n,) [1 / mass], zero for a frozen particle. Arrays are
 float64 and C-contiguous. TypeError for arrays of another dimension; ValueError for wrong lengths,
-indices out of range, numbers that are not finite, negative masses, normals that have not length 1, a
-contact of a particle with itself and contacts between two particles that cannot move.
+indices out of range, numbers that are not finite, negative masses, normals that have not length 1,
+a contact of a particle with itself and contacts between two particles that cannot move.
 """
 
 import numpy as np

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_problems import UP, WALL, assert_within, column, problem, residual_left, row
 from scipy.optimize import isotonic_regression
+
+from contact_problems import UP, WALL, assert_within, column, problem, residual_left, row
 
 # [diameters] 1e-9 of one step's motion, far above the rounding of gaps near 0.01.
 TOLERANCE = 1e-11

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_problems import WALL, Problem, assert_within, cubic_crystal, dense_crystal, heap
 
+from contact_problems import WALL, Problem, assert_within, cubic_crystal, dense_crystal, heap
 from lammps_inelastic import core
 
 # [diameters] One step's motion is 0.01.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import clarabel
 import numpy as np
 import pytest
+from scipy import sparse
+
 from contact_problems import (
     Problem,
     assert_within,
@@ -15,8 +17,6 @@ from contact_problems import (
     problem,
     row,
 )
-from scipy import sparse
-
 from lammps_inelastic import core
 
 # [diameters] A ten-thousand-millionth of one step's motion, not far above what float64 resolves.

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from lammps_inelastic.analysis import largest_pair_overlap
 from lammps_run import Run, Runner
 from scenes import (
-    DEFAULT_BOX,
     DUMP_CONTACTS,
     DUMP_PARTICLES,
     GRAVITY,
@@ -184,7 +183,7 @@ CONTAINERS = {
 
 
 @pytest.mark.parametrize("name", CONTAINERS)
-@pytest.mark.parametrize("speed", [0, 20])
+@pytest.mark.parametrize("speed", [0, 20, 80])
 def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
     regions, names, depth = CONTAINERS[name]
     random = np.random.default_rng(7)
@@ -202,7 +201,7 @@ def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runn
         tolerance=EPS,
         box=((-1, 1), (-1, 3), (-1, 1)),
         velocities=random.normal(0, speed, points.shape),
-        skin=0.1 if speed == 0 else 0.6,
+        skin={0: 0.1, 20: 0.6, 80: 3}[speed],
         options=f"region {names} shorten yes",
         fixes="fix drag all viscous 0.001",
     )
@@ -468,7 +467,139 @@ def test_a_moving_wall_while_steps_are_shortened(tmp_path: Path, lmp: Runner) ->
         assert deepest_pair(frame.positions, frame["radius"]) <= EPS * SLACK
 
 
-def test_the_box_of_the_tests_is_the_usual_one() -> None:
-    assert deepest_in_box(np.array([[0.05, 2.5, 0.5]]), np.array([0.1]), DEFAULT_BOX) == (
-        pytest.approx(0.05)
+def off_ball(positions: FloatArray, radii: FloatArray, time: float) -> float:
+    """Depth in a ball of radius 0.3 about (0.5, 0.5, 0.5)."""
+    return float(np.max(radii + 0.3 - np.linalg.norm(positions - 0.5, axis=1)))
+
+
+def distance_to_brick(positions: FloatArray, low: object, high: object) -> FloatArray:
+    """Distance of points to a block with edges along the axes (a face, where it has no depth)."""
+    outside = np.maximum(0, np.maximum(np.array(low) - positions, positions - np.array(high)))
+    return np.linalg.norm(outside, axis=1)
+
+
+def off_brick(positions: FloatArray, radii: FloatArray, time: float) -> float:
+    """Depth in the block [0.3, 0.7] x [0.2, 0.6] x [0.3, 0.7]: its edges are seen as well."""
+    return float(np.max(radii - distance_to_brick(positions, (0.3, 0.2, 0.3), (0.7, 0.6, 0.7))))
+
+
+def off_plate(positions: FloatArray, radii: FloatArray, time: float) -> float:
+    """Depth in a plate that is thinner than a step is long."""
+    return float(np.max(radii + 0.005 - np.abs(positions[:, 1] - 0.595)))
+
+
+OBSTACLES = {
+    "ball": ("sphere 0.5 0.5 0.5 0.3", off_ball),
+    "brick": ("block 0.3 0.7 0.2 0.6 0.3 0.7", off_brick),
+    "plate": ("block -1 2 0.59 0.6 -1 2", off_plate),
+}
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+@pytest.mark.parametrize("speed", [0, 60])
+def test_convex_obstacles(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
+    region, depth = OBSTACLES[name]
+    deck = scene(
+        random_points(120, ((0.06, 0.94), (1, 4), (0.06, 0.94)), 2 * RADIUS, seed=1),
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        velocities=[0, -speed, 0],
+        skin=0.8 if speed else 0.11,
+        setup=f"region obstacle {region} side out",
+        options="region container obstacle",
     )
+    result = lmp(deck + DUMP_PARTICLES + "run 180\n")
+    of_pairs, of_obstacle = largest_overlap(tmp_path, depth)
+    _, of_walls = largest_overlap(tmp_path, in_box)
+    assert max(of_pairs, of_obstacle, of_walls) <= EPS * SLACK
+    assert result.thermo["f_contact[6]"][-1] > 50
+
+
+def test_an_open_box_with_rims(tmp_path: Path, lmp: Runner) -> None:
+    """Spheres fall into a box without a lid, on its rims and past it."""
+    faces = [
+        ((0, 0, 0), (1, 0, 1)),
+        ((0, 0, 0), (0, 1, 1)),
+        ((1, 0, 0), (1, 1, 1)),
+        ((0, 0, 0), (1, 1, 0)),
+        ((0, 0, 1), (1, 1, 1)),
+    ]
+
+    def depth(positions: FloatArray, radii: FloatArray, time: float) -> float:
+        return max(float(np.max(radii - distance_to_brick(positions, *face))) for face in faces)
+
+    deck = scene(
+        random_points(150, ((-0.3, 1.3), (1.1, 4), (-0.3, 1.3)), 0.111, seed=1),
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        box=((-4, 5), (-19, 8), (-4, 5)),
+        skin=0.11,
+        setup="region tub block 0 1 0 1 0 1 open 4",
+        options="region tub",
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 200\n")
+    of_pairs, of_walls = largest_overlap(tmp_path, depth)
+    assert of_pairs <= EPS * SLACK
+    assert of_walls <= 2 * EPS * SLACK
+    assert result.thermo["f_contact[6]"].max() > 40
+
+
+@pytest.mark.parametrize("rebuild", ["every 100000 delay 100000 check no", "once yes"])
+def test_lists_are_rebuilt_in_time_whatever_the_deck_says(
+    rebuild: str, tmp_path: Path, lmp: Runner
+) -> None:
+    deck = scene(
+        random_points(150, CENTRES, 2 * RADIUS, seed=1),
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        skin=0.11,
+    ).replace("neigh_modify delay 0 every 1 check yes", f"neigh_modify {rebuild}")
+    lmp(deck + DUMP_PARTICLES + "run 200\n")
+    assert max(largest_overlap(tmp_path, in_box)) <= EPS * SLACK
+
+
+def test_discs_in_two_dimensions(tmp_path: Path, lmp: Runner) -> None:
+    points = random_points(40, ((0.06, 0.94), (0.06, 3), (0, 1e-9)), 2 * RADIUS, seed=1)
+    points[:, 2] = 0
+    deck = scene(
+        points,
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        boundary="f f p",
+        box=((0, 1), (0, 4), (-0.5, 0.5)),
+        setup="dimension 2\nregion frame block 0 1 0 4 -9 9",
+        options="region frame",
+        fixes="fix flat all enforce2d",
+        skin=0.1,
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 200\n")
+    of_pairs, of_walls = largest_overlap(
+        tmp_path, lambda x, r, t: deepest_in_box(x, r, ((0, 1), (0, 4), (-9, 9)))
+    )
+    assert max(of_pairs, of_walls) <= EPS * SLACK
+    assert not read_dump(tmp_path / "particles.dump")[-1]["z"].any()
+    assert result.thermo["f_contact[5]"][-1] > 40
+
+
+def test_a_frozen_sphere_that_moves_pushes(tmp_path: Path, lmp: Runner) -> None:
+    deck = scene(
+        [[0.2, 0.5, 0.5], [0.4, 0.5, 0.5]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        gravity=False,
+        velocities=[[0.5, 0, 0], [0, 0, 0]],
+        options="region container frozen pusher",
+        motion="group pusher id 1\ngroup free id 2\nfix push pusher move linear 0.5 0 0\n"
+        "fix motion free nve",
+    )
+    lmp(deck + DUMP_PARTICLES + "run 140\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    assert max(deepest_pair(f.positions, f["radius"]) for f in frames) <= EPS * SLACK
+    assert frames[-1].positions[0] == pytest.approx([0.55, 0.5, 0.5], abs=1e-12)  # round-off
+    # Pushed with the pusher's speed: to the tolerance over the step.
+    assert frames[-1].velocities[1] == pytest.approx([0.5, 0, 0], abs=2 * EPS / 0.005)
