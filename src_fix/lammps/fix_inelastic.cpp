@@ -627,46 +627,78 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
   ++relinearisations_;
   long changed = 0;
   output_[EXCESS] = 0.0;
-  std::vector<RegionWalls::Look> to_look = looks(velocity.data(), true, 0.0);
-  while (!to_look.empty()) {
-    std::vector<RegionWalls::Look> again;
+  auto add_plane = [&](const RegionWalls::Look &look, const WallView &view) {
+    if (relinearisations_ > MAX_RELINEARISATIONS) return;
+    const int i = look.atom;
+    const auto existing = wall_constraint_.find(wall_key(i, view.wall));
+    const bool known = existing != wall_constraint_.end();
+    if (known && is_bad(origin_[existing->second].gap_now)) return;
+    ++changed;
+    const double gap_there = view.distance - atom->radius[i];
+    const double from_here[3] = {look.where[0] - atom->x[i][0], look.where[1] - atom->x[i][1],
+                                 look.where[2] - atom->x[i][2]};
+    const double gap_here = gap_there - dot(view.normal, from_here);
+    const double motion = view.distance_now - view.distance;
+    const double gap_now = known ? origin_[existing->second].gap_now : gap_here + motion;
+    // A region can show a wall late: from inside one part of a union the others are not seen.
+    note_overlap(gap_now);
+    const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - motion : gap_here;
+    wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
+    problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
+    origin_.push_back({view.wall, gap_now, atom->radius[i], motion});
+  };
+
+  const std::vector<RegionWalls::Look> ends = looks(velocity.data(), true, 0.0);
+  std::vector<RegionWalls::Look> beyond;
+  walls_->view(
+      ends, true,
+      [&](const RegionWalls::Look &look, const WallView &view) {
+        const double overlap = atom->radius[look.atom] - view.distance;
+        output_[EXCESS] = std::max(output_[EXCESS], overlap - 2.0 * tolerance_);
+        if (overlap > RELINEARISE_BEYOND * tolerance_) add_plane(look, view);
+      },
+      [&](const RegionWalls::Look &look, const std::string &) { beyond.push_back(look); });
+
+  double number_beyond = static_cast<double>(beyond.size());
+  reduce(&number_beyond, 1, nullptr, 0);
+  if (number_beyond > 0.0) {
+    for (const RegionWalls::Look &look : beyond)
+      output_[EXCESS] = std::max(output_[EXCESS], atom->radius[look.atom]);
     walls_->view(
-        to_look, true,
-        [&](const RegionWalls::Look &look, const WallView &view) {
-          const int i = look.atom;
-          const auto existing = wall_constraint_.find(wall_key(i, view.wall));
-          const bool known = existing != wall_constraint_.end();
-          if (known && is_bad(origin_[existing->second].gap_now)) return;
-          const double gap_there = view.distance - atom->radius[i];
-          output_[EXCESS] = std::max(output_[EXCESS], -gap_there - 2.0 * tolerance_);
-          if (gap_there >= -RELINEARISE_BEYOND * tolerance_) return;
-          if (relinearisations_ > MAX_RELINEARISATIONS) return;
-          ++changed;
-          const double from_here[3] = {look.where[0] - atom->x[i][0], look.where[1] - atom->x[i][1],
-                                       look.where[2] - atom->x[i][2]};
-          const double gap_here = gap_there - dot(view.normal, from_here);
-          const double motion = view.distance_now - view.distance;
-          const double gap_now = known ? origin_[existing->second].gap_now : gap_here + motion;
-          // A region can show a wall late: from inside one part of a union the others are not seen.
-          note_overlap(gap_now);
-          const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - motion : gap_here;
-          wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
-          problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
-          origin_.push_back({view.wall, gap_now, atom->radius[i], motion});
-        },
-        [&](const RegionWalls::Look &look, const std::string &) {
-          // Beyond the wall nothing is seen: look from half way, where the plane is a safe one too.
-          RegionWalls::Look nearer = look;
-          for (int d = 0; d < 3; ++d)
-            nearer.where[d] = 0.5 * (look.where[d] + atom->x[look.atom][d]);
-          again.push_back(nearer);
-        });
-    to_look.swap(again);
+        last_inside(beyond), true,
+        [&](const RegionWalls::Look &look, const WallView &view) { add_plane(look, view); },
+        [](const RegionWalls::Look &, const std::string &) {});
   }
   double excess = output_[EXCESS];
   reduce(nullptr, 0, &excess, 1);
   output_[EXCESS] = excess;
   return changed;
+}
+
+// From beyond a wall nothing is seen: how far along the step each of these centres is still inside.
+// Collective.
+std::vector<RegionWalls::Look> FixInelastic::last_inside(const std::vector<RegionWalls::Look> &beyond)
+{
+  constexpr int BISECTIONS = 12;
+  std::vector<double> inside(beyond.size(), 0.0), outside(beyond.size(), 1.0);    // parts of the step
+  auto looks_at = [&](const std::vector<double> &part) {
+    std::vector<RegionWalls::Look> looks = beyond;
+    for (std::size_t k = 0; k < beyond.size(); ++k)
+      for (int d = 0; d < 3; ++d)
+        looks[k].where[d] += (part[k] - 1.0) * (beyond[k].where[d] - atom->x[beyond[k].atom][d]);
+    return looks;
+  };
+  for (int step = 0; step < BISECTIONS; ++step) {
+    std::vector<double> middle(beyond.size());
+    for (std::size_t k = 0; k < beyond.size(); ++k) middle[k] = 0.5 * (inside[k] + outside[k]);
+    const std::vector<RegionWalls::Look> looks = looks_at(middle);
+    std::vector<char> out(beyond.size(), 0);
+    walls_->view(
+        looks, true, [](const RegionWalls::Look &, const WallView &) {},
+        [&](const RegionWalls::Look &look, const std::string &) { out[&look - looks.data()] = 1; });
+    for (std::size_t k = 0; k < beyond.size(); ++k) (out[k] ? outside : inside)[k] = middle[k];
+  }
+  return looks_at(inside);
 }
 
 // Beyond the regular overlaps: the smallest motion, added to the step's but not kept as momentum,

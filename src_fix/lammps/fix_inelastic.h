@@ -180,6 +180,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   long add_violated_pairs(const std::vector<double> &velocity);
   long add_violated_walls(const std::vector<double> &velocity);
   long relinearise_walls(const std::vector<double> &velocity);
+  std::vector<RegionWalls::Look> last_inside(const std::vector<RegionWalls::Look> &beyond);
   std::vector<RegionWalls::Look> looks(const double *velocity, bool at_end, double beyond) const;
   double effective_gap(double gap_now, double size) const;
   bool is_bad(double gap) const;

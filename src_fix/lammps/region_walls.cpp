@@ -53,7 +53,7 @@ void RegionWalls::init()
     // Motion changes nothing: walls are taken where they stand at the end of the step.
     const bool convex_obstacle = !region->interior && !region->openflag &&
         strcmp(region->style, "union") != 0 && strcmp(region->style, "intersect") != 0;
-    const bool exact = flat || convex_obstacle;
+    const bool exact = (flat && !region->openflag) || convex_obstacle;
     if (strcmp(region->style, "ellipsoid") == 0)
       error->all(FLERR,
                  "Fix inelastic: region {} is an ellipsoid, whose wall LAMMPS shows too late: use a sphere, a "

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lammps_inelastic.analysis import iterate_contact_frames
 from lammps_run import Runner
 from scenes import (
     DUMP_CONTACTS,
@@ -54,7 +55,8 @@ def test_periodic_sides_and_a_floor(ranks: int, newton: str, tmp_path: Path, lmp
         skin=0.1,
         velocities=np.random.default_rng(3).normal(0, 2, (60, 3)),
     )
-    result = lmp(deck + DUMP_PARTICLES + DUMP_FORCES + "run 150\n", ranks=ranks)
+    dumps = DUMP_PARTICLES + DUMP_FORCES + DUMP_CONTACTS
+    result = lmp(deck + dumps + "run 150\n", ranks=ranks)
     for frame in read_dump(tmp_path / "particles.dump"):
         radii = frame["radius"]
         assert deepest_pair(frame.positions, radii, [0.57, 0, 0.57]) <= EPS * SLACK
@@ -68,6 +70,19 @@ def test_periodic_sides_and_a_floor(ranks: int, newton: str, tmp_path: Path, lmp
     # Each contact is counted at both ends.
     counts = [frame["particles"].sum() for frame in read_dump(tmp_path / "forces.dump")]
     assert (np.array(counts) == 2 * result.thermo["f_contact[5]"]).all()
+    # The list holds each contact once (the reader checks that), and the same forces.
+    contacts = list(iterate_contact_frames(tmp_path / "contacts.dump"))
+    assert [len(frame.forces) for frame in contacts] == list(
+        result.thermo["f_contact[5]"] + result.thermo["f_contact[6]"]
+    )
+    force = np.zeros((61, 3))
+    for (first, second), pushed in zip(
+        contacts[-1].ids, contacts[-1].forces[:, None] * contacts[-1].normals, strict=True
+    ):
+        force[first] += pushed
+        force[max(second, 0)] -= pushed  # walls: row 0
+    per_atom = read_dump(tmp_path / "forces.dump")[-1].vectors("fx fy fz")
+    assert per_atom == pytest.approx(force[1:], abs=1e-12 * np.abs(per_atom).max())  # round-off
 
 
 @pytest.mark.parametrize("newton", ["on", "off"])
@@ -183,6 +198,29 @@ def test_balance_after_the_fix_and_before(tmp_path: Path, lmp: Runner) -> None:
         deck += balance if place == "after" else ""
         lmp(deck + DUMP_PARTICLES + "run 80\n", ranks=2, into=place)
         ends.append(read_dump(tmp_path / place / "particles.dump")[-1].positions)
+    assert np.abs(ends[0] - ends[1]).max() <= SAME
+
+
+def test_frozen_spheres_on_two_ranks(tmp_path: Path, lmp: Runner) -> None:
+    ends = []
+    for ranks in (1, 2):
+        folder = tmp_path / str(ranks)
+        points = bed()
+        deck = scene(
+            points,
+            RADIUS,
+            folder,
+            tolerance=EXACT,
+            box=BOX,
+            options="region container frozen still",
+            motion=f"group still id {' '.join(map(str, np.argsort(points[:, 1])[:8] + 1))}\n"
+            "group moving subtract all still\nfix motion moving nve",
+        )
+        lmp(deck + DUMP_PARTICLES + "run 60\n", ranks=ranks, into=str(ranks))
+        frames = read_dump(folder / "particles.dump")
+        still = np.argsort(points[:, 1])[:8]
+        assert (frames[-1].positions[still] == points[still]).all()
+        ends.append(frames[-1].positions)
     assert np.abs(ends[0] - ends[1]).max() <= SAME
 
 
