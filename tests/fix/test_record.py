@@ -200,9 +200,9 @@ def test_an_independent_solver_agrees(tmp_path: Path, lmp: Runner) -> None:
         deck += f"fix_modify contact tolerance {EPS}\nrun {step - 3} upto\n"
         deck += f"fix_modify contact tolerance {tight}\nrun {step} upto\n"
     result = lmp(deck)
-    assert result.runs[1]["KinEng"][-1] > 50 * result.runs[-1]["KinEng"][-1]
+    assert result.runs[1]["KinEng"][-1] > 10 * result.runs[-1]["KinEng"][-1]
     assert result.runs[3]["f_contact[5]"][-1] > 10
-    assert result.runs[-1]["f_contact[5]"][-1] > 200
+    assert result.runs[-1]["f_contact[5]"][-1] > 150
     for name, step in phases.items():
         record = load(tmp_path / f"step{step}.npz")
         assert record["tolerance"] == tight
