@@ -97,7 +97,7 @@ def solvers(every: int) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--every", type=int, default=20, help="record every N steps (default 20)")
+    parser.add_argument("--every", type=int, default=8, help="record every N steps (default 8)")
     arguments = parser.parse_args()
     solvers(arguments.every)
     sedimentation()

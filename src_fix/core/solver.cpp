@@ -114,8 +114,9 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
 {
   // L is let down a little between calls, so that it can follow a packing that becomes less
   // connected, and raised with a margin when a step shows it too small.
-  constexpr double RELAXATION = 0.99;
-  constexpr double MARGIN = 1.02;
+  constexpr double RELAXATION = 0.998;
+  constexpr double MARGIN = 1.05;
+  constexpr double LEAST_SCALE = 0.9, MOST_SCALE = 1.1;
   constexpr double FIRST_CURVATURE = 2.0;    // of a few contacts; a first step far too long costs more
 
   ContactSet &contacts = problem.contacts;
@@ -138,14 +139,36 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
   gap_operator_.apply(problem, impulse_.data(), gap_.data(), host);
   SolverResult result;
   result.residual = residual(gap_.data(), impulse_.data(), count);
+  double along = 0.0, along_free = 0.0;
+  const std::vector<double> &free_gap = gap_operator_.free_gap();
+  for (std::size_t c = 0; c < count; ++c) {
+    along += impulse_[c] * gap_[c];
+    along_free += impulse_[c] * free_gap[c];
+  }
+  double first_sums[2] = {along, along_free};
   double first_maxima[2] = {result.residual.feasibility, result.residual.complementarity};
-  host.reduce(nullptr, 0, first_maxima, 2);
+  host.reduce(first_sums, 2, first_maxima, 2);
   result.residual = {first_maxima[0], first_maxima[1]};
   auto done = [&limits](const Residual &r) {
     return r.feasibility <= limits.tolerance && r.complementarity <= limits.tolerance;
   };
   result.converged = done(result.residual);
-  if (!std::isfinite(result.residual.feasibility)) return result;
+  if (result.converged || !std::isfinite(result.residual.feasibility)) {
+    contacts.impulse = impulse_;
+    return result;
+  }
+
+  // The guess is first made as large as the dual function likes it along its own direction, which
+  // costs no product since w is affine: with b = w(0), the minimum over s of the dual at s lambda is at
+  // s = -lambda.b / lambda.(w - b). Measured to save a tenth of the iterations, within these bounds.
+  const double curved_along = first_sums[0] - first_sums[1];
+  if (curved_along > 0.0) {
+    const double scale = std::clamp(-first_sums[1] / curved_along, LEAST_SCALE, MOST_SCALE);
+    for (std::size_t c = 0; c < count; ++c) {
+      impulse_[c] *= scale;
+      gap_[c] = free_gap[c] + scale * (gap_[c] - free_gap[c]);
+    }
+  }
 
   curvature_ = curvature_ == 0.0 ? FIRST_CURVATURE : std::max(1.0, RELAXATION * curvature_);
   double momentum_time = 1.0;
