@@ -27,13 +27,15 @@ void GapOperator::prepare(const ContactProblem &problem)
     const double *vi = velocity + 3 * static_cast<std::size_t>(contacts.first[c]);
     const double *vj = velocity + 3 * static_cast<std::size_t>(contacts.second[c]);
     free_gap_[c] = contacts.gap[c] +
-        problem.timestep * (n[0] * (vi[0] - vj[0]) + n[1] * (vi[1] - vj[1]) + n[2] * (vi[2] - vj[2]));
+        problem.timestep *
+            (n[0] * (vi[0] - vj[0]) + n[1] * (vi[1] - vj[1]) + n[2] * (vi[2] - vj[2]));
   }
 }
 
-// Contacts come in runs with the same first particle, in the order of the neighbour list. Its sum is
-// kept in registers over a run: through memory each addition would wait for the one before.
-INELASTIC_CLONES void scatter_impulses(const ContactSet &contacts, const double *impulse, double *sum)
+// Contacts come in runs with the same first particle, in the order of the neighbour list. Its sum
+// is kept in registers over a run: through memory each addition would wait for the one before.
+INELASTIC_CLONES void scatter_impulses(const ContactSet &contacts, const double *impulse,
+                                       double *sum)
 {
   const std::size_t count = contacts.size();
   const int *const first = contacts.first.data();
@@ -61,8 +63,8 @@ INELASTIC_CLONES void scatter_impulses(const ContactSet &contacts, const double 
   }
 }
 
-INELASTIC_CLONES void gather_gaps(const ContactSet &contacts, const double *free_gap, double timestep,
-                                  const double *change, double *gap_at_end)
+INELASTIC_CLONES void gather_gaps(const ContactSet &contacts, const double *free_gap,
+                                  double timestep, const double *change, double *gap_at_end)
 {
   const std::size_t count = contacts.size();
   const int *const first = contacts.first.data();

@@ -1,6 +1,7 @@
 // One step's projection problem.
 //
-//   minimise over V:   1/2 (V - V*)^T M (V - V*)      subject to   gap_c + h G_c . V >= 0  for all c
+//   minimise over V:   1/2 (V - V*)^T M (V - V*)      subject to   gap_c + h G_c . V >= 0  for all
+// c
 //
 // V* predicted velocities, M the mass matrix, G_c V = n_c . (v_first - v_second). Its dual has one
 // impulse per constraint:

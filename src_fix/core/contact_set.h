@@ -9,8 +9,8 @@
 //          wall's own motion during the step is already in it, so that a wall has no velocity here.
 //   h      time step
 //
-// Each constraint carries one impulse lambda_c >= 0 [mass length / time]: +lambda n acts on the first
-// particle, -lambda n on the second.
+// Each constraint carries one impulse lambda_c >= 0 [mass length / time]: +lambda n acts on the
+// first particle, -lambda n on the second.
 
 #pragma once
 
@@ -20,8 +20,8 @@
 namespace inelastic {
 
 struct ContactSet {
-  std::vector<int> first;        // particle index
-  std::vector<int> second;       // particle index; number of particles (the dummy particle) = a wall
+  std::vector<int> first;     // particle index
+  std::vector<int> second;    // particle index; number of particles (the dummy particle) = a wall
   std::vector<double> normal;    // 3 per constraint
   std::vector<double> gap;
   std::vector<double> impulse;

@@ -9,12 +9,12 @@ namespace inelastic {
 
 class Host {
  public:
-  // Per-particle vectors (3 doubles each, owned particles first, then copies of particles that other
-  // ranks own): add the copies' values to their owners, then give every copy its owner's sum.
+  // Per-particle vectors (3 doubles each, owned particles first, then copies of particles that
+  // other ranks own): add the copies' values to their owners, then give every copy its owner's sum.
   virtual void sum_over_copies(double *per_particle) = 0;
 
-  // Per-particle vectors: give every copy its owner's value. For those who set up a problem: the copies
-  // need predicted velocities too.
+  // Per-particle vectors: give every copy its owner's value. For those who set up a problem: the
+  // copies need predicted velocities too.
   virtual void share_with_copies(double *per_particle) = 0;
 
   // Global sums and global maxima of a few numbers, in one communication.

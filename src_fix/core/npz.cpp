@@ -9,34 +9,38 @@ namespace inelastic {
 
 namespace {
 
-std::uint32_t crc32(const std::string &bytes)
-{
-  static const std::array<std::uint32_t, 256> table = [] {
-    std::array<std::uint32_t, 256> built{};
-    for (std::uint32_t n = 0; n < 256; ++n) {
-      std::uint32_t value = n;
-      for (int bit = 0; bit < 8; ++bit) value = value & 1 ? 0xEDB88320U ^ (value >> 1) : value >> 1;
-      built[n] = value;
-    }
-    return built;
-  }();
-  std::uint32_t crc = 0xFFFFFFFFU;
-  for (const char byte : bytes) crc = table[(crc ^ static_cast<unsigned char>(byte)) & 0xFF] ^ (crc >> 8);
-  return crc ^ 0xFFFFFFFFU;
-}
+  std::uint32_t crc32(const std::string &bytes)
+  {
+    static const std::array<std::uint32_t, 256> table = [] {
+      std::array<std::uint32_t, 256> built{};
+      for (std::uint32_t n = 0; n < 256; ++n) {
+        std::uint32_t value = n;
+        for (int bit = 0; bit < 8; ++bit)
+          value = value & 1 ? 0xEDB88320U ^ (value >> 1) : value >> 1;
+        built[n] = value;
+      }
+      return built;
+    }();
+    std::uint32_t crc = 0xFFFFFFFFU;
+    for (const char byte : bytes)
+      crc = table[(crc ^ static_cast<unsigned char>(byte)) & 0xFF] ^ (crc >> 8);
+    return crc ^ 0xFFFFFFFFU;
+  }
 
-void append(std::string &out, std::uint32_t value, int bytes)
-{
-  for (int k = 0; k < bytes; ++k) out.push_back(static_cast<char>(value >> (8 * k) & 0xFF));
-}
+  void append(std::string &out, std::uint32_t value, int bytes)
+  {
+    for (int k = 0; k < bytes; ++k) out.push_back(static_cast<char>(value >> (8 * k) & 0xFF));
+  }
 
 }    // namespace
 
 void NpzWriter::add_member(const std::string &name, const std::string &type,
                            const std::string &shape, const void *data, std::size_t bytes)
 {
-  std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + shape + ", }";
-  constexpr std::size_t PREFIX = 10;    // magic, version and header length; the sum is a multiple of 64
+  std::string header =
+      "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + shape + ", }";
+  constexpr std::size_t PREFIX =
+      10;    // magic, version and header length; the sum is a multiple of 64
   header.append(63 - (PREFIX + header.size()) % 64, ' ');
   header.push_back('\n');
   std::string member("\x93NUMPY\x01\x00", 8);
@@ -61,9 +65,7 @@ void NpzWriter::add(const std::string &name, const std::vector<std::int64_t> &va
 }
 
 void NpzWriter::add(const std::string &name, double value)
-{
-  add_member(name, "<f8", "()", &value, sizeof(double));
-}
+{ add_member(name, "<f8", "()", &value, sizeof(double)); }
 
 bool NpzWriter::write(const std::string &path) const
 {
@@ -71,11 +73,11 @@ bool NpzWriter::write(const std::string &path) const
   for (const Member &member : members_) {
     const auto size = static_cast<std::uint32_t>(member.bytes.size());
     const auto offset = static_cast<std::uint32_t>(archive.size());
-    std::string common;    // the fields that the local and the central header share
-    append(common, 20, 2);    // zip 2.0
-    append(common, 0, 2);     // flags
-    append(common, 0, 2);     // stored
-    append(common, 0, 2);     // time and
+    std::string common;         // the fields that the local and the central header share
+    append(common, 20, 2);      // zip 2.0
+    append(common, 0, 2);       // flags
+    append(common, 0, 2);       // stored
+    append(common, 0, 2);       // time and
     append(common, 0x21, 2);    // date: 1 January 1980, so that equal arrays give equal files
     append(common, crc32(member.bytes), 4);
     append(common, size, 4);

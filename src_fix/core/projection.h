@@ -1,10 +1,10 @@
 // The projection of one step onto ALL constraints, with only those that matter in the problem.
 //
-// The set is generated (for the theory see Palmer, Aktulga and Gao, arXiv 2506.14097): solve with the
-// constraints at hand, let the source look at everything that can touch, add what the solution
-// violates, solve again from the impulses reached, until nothing is added. A source may also replace
-// the linearisation of a constraint whose gap is not convex (a concave wall) by one about the new
-// end-of-step position.
+// The set is generated (for the theory see Palmer, Aktulga and Gao, arXiv 2506.14097): solve with
+// the constraints at hand, let the source look at everything that can touch, add what the solution
+// violates, solve again from the impulses reached, until nothing is added. A source may also
+// replace the linearisation of a constraint whose gap is not convex (a concave wall) by one about
+// the new end-of-step position.
 
 #pragma once
 
@@ -31,11 +31,11 @@ struct ProjectionResult {
   bool complete = false;     // the last round left nothing to add or change
   long iterations = 0;       // over all rounds
   int rounds = 0;
-  Residual residual;         // over all constraints that came to light
+  Residual residual;    // over all constraints that came to light
 };
 
-// Solves at least once. On return `velocity` (3 per particle, copies included) holds the projection of
-// problem.predicted_velocity and problem.contacts.impulse the impulses. When the result is not
+// Solves at least once. On return `velocity` (3 per particle, copies included) holds the projection
+// of problem.predicted_velocity and problem.contacts.impulse the impulses. When the result is not
 // complete, `velocity` knows nothing of the constraints that were added last.
 ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,
                          const SolverLimits &limits, int max_rounds, Host &host,

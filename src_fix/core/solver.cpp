@@ -10,8 +10,8 @@ namespace inelastic {
 
 namespace {
 
-constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
-                               std::numeric_limits<double>::infinity()};
+  constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
+                                 std::numeric_limits<double>::infinity()};
 
 }    // namespace
 
@@ -109,15 +109,16 @@ AcceleratedProjectedGradient::compare(std::size_t count) const
   return {curved, {std::max(0.0, -least), most}};
 }
 
-SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const SolverLimits &limits,
-                                                 Host &host)
+SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
+                                                 const SolverLimits &limits, Host &host)
 {
   // L is let down a little between calls, so that it can follow a packing that becomes less
   // connected, and raised with a margin when a step shows it too small.
   constexpr double RELAXATION = 0.998;
   constexpr double MARGIN = 1.05;
   constexpr double LEAST_SCALE = 0.9, MOST_SCALE = 1.1;
-  constexpr double FIRST_CURVATURE = 2.0;    // of a few contacts; a first step far too long costs more
+  constexpr double FIRST_CURVATURE =
+      2.0;    // of a few contacts; a first step far too long costs more
 
   ContactSet &contacts = problem.contacts;
   const std::size_t count = contacts.size();
@@ -159,8 +160,9 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
   }
 
   // The guess is first made as large as the dual function likes it along its own direction, which
-  // costs no product since w is affine: with b = w(0), the minimum over s of the dual at s lambda is at
-  // s = -lambda.b / lambda.(w - b). Measured to save a tenth of the iterations, within these bounds.
+  // costs no product since w is affine: with b = w(0), the minimum over s of the dual at s lambda
+  // is at s = -lambda.b / lambda.(w - b). Measured to save a tenth of the iterations, within these
+  // bounds.
   const double curved_along = first_sums[0] - first_sums[1];
   if (curved_along > 0.0) {
     const double scale = std::clamp(-first_sums[1] / curved_along, LEAST_SCALE, MOST_SCALE);
@@ -190,8 +192,8 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem, const 
       break;
     }
 
-    // A step that was longer than the curvature along it allows is kept: the next ones undo its harm,
-    // and dropping it with its momentum was measured to cost a quarter more iterations.
+    // A step that was longer than the curvature along it allows is kept: the next ones undo its
+    // harm, and dropping it with its momentum was measured to cost a quarter more iterations.
     if (sums[2] > curvature_ * sums[1] && sums[1] > 0.0) curvature_ = MARGIN * sums[2] / sums[1];
 
     impulse_before_.swap(impulse_);

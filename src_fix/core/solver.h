@@ -1,7 +1,8 @@
 // Solvers of the projection problem (contact_problem.h). All work on the dual: they look for the
 // impulses, and are judged by the same residual, in units of length:
 //
-//   feasibility       max over all constraints of       -w_c      (overlap left at the end of the step)
+//   feasibility       max over all constraints of       -w_c      (overlap left at the end of the
+// step)
 //   complementarity   max over constraints with impulse of w_c    (gap left where a force acts)
 //
 // A solver takes its first guess from ContactSet::impulse if it warm-starts (what is negative there
@@ -62,15 +63,16 @@ class AcceleratedProjectedGradient final : public Solver {
   Outcome compare(std::size_t count) const;
 
   GapOperator gap_operator_;
-  double curvature_ = 0.0;    // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
+  // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
+  double curvature_ = 0.0;
   std::vector<double> diagonal_;    // of A
   std::vector<double> impulse_, impulse_before_, impulse_next_;
   std::vector<double> gap_, gap_before_, gap_next_;
 };
 
 // The paper's solver: projected gradient with a fixed step from zero impulses, which stops on
-// feasibility alone. The step is 1 over the largest eigenvalue of A, from power iteration that is not
-// counted among the iterations.
+// feasibility alone. The step is 1 over the largest eigenvalue of A, from power iteration that is
+// not counted among the iterations.
 class Uzawa final : public Solver {
  public:
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;

@@ -1,5 +1,5 @@
-// The contact forces of the last step, kept per atom so that they follow the atoms through neighbour
-// list rebuilds and from rank to rank: the first guess of the next step.
+// The contact forces of the last step, kept per atom so that they follow the atoms through
+// neighbour list rebuilds and from rank to rank: the first guess of the next step.
 
 #ifndef INELASTIC_CONTACT_MEMORY_H
 #define INELASTIC_CONTACT_MEMORY_H
@@ -18,9 +18,7 @@ class ContactMemory {
 
   // partner: the other atom's ID, or minus the wall's number.
   void remember(int atom, tagint partner, double force)
-  {
-    remembered_[atom].push_back({partner, force});
-  }
+  { remembered_[atom].push_back({partner, force}); }
 
   // Zero when nothing is remembered.
   double force(int atom, tagint partner) const

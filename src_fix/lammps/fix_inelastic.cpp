@@ -27,18 +27,20 @@ using namespace FixConst;
 
 namespace {
 
-constexpr int MAX_ROUNDS = 100;                 // of adding constraints; a handful is usual
-constexpr int MAX_RELINEARISATIONS = 20;        // per step; each one squares the error
-constexpr double REGULAR_OVERLAP = 2.0;         // in eps; more is a bad start
-constexpr double PUSH_LIMIT = 0.05;             // of the sum of radii, per regular step, out of a bad overlap
-constexpr double RELINEARISE_BEYOND = 1.1;      // in eps, overlap at the end of the step
-constexpr double COINCIDENT = 1.0e-10;          // of the sum of radii: no normal can be computed
-constexpr double EXPECTED_IN_EPS = 1.0e-7;      // how well the predicted motion must be met ...
-constexpr double EXPECTED_RELATIVE = 1.0e-12;   // ... beside the round-off of positions and velocities
-constexpr double SIMILAR_RADII = 1.1;           // up to here one cutoff for all pairs wastes little
+constexpr int MAX_ROUNDS = 100;             // of adding constraints; a handful is usual
+constexpr int MAX_RELINEARISATIONS = 20;    // per step; each one squares the error
+constexpr double REGULAR_OVERLAP = 2.0;     // in eps; more is a bad start
+constexpr double PUSH_LIMIT =
+    0.05;    // of the sum of radii, per regular step, out of a bad overlap
+constexpr double RELINEARISE_BEYOND = 1.1;    // in eps, overlap at the end of the step
+constexpr double COINCIDENT = 1.0e-10;        // of the sum of radii: no normal can be computed
+constexpr double EXPECTED_IN_EPS = 1.0e-7;    // how well the predicted motion must be met ...
+constexpr double EXPECTED_RELATIVE =
+    1.0e-12;                             // ... beside the round-off of positions and velocities
+constexpr double SIMILAR_RADII = 1.1;    // up to here one cutoff for all pairs wastes little
 
-constexpr double FIRST_MARGIN = 0.02;           // of the smallest radius
-constexpr double EXTREME = 1.0e300;          // below or above every value that is compared
+constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
+constexpr double EXTREME = 1.0e300;      // below or above every value that is compared
 constexpr int REDUCED_SUMS = 4;
 constexpr int REDUCED_MAXIMA = 8;
 
@@ -59,14 +61,10 @@ void combine(void *in, void *inout, int *count, MPI_Datatype *)
 }
 
 double dot(const double *a, const double *b)
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+{ return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 double norm(const double *a)
-{
-  return std::sqrt(dot(a, a));
-}
+{ return std::sqrt(dot(a, a)); }
 
 }    // namespace
 
@@ -74,13 +72,13 @@ double norm(const double *a)
 
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
-    warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0),  
-    list_(nullptr), margin_(-1.0), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr),
-    largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
-    spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
-    wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
-    run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0), run_shortened_(0),
-    exchanged_(nullptr), memory_exchange_size_(0)
+    warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), list_(nullptr),
+    margin_(-1.0), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
+    state_(nullptr), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
+    spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false),
+    expecting_(false), kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
+    run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
+    run_unconverged_(0), run_shortened_(0), exchanged_(nullptr), memory_exchange_size_(0)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -195,9 +193,7 @@ FixInelastic::~FixInelastic()
 }
 
 int FixInelastic::setmask()
-{
-  return POST_NEIGHBOR | POST_FORCE | POST_RUN;
-}
+{ return POST_NEIGHBOR | POST_FORCE | POST_RUN; }
 
 int FixInelastic::modify_param(int narg, char **arg)
 {
@@ -252,14 +248,10 @@ void FixInelastic::init()
 }
 
 void FixInelastic::init_list(int, NeighList *list)
-{
-  list_ = list;
-}
+{ list_ = list; }
 
 void FixInelastic::setup_post_neighbor()
-{
-  post_neighbor();
-}
+{ post_neighbor(); }
 
 void FixInelastic::post_neighbor()
 {
@@ -275,10 +267,11 @@ void FixInelastic::post_neighbor()
   const double widest = 2.0 * largest_radius_ + neighbor->skin;
   const double listed = one_cutoff_ ? neighbor->cutneighmin : neighbor->cutneighmax;
   if (listed < widest * (1.0 - 1.0e-12))
-    error->all(FLERR,
-               "Fix inelastic: the neighbour list reaches {:.6g} between centres but needs {:.6g}: give "
-               "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
-               listed, widest, 2.0 * largest_radius_);
+    error->all(
+        FLERR,
+        "Fix inelastic: the neighbour list reaches {:.6g} between centres but needs {:.6g}: give "
+        "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
+        listed, widest, 2.0 * largest_radius_);
   list_reach_ = one_cutoff_ ? listed - 2.0 * largest_radius_ : neighbor->skin;
 }
 
@@ -292,9 +285,7 @@ void FixInelastic::setup(int vflag)
 }
 
 void FixInelastic::post_force(int vflag)
-{
-  advance(vflag, 1.0);
-}
+{ advance(vflag, 1.0); }
 
 void FixInelastic::post_run()
 {
@@ -306,16 +297,18 @@ void FixInelastic::post_run()
       state_[i][PUSH_HELD + d] = 0.0;
     }
   if (comm->me != 0) return;
-  utils::logmesg(lmp,
-                 "Fix inelastic: {} projections, {:.0f} iterations, largest overlap {:.6g} = {:.4g} "
-                 "tolerances, {} shortened steps\n",
-                 run_steps_, run_iterations_, run_largest_overlap_,
-                 run_largest_overlap_ / tolerance_, run_shortened_);
+  utils::logmesg(
+      lmp,
+      "Fix inelastic: {} projections, {:.0f} iterations, largest overlap {:.6g} = {:.4g} "
+      "tolerances, {} shortened steps\n",
+      run_steps_, run_iterations_, run_largest_overlap_, run_largest_overlap_ / tolerance_,
+      run_shortened_);
   if (run_largest_excess_ > 0.0)
-    utils::logmesg(lmp,
-                   "  the curvature of walls left overlaps of up to {:.6g} beyond 2 tolerances: a shorter "
-                   "timestep, or shorten yes, avoids them\n",
-                   run_largest_excess_);
+    utils::logmesg(
+        lmp,
+        "  the curvature of walls left overlaps of up to {:.6g} beyond 2 tolerances: a shorter "
+        "timestep, or shorten yes, avoids them\n",
+        run_largest_excess_);
   if (run_unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
                    run_unconverged_);
@@ -335,16 +328,16 @@ void FixInelastic::advance(int vflag, double kick_steps)
   while (true) {
     predict(kick_steps);
     spread_at_start_ = spread_since_build(nullptr);
-    // The prediction moves nearly as far as the projection will: where the list cannot reach that far
-    // there is no use in solving first.
+    // The prediction moves nearly as far as the projection will: where the list cannot reach that
+    // far there is no use in solving first.
     if (shorten_ && spread_at_start_ < list_reach_ && !list_reaches(problem_.predicted_velocity)) {
       shorten_step(room_in_list(problem_.predicted_velocity));
       continue;
     }
     phase_ = Phase::CONTACT;
     collect();
-    result = inelastic::project(problem_, *this, *solver_, {tolerance_, max_iterations_}, MAX_ROUNDS,
-                                *this, velocity_);
+    result = inelastic::project(problem_, *this, *solver_, {tolerance_, max_iterations_},
+                                MAX_ROUNDS, *this, velocity_);
     double maxima[2] = {bad_overlap_ ? 1.0 : 0.0, output_[OVERLAP]};
     reduce(nullptr, 0, maxima, 2);
     bad_overlap_ = maxima[0] > 0.0;
@@ -356,11 +349,12 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (!list_reaches(velocity_)) {
       if (!shorten_ || spread_at_start_ >= list_reach_) {
         const double needed = spread_at_start_ + problem_.timestep * spread(velocity_.data());
-        error->all(FLERR,
-                   "Fix inelastic: step {}: spheres move by up to {:.6g} relative to one another, further "
-                   "than the neighbour list reaches ({:.6g}): set the skin of the neighbor command to at "
-                   "least {:.6g}, or lower the timestep, or use shorten yes",
-                   update->ntimestep, needed, list_reach_, 1.2 * needed);
+        error->all(
+            FLERR,
+            "Fix inelastic: step {}: spheres move by up to {:.6g} relative to one another, further "
+            "than the neighbour list reaches ({:.6g}): set the skin of the neighbor command to at "
+            "least {:.6g}, or lower the timestep, or use shorten yes",
+            update->ntimestep, needed, list_reach_, 1.2 * needed);
       }
       shorten_step(room_in_list(velocity_));
     } else if (shorten_ && output_[EXCESS] > 0.0) {
@@ -404,14 +398,15 @@ void FixInelastic::predict(double kick_steps)
     // What pushed overlaps apart is no momentum; between runs it is not in the velocity.
     const double *const push = state_[i] + PUSH_NEXT;
     for (int d = 0; d < 3; ++d)
-      problem_.predicted_velocity[3 * i + d] = atom->v[i][d] -
-          (kick_steps == 1.0 ? push[d] : 0.0) + kick_per_force * atom->f[i][d];
+      problem_.predicted_velocity[3 * i + d] =
+          atom->v[i][d] - (kick_steps == 1.0 ? push[d] : 0.0) + kick_per_force * atom->f[i][d];
   }
   share_with_copies(problem_.predicted_velocity.data());
   message_.clear();
   for (int i = 0; i < nlocal; ++i)
     if (!std::isfinite(norm(&problem_.predicted_velocity[3 * i])))
-      message_ = fmt::format("the force on atom {} or its velocity is not a finite number", atom->tag[i]);
+      message_ =
+          fmt::format("the force on atom {} or its velocity is not a finite number", atom->tag[i]);
 }
 
 void FixInelastic::collect()
@@ -430,9 +425,7 @@ void FixInelastic::collect()
 
 // More than a step can leave behind.
 bool FixInelastic::is_bad(double gap) const
-{
-  return gap < -REGULAR_OVERLAP * tolerance_;
-}
+{ return gap < -REGULAR_OVERLAP * tolerance_; }
 
 // The gap that a constraint asks to be kept. `size` is the sum of radii (of one sphere for a wall).
 double FixInelastic::effective_gap(double gap_now, double size) const
@@ -501,8 +494,8 @@ void FixInelastic::take_pair(std::size_t slot, int i, int j)
   const double distance = norm(away);
   const double size = atom->radius[i] + atom->radius[j];
   if (!(distance > COINCIDENT * size)) {
-    message_ = fmt::format("the centres of atoms {} and {} coincide: move one of them", atom->tag[i],
-                           atom->tag[j]);
+    message_ = fmt::format("the centres of atoms {} and {} coincide: move one of them",
+                           atom->tag[i], atom->tag[j]);
     return;
   }
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
@@ -615,7 +608,8 @@ long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
         if (gap + opening < -tolerance_ && !wall_constraint_.count(wall_key(look.atom, view.wall)))
           take_wall(look, view);
       },
-      [](const RegionWalls::Look &, const std::string &) {});
+      [](const RegionWalls::Look &, const std::string &) {
+      });
   return static_cast<long>(problem_.contacts.size() - before);
 }
 
@@ -642,7 +636,8 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     const double gap_now = known ? origin_[existing->second].gap_now : gap_here + motion;
     // A region can show a wall late: from inside one part of a union the others are not seen.
     note_overlap(gap_now);
-    const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - motion : gap_here;
+    const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - motion
+                                       : gap_here;
     wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
     problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
     origin_.push_back({view.wall, gap_now, atom->radius[i], motion});
@@ -657,7 +652,9 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
         output_[EXCESS] = std::max(output_[EXCESS], overlap - 2.0 * tolerance_);
         if (overlap > RELINEARISE_BEYOND * tolerance_) add_plane(look, view);
       },
-      [&](const RegionWalls::Look &look, const std::string &) { beyond.push_back(look); });
+      [&](const RegionWalls::Look &look, const std::string &) {
+        beyond.push_back(look);
+      });
 
   double number_beyond = static_cast<double>(beyond.size());
   reduce(&number_beyond, 1, nullptr, 0);
@@ -666,8 +663,11 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
       output_[EXCESS] = std::max(output_[EXCESS], atom->radius[look.atom]);
     walls_->view(
         last_inside(beyond), true,
-        [&](const RegionWalls::Look &look, const WallView &view) { add_plane(look, view); },
-        [](const RegionWalls::Look &, const std::string &) {});
+        [&](const RegionWalls::Look &look, const WallView &view) {
+          add_plane(look, view);
+        },
+        [](const RegionWalls::Look &, const std::string &) {
+        });
   }
   double excess = output_[EXCESS];
   reduce(nullptr, 0, &excess, 1);
@@ -677,10 +677,12 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
 
 // From beyond a wall nothing is seen: how far along the step each of these centres is still inside.
 // Collective.
-std::vector<RegionWalls::Look> FixInelastic::last_inside(const std::vector<RegionWalls::Look> &beyond)
+std::vector<RegionWalls::Look>
+FixInelastic::last_inside(const std::vector<RegionWalls::Look> &beyond)
 {
   constexpr int BISECTIONS = 12;
-  std::vector<double> inside(beyond.size(), 0.0), outside(beyond.size(), 1.0);    // parts of the step
+  std::vector<double> inside(beyond.size(), 0.0),
+      outside(beyond.size(), 1.0);    // parts of the step
   auto looks_at = [&](const std::vector<double> &part) {
     std::vector<RegionWalls::Look> looks = beyond;
     for (std::size_t k = 0; k < beyond.size(); ++k)
@@ -694,8 +696,12 @@ std::vector<RegionWalls::Look> FixInelastic::last_inside(const std::vector<Regio
     const std::vector<RegionWalls::Look> looks = looks_at(middle);
     std::vector<char> out(beyond.size(), 0);
     walls_->view(
-        looks, true, [](const RegionWalls::Look &, const WallView &) {},
-        [&](const RegionWalls::Look &look, const std::string &) { out[&look - looks.data()] = 1; });
+        looks, true,
+        [](const RegionWalls::Look &, const WallView &) {
+        },
+        [&](const RegionWalls::Look &look, const std::string &) {
+          out[&look - looks.data()] = 1;
+        });
     for (std::size_t k = 0; k < beyond.size(); ++k) (out[k] ? outside : inside)[k] = middle[k];
   }
   return looks_at(inside);
@@ -716,10 +722,9 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
     problem_.contacts.impulse[c] = 0.0;
   }
   const std::vector<double> kept = velocity_;
-  const inelastic::ProjectionResult pushed =
-      inelastic::project(problem_, *this, *solver_,
-                         {tolerance_, std::max(0L, max_iterations_ - result.iterations)}, MAX_ROUNDS,
-                         *this, velocity_);
+  const inelastic::ProjectionResult pushed = inelastic::project(
+      problem_, *this, *solver_, {tolerance_, std::max(0L, max_iterations_ - result.iterations)},
+      MAX_ROUNDS, *this, velocity_);
   result.iterations += pushed.iterations;
   result.converged = result.converged && pushed.converged;
   result.complete = result.complete && pushed.complete;
@@ -748,8 +753,7 @@ void FixInelastic::apply_forces(double kick_steps)
             atom->v[i][d] + kick_ * force->ftm2v * problem_.inverse_mass[i] * atom->f[i][d];
         atom->f[i][d] += (v - without) / (kick_ * force->ftm2v * problem_.inverse_mass[i]);
       }
-      const double push =
-          bad_overlap_ && moves ? v - problem_.predicted_velocity[3 * i + d] : 0.0;
+      const double push = bad_overlap_ && moves ? v - problem_.predicted_velocity[3 * i + d] : 0.0;
       if (kick_steps == 1.0) state[PUSH_HELD + d] = 0.5 * (state[PUSH_NEXT + d] + push);
       state[PUSH_NEXT + d] = push;
       state[EXPECTED_V + d] = v;
@@ -769,7 +773,8 @@ void FixInelastic::check_expected()
     double off[3] = {atom->x[i][0] - state[EXPECTED_X], atom->x[i][1] - state[EXPECTED_X + 1],
                      atom->x[i][2] - state[EXPECTED_X + 2]};
     domain->minimum_image(FLERR, off);
-    const double faster[3] = {atom->v[i][0] - state[EXPECTED_V], atom->v[i][1] - state[EXPECTED_V + 1],
+    const double faster[3] = {atom->v[i][0] - state[EXPECTED_V],
+                              atom->v[i][1] - state[EXPECTED_V + 1],
                               atom->v[i][2] - state[EXPECTED_V + 2]};
     const bool frozen = (atom->mask[i] & frozen_bit_) != 0;
     const double round_off =
@@ -781,7 +786,8 @@ void FixInelastic::check_expected()
 
     if (frozen) {
       message = fmt::format(
-          "frozen atom {} is {:.3g} away from where its velocity takes it: give it the velocity that it moves "
+          "frozen atom {} is {:.3g} away from where its velocity takes it: give it the velocity "
+          "that it moves "
           "with (command velocity), the same during a step, or none if nothing moves it",
           atom->tag[i], position_error);
       break;
@@ -795,12 +801,13 @@ void FixInelastic::check_expected()
       else if ((passed && (modify->fmask[k] & POST_FORCE)) || (modify->fmask[k] & END_OF_STEP))
         later += fmt::format(" {} ({})", fixes[k]->id, fixes[k]->style);
     }
-    message = fmt::format(
-        "atom {} did not move as predicted: its {} is off by {:.3g}. Move it with fix nve or nve/sphere "
-        "alone; define every fix that adds forces before fix {}; let nothing else change velocities{}{}",
-        atom->tag[i], position_error > velocity_error ? "position" : "velocity",
-        position_error > velocity_error ? position_error : norm(faster), id,
-        later.empty() ? "" : ". Fixes that may have:", later);
+    message = fmt::format("atom {} did not move as predicted: its {} is off by {:.3g}. Move it "
+                          "with fix nve or nve/sphere "
+                          "alone; define every fix that adds forces before fix {}; let nothing "
+                          "else change velocities{}{}",
+                          atom->tag[i], position_error > velocity_error ? "position" : "velocity",
+                          position_error > velocity_error ? position_error : norm(faster), id,
+                          later.empty() ? "" : ". Fixes that may have:", later);
   }
   fail_together(message);
 }
@@ -829,9 +836,7 @@ double FixInelastic::spread(const double *values)
 
 // Pairs that are not listed were at least list_reach_ apart when the list was built.
 bool FixInelastic::list_reaches(const std::vector<double> &velocity)
-{
-  return spread_at_start_ + problem_.timestep * spread(velocity.data()) <= list_reach_;
-}
+{ return spread_at_start_ + problem_.timestep * spread(velocity.data()) <= list_reach_; }
 
 // The part of the time step for which the list would reach, with some reserve.
 double FixInelastic::room_in_list(const std::vector<double> &velocity)
@@ -1007,15 +1012,13 @@ void FixInelastic::share_virial()
 }
 
 double FixInelastic::compute_vector(int n)
-{
-  return output_[n];
-}
+{ return output_[n]; }
 
 double FixInelastic::compute_array(int wall, int direction)
 {
   if (wall_force_step_ != update->ntimestep) {
-    MPI_Allreduce(wall_force_.data(), wall_force_total_.data(), static_cast<int>(wall_force_.size()),
-                  MPI_DOUBLE, MPI_SUM, world);
+    MPI_Allreduce(wall_force_.data(), wall_force_total_.data(),
+                  static_cast<int>(wall_force_.size()), MPI_DOUBLE, MPI_SUM, world);
     wall_force_step_ = update->ntimestep;
   }
   return wall_force_total_[3 * wall + direction];
@@ -1025,8 +1028,8 @@ double FixInelastic::compute_array(int wall, int direction)
    what is remembered from step to step, and follows the atoms
 ------------------------------------------------------------------------- */
 
-// Both atoms of a contact remember it, those of other ranks included: the next neighbour list may show
-// the pair from the other side, and atoms may migrate before it is built.
+// Both atoms of a contact remember it, those of other ranks included: the next neighbour list may
+// show the pair from the other side, and atoms may migrate before it is built.
 void FixInelastic::remember_contacts()
 {
   const inelastic::ContactSet &contacts = problem_.contacts;
@@ -1049,7 +1052,8 @@ void FixInelastic::remember_contacts()
     return static_cast<int>(most);
   };
   if (has_copies()) {
-    memory_exchange_size_ = ContactMemory::packed_size(most_partners(atom->nlocal, problem_.particles));
+    memory_exchange_size_ =
+        ContactMemory::packed_size(most_partners(atom->nlocal, problem_.particles));
     comm->reverse_comm(this, memory_exchange_size_);
     memory_exchange_size_ = 0;
   }
@@ -1100,9 +1104,7 @@ int FixInelastic::unpack_exchange(int i, double *buffer)
 ------------------------------------------------------------------------- */
 
 bool FixInelastic::has_copies() const
-{
-  return comm->nprocs > 1 || atom->nghost > 0;
-}
+{ return comm->nprocs > 1 || atom->nghost > 0; }
 
 void FixInelastic::sum_over_copies(double *per_particle)
 {
@@ -1139,9 +1141,7 @@ int FixInelastic::pack_forward_comm(int n, int *list, double *buffer, int, int *
 }
 
 void FixInelastic::unpack_forward_comm(int n, int first, double *buffer)
-{
-  std::copy_n(buffer, 3 * n, exchanged_ + 3 * first);
-}
+{ std::copy_n(buffer, 3 * n, exchanged_ + 3 * first); }
 
 int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
 {
@@ -1187,14 +1187,16 @@ void FixInelastic::fail_together(const std::string &message)
 void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
 {
   ++run_unconverged_;
-  const std::string message = fmt::format(
-      "step {}: {} iterations left an overlap of {:.4g} and a gap under a force of {:.4g}, where {:.4g} is "
-      "allowed",
-      update->ntimestep, result.iterations, result.residual.feasibility,
-      result.residual.complementarity, tolerance_);
+  const std::string message =
+      fmt::format("step {}: {} iterations left an overlap of {:.4g} and a gap under a force of "
+                  "{:.4g}, where {:.4g} is "
+                  "allowed",
+                  update->ntimestep, result.iterations, result.residual.feasibility,
+                  result.residual.complementarity, tolerance_);
   if (!warn_only_)
     error->all(FLERR,
-               "Fix inelastic: {}. Either the scene leaves no room for the spheres, or: raise maxiter ({}), "
+               "Fix inelastic: {}. Either the scene leaves no room for the spheres, or: raise "
+               "maxiter ({}), "
                "raise the tolerance, or lower the timestep",
                message, max_iterations_);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
@@ -1215,9 +1217,9 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
     const double *const predicted = &problem_.predicted_velocity[3 * i];
     const double *const projected = &velocity_[3 * i];
     const double *const x = atom->x[i];
-    for (const double value :
-         {static_cast<double>(atom->tag[i]), problem_.inverse_mass[i], atom->radius[i], x[0], x[1], x[2],
-          predicted[0], predicted[1], predicted[2], projected[0], projected[1], projected[2], mass(i)})
+    for (const double value : {static_cast<double>(atom->tag[i]), problem_.inverse_mass[i],
+                               atom->radius[i], x[0], x[1], x[2], predicted[0], predicted[1],
+                               predicted[2], projected[0], projected[1], projected[2], mass(i)})
       atoms.push_back(value);
   }
   for (std::size_t c = 0; c < problem_.contacts.size(); ++c) {
@@ -1225,9 +1227,9 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
     const double *const n = &problem_.contacts.normal[3 * c];
     const Origin &origin = origin_[c];
     const double partner = origin.wall ? -origin.wall : static_cast<double>(atom->tag[j]);
-    for (const double value :
-         {static_cast<double>(atom->tag[problem_.contacts.first[c]]), partner, n[0], n[1], n[2],
-          problem_.contacts.gap[c], origin.gap_now, origin.wall_motion, problem_.contacts.impulse[c]})
+    for (const double value : {static_cast<double>(atom->tag[problem_.contacts.first[c]]), partner,
+                               n[0], n[1], n[2], problem_.contacts.gap[c], origin.gap_now,
+                               origin.wall_motion, problem_.contacts.impulse[c]})
       contacts.push_back(value);
   }
   const std::vector<double> all_atoms = gather(atoms);
@@ -1286,17 +1288,16 @@ std::vector<double> FixInelastic::gather(std::vector<double> mine) const
   int count = static_cast<int>(mine.size());
   std::vector<int> counts(comm->nprocs), offsets(comm->nprocs, 0);
   MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, world);
-  for (int rank = 1; rank < comm->nprocs; ++rank) offsets[rank] = offsets[rank - 1] + counts[rank - 1];
+  for (int rank = 1; rank < comm->nprocs; ++rank)
+    offsets[rank] = offsets[rank - 1] + counts[rank - 1];
   std::vector<double> all(comm->me == 0 ? offsets.back() + counts.back() : 0);
-  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(), MPI_DOUBLE, 0,
-              world);
+  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(), MPI_DOUBLE,
+              0, world);
   return all;
 }
 
 double FixInelastic::mass(int i) const
-{
-  return atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
-}
+{ return atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]]; }
 
 double FixInelastic::memory_usage()
 {

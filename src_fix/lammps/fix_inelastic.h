@@ -89,33 +89,39 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::vector<Origin> origin_;
   std::vector<char> listed_pair_taken_;    // per pair of the neighbour list: is it in the problem?
   std::unordered_map<std::uint64_t, std::size_t> wall_constraint_;    // atom and wall -> constraint
-  double margin_;                // what comes closer than this is in the problem from the start
-  int relinearisations_;         // in this step
-  std::string message_;          // what went wrong on this rank while collecting
+  double margin_;           // what comes closer than this is in the problem from the start
+  int relinearisations_;    // in this step
+  std::string message_;     // what went wrong on this rank while collecting
 
   // A bad start: overlaps beyond the regular ones are first treated as touching, then pushed apart.
   enum class Phase { CONTACT, PUSH };
   Phase phase_;
   bool bad_overlap_;
 
-  // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the last
-  // move (NEXT) and at whole steps (HELD).
-  enum StateColumn { EXPECTED_X = 0, EXPECTED_V = 3, PUSH_NEXT = 6, PUSH_HELD = 9, STATE_SIZE = 12 };
+  // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the
+  // last move (NEXT) and at whole steps (HELD).
+  enum StateColumn {
+    EXPECTED_X = 0,
+    EXPECTED_V = 3,
+    PUSH_NEXT = 6,
+    PUSH_HELD = 9,
+    STATE_SIZE = 12
+  };
   double **state_;
   ContactMemory memory_;
 
   // The neighbour list's reach
   double largest_radius_;
-  bool one_cutoff_;       // the list is by one cutoff for all pairs, not by their radii
-  double list_reach_;     // gap beyond which a pair may be missing from a fresh list
+  bool one_cutoff_;           // the list is by one cutoff for all pairs, not by their radii
+  double list_reach_;         // gap beyond which a pair may be missing from a fresh list
   double spread_at_start_;    // largest relative displacement since the list was built
   double growth_;             // of a radius since then
   std::vector<double> position_at_build_, radius_at_build_, displacement_;
 
   double regular_timestep_;    // as the deck sets it
   bool setting_timestep_;      // the fix itself is changing it
-  bool expecting_;    // state_ holds a prediction to compare with
-  double kick_;       // time for which the force acts before the next move
+  bool expecting_;             // state_ holds a prediction to compare with
+  double kick_;                // time for which the force acts before the next move
 
   // Output
   enum Output {
@@ -148,7 +154,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   // Communication
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
-  double *exchanged_;    // the per-particle vectors that pack and unpack work on
+  double *exchanged_;           // the per-particle vectors that pack and unpack work on
   int memory_exchange_size_;    // values per atom while the memory is exchanged, otherwise 0
 
   // Host
@@ -186,9 +192,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool is_bad(double gap) const;
   void note_overlap(double gap);
   std::uint64_t wall_key(int i, int wall) const
-  {
-    return static_cast<std::uint64_t>(i) * (walls_->number_of_walls() + 1) + wall;
-  }
+  { return static_cast<std::uint64_t>(i) * (walls_->number_of_walls() + 1) + wall; }
 
   // Reach and time step
   double spread(const double *values);

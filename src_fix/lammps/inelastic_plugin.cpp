@@ -38,14 +38,10 @@ __attribute__((visibility("default"))) void lammpsplugin_init(void *, void *, vo
 namespace {
 
 Fix *create_fix_inelastic(LAMMPS *lmp, int narg, char **arg)
-{
-  return new FixInelastic(lmp, narg, arg);
-}
+{ return new FixInelastic(lmp, narg, arg); }
 
 Fix *create_fix_random_force(LAMMPS *lmp, int narg, char **arg)
-{
-  return new FixRandomForce(lmp, narg, arg);
-}
+{ return new FixRandomForce(lmp, narg, arg); }
 
 }    // namespace
 
@@ -53,14 +49,15 @@ void lammpsplugin_init(void *lmp_pointer, void *handle, void *register_function)
 {
   auto *lmp = static_cast<LAMMPS *>(lmp_pointer);
 
-  // The classes that plugins share with LAMMPS change their layout even within a release: two updates
-  // that both print one date do not fit together. The git descriptor tells them apart.
+  // The classes that plugins share with LAMMPS change their layout even within a release: two
+  // updates that both print one date do not fit together. The git descriptor tells them apart.
   if (strcmp(LAMMPS::git_descriptor(), INELASTIC_LAMMPS_BUILD) != 0) {
     if (lmp->comm->me == 0)
-      lmp->error->warning(FLERR,
-                          "fix inelastic is not available: its plugin was built for LAMMPS {}, this is {}. "
-                          "Install lammps-inelastic again in this environment",
-                          INELASTIC_LAMMPS_BUILD, LAMMPS::git_descriptor());
+      lmp->error->warning(
+          FLERR,
+          "fix inelastic is not available: its plugin was built for LAMMPS {}, this is {}. "
+          "Install lammps-inelastic again in this environment",
+          INELASTIC_LAMMPS_BUILD, LAMMPS::git_descriptor());
     return;
   }
 

@@ -49,18 +49,20 @@ void RegionWalls::init()
     const bool moving = region->dynamic_check() != 0;
     const bool flat = strcmp(region->style, "block") == 0 || strcmp(region->style, "plane") == 0 ||
         strcmp(region->style, "prism") == 0;
-    // The distance to a convex obstacle (side out) is a convex function, like the one to a flat wall.
-    // Motion changes nothing: walls are taken where they stand at the end of the step.
+    // The distance to a convex obstacle (side out) is a convex function, like the one to a flat
+    // wall. Motion changes nothing: walls are taken where they stand at the end of the step.
     const bool convex_obstacle = !region->interior && !region->openflag &&
         strcmp(region->style, "union") != 0 && strcmp(region->style, "intersect") != 0;
     const bool exact = (flat && !region->openflag) || convex_obstacle;
     if (strcmp(region->style, "ellipsoid") == 0)
       error->all(FLERR,
-                 "Fix inelastic: region {} is an ellipsoid, whose wall LAMMPS shows too late: use a sphere, a "
+                 "Fix inelastic: region {} is an ellipsoid, whose wall LAMMPS shows too late: use "
+                 "a sphere, a "
                  "cylinder or a cone",
                  id);
     // Cones can also be parts of these.
-    const bool joined = strcmp(region->style, "union") == 0 || strcmp(region->style, "intersect") == 0;
+    const bool joined = strcmp(region->style, "union") == 0 ||
+        strcmp(region->style, "intersect") == 0;
     const bool cone = joined || strcmp(region->style, "cone") == 0;
     obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, cone});
     number_of_walls_ += region->cmax;
@@ -74,8 +76,10 @@ void RegionWalls::warn() const
     if (strcmp(obstacle.region->style, obstacle.region->interior ? "union" : "intersect") == 0 &&
         comm->me == 0)
       error->warning(FLERR,
-                     "Fix inelastic: LAMMPS shows the walls of region {} only to spheres whose centre is in the "
-                     "same part of it: spheres can overlap the re-entrant edges where parts of this union meet",
+                     "Fix inelastic: LAMMPS shows the walls of region {} only to spheres whose "
+                     "centre is in the "
+                     "same part of it: spheres can overlap the re-entrant edges where parts of "
+                     "this union meet",
                      obstacle.region->id);
 }
 
@@ -92,8 +96,8 @@ void RegionWalls::view(const std::vector<Look> &looks, bool inexact_only,
   }
 }
 
-// The walls of one region within reach of a point; empty when LAMMPS shows none. False when the point
-// lies on a wall or beyond it.
+// The walls of one region within reach of a point; empty when LAMMPS shows none. False when the
+// point lies on a wall or beyond it.
 bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reach,
                       std::vector<WallView> &views) const
 {
@@ -114,11 +118,11 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
 }
 
 // LAMMPS points the vector to the caps of a cone along y in the wrong direction (update 4 of 22 Jul
-// 2025), though their distance is right. A vector is right if the wall is half as far from half way;
-// otherwise it is the gradient of the distance, which is linear for a cap.
+// 2025), though their distance is right. A vector is right if the wall is half as far from half
+// way; otherwise it is the gradient of the distance, which is linear for a cap.
 void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallView &view) const
 {
-  constexpr double PROBE = 1.0e-3;         // of the distance: stays on the same side of the wall
+  constexpr double PROBE = 1.0e-3;            // of the distance: stays on the same side of the wall
   constexpr double SAME_DISTANCE = 1.0e-6;    // relative; round-off is far below
   auto distance_from = [&](const double *point) {
     Region *region = obstacle.region;
@@ -129,7 +133,8 @@ void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallVie
   };
   double half_way[3];
   for (int d = 0; d < 3; ++d) half_way[d] = x[d] - 0.5 * view.distance * view.normal[d];
-  if (std::abs(distance_from(half_way) - 0.5 * view.distance) < SAME_DISTANCE * view.distance) return;
+  if (std::abs(distance_from(half_way) - 0.5 * view.distance) < SAME_DISTANCE * view.distance)
+    return;
 
   double gradient[3];
   double length_squared = 0.0;
@@ -162,7 +167,8 @@ void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Look> 
   }
 }
 
-// Variables that move a region are evaluated for the end of the step by setting LAMMPS's clock ahead.
+// Variables that move a region are evaluated for the end of the step by setting LAMMPS's clock
+// ahead.
 void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)
 {
   modify->clearstep_compute();

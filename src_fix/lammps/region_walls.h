@@ -1,5 +1,5 @@
-// LAMMPS regions as obstacles: which walls a sphere can reach in a step, and how far they are at the
-// end of it.
+// LAMMPS regions as obstacles: which walls a sphere can reach in a step, and how far they are at
+// the end of it.
 
 #ifndef INELASTIC_REGION_WALLS_H
 #define INELASTIC_REGION_WALLS_H
@@ -16,10 +16,12 @@ class Region;
 
 // One wall seen from the centre of one sphere.
 struct WallView {
-  int wall;             // 1, 2, ... over all regions of the fix
-  double distance;      // from the sphere's centre to the wall as it will stand at the end of the step
-  double normal[3];     // unit vector from the wall to the centre, for the wall at the end of the step
-  double distance_now;  // to the wall as it stands now; the difference is the wall's own motion
+  int wall;    // 1, 2, ... over all regions of the fix
+  double
+      distance;    // from the sphere's centre to the wall as it will stand at the end of the step
+  double
+      normal[3];    // unit vector from the wall to the centre, for the wall at the end of the step
+  double distance_now;    // to the wall as it stands now; the difference is the wall's own motion
 };
 
 class RegionWalls : protected Pointers {
@@ -35,8 +37,8 @@ class RegionWalls : protected Pointers {
   // Warns of regions that LAMMPS cannot show in full.
   void warn() const;
 
-  // All walls flat (or convex obstacles): the linearised constraint is exact or on the safe side, and
-  // no look at the end of the step is needed.
+  // All walls flat (or convex obstacles): the linearised constraint is exact or on the safe side,
+  // and no look at the end of the step is needed.
   bool exact() const { return exact_; }
 
   // A point from which to look at the walls: `where` is the centre of atom i, or the place where it
@@ -47,9 +49,9 @@ class RegionWalls : protected Pointers {
     double reach;
   };
 
-  // Calls found(look, view) for every wall within reach. outside(look) is called instead for a centre
-  // that lies on the wrong side of a region, from where LAMMPS sees no wall. `inexact_only` leaves
-  // out the regions whose constraints are exact. Collective (variables of moving regions).
+  // Calls found(look, view) for every wall within reach. outside(look) is called instead for a
+  // centre that lies on the wrong side of a region, from where LAMMPS sees no wall. `inexact_only`
+  // leaves out the regions whose constraints are exact. Collective (variables of moving regions).
   void view(const std::vector<Look> &looks, bool inexact_only,
             const std::function<void(const Look &, const WallView &)> &found,
             const std::function<void(const Look &, const std::string &region)> &outside);

@@ -32,7 +32,9 @@ nb::ndarray<nb::numpy, double> to_numpy(const std::vector<double> &values, std::
 {
   auto *data = new double[std::max<std::size_t>(values.size(), 1)];
   std::copy(values.begin(), values.end(), data);
-  nb::capsule owner(data, [](void *pointer) noexcept { delete[] static_cast<double *>(pointer); });
+  nb::capsule owner(data, [](void *pointer) noexcept {
+    delete[] static_cast<double *>(pointer);
+  });
   if (columns == 0) {
     const std::size_t shape[1] = {values.size()};
     return {data, 1, shape, owner};
@@ -41,7 +43,8 @@ nb::ndarray<nb::numpy, double> to_numpy(const std::vector<double> &values, std::
   return {data, 2, shape, owner};
 }
 
-template <typename Array> void require_length(const Array &array, std::size_t length, const char *name)
+template <typename Array>
+void require_length(const Array &array, std::size_t length, const char *name)
 {
   if (array.shape(0) != length)
     throw nb::value_error((std::string(name) + " must have length " + std::to_string(length) +
@@ -58,9 +61,10 @@ template <typename Array> void require_finite(const Array &array, const char *na
 
 constexpr double NOT_UNIT = 1.0e-6;    // of a squared length: far above round-off
 
-inelastic::ContactProblem make_problem(const Vectors &predicted_velocity, const Scalars &inverse_mass,
-                                       const Indices &first, const Indices &second,
-                                       const Vectors &normal, const Scalars &gap, double timestep,
+inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
+                                       const Scalars &inverse_mass, const Indices &first,
+                                       const Indices &second, const Vectors &normal,
+                                       const Scalars &gap, double timestep,
                                        const std::optional<Scalars> &impulse)
 {
   const std::size_t particles = predicted_velocity.shape(0);
@@ -94,17 +98,19 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity, const 
                              std::to_string(limit - 1))
                                 .c_str());
     if (i == j)
-      throw nb::value_error(("contact " + std::to_string(c) + " is of a particle with itself").c_str());
+      throw nb::value_error(
+          ("contact " + std::to_string(c) + " is of a particle with itself").c_str());
     const double *const n = normal.data() + 3 * c;
     if (std::abs(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0) > NOT_UNIT)
-      throw nb::value_error(("the normal of contact " + std::to_string(c) + " has not length 1").c_str());
+      throw nb::value_error(
+          ("the normal of contact " + std::to_string(c) + " has not length 1").c_str());
     const double w =
         problem.inverse_mass[i] + (j < 0 ? 0.0 : problem.inverse_mass[static_cast<std::size_t>(j)]);
     if (!(w > 0.0))
       throw nb::value_error(
           ("contact " + std::to_string(c) + " is between particles that cannot move").c_str());
-    problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j),
-                         n, gap.data()[c], impulse ? impulse->data()[c] : 0.0);
+    problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j), n,
+                         gap.data()[c], impulse ? impulse->data()[c] : 0.0);
   }
   return problem;
 }
@@ -129,16 +135,17 @@ inelastic::Residual residual_of(const inelastic::ContactProblem &problem)
 
 Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mass,
                    const Indices &first, const Indices &second, const Vectors &normal,
-                   const Scalars &gap, double timestep, double tolerance, const std::string &solver_name,
-                   long max_iterations, const std::optional<Scalars> &impulse)
+                   const Scalars &gap, double timestep, double tolerance,
+                   const std::string &solver_name, long max_iterations,
+                   const std::optional<Scalars> &impulse)
 {
   if (!(tolerance > 0.0) || std::isinf(tolerance))
     throw nb::value_error("tolerance must be finite and greater than 0");
   if (max_iterations < 0) throw nb::value_error("max_iterations must not be negative");
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
-  inelastic::ContactProblem problem = make_problem(predicted_velocity, inverse_mass, first, second,
-                                                   normal, gap, timestep, impulse);
+  inelastic::ContactProblem problem =
+      make_problem(predicted_velocity, inverse_mass, first, second, normal, gap, timestep, impulse);
   inelastic::SerialHost host;
   Projection projection;
   const inelastic::SolverResult result = solver->solve(problem, {tolerance, max_iterations}, host);
@@ -158,14 +165,27 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
 NB_MODULE(_core, module)
 {
   nb::class_<Projection>(module, "Projection")
-      .def_prop_ro("velocity", [](const Projection &p) { return to_numpy(p.velocity, 3); },
-                   nb::rv_policy::move)
-      .def_prop_ro("impulse", [](const Projection &p) { return to_numpy(p.impulse, 0); },
-                   nb::rv_policy::move)
+      .def_prop_ro(
+          "velocity",
+          [](const Projection &p) {
+            return to_numpy(p.velocity, 3);
+          },
+          nb::rv_policy::move)
+      .def_prop_ro(
+          "impulse",
+          [](const Projection &p) {
+            return to_numpy(p.impulse, 0);
+          },
+          nb::rv_policy::move)
       .def_ro("iterations", &Projection::iterations)
       .def_ro("converged", &Projection::converged)
-      .def_prop_ro("feasibility", [](const Projection &p) { return p.residual.feasibility; })
-      .def_prop_ro("complementarity", [](const Projection &p) { return p.residual.complementarity; });
+      .def_prop_ro("feasibility",
+                   [](const Projection &p) {
+                     return p.residual.feasibility;
+                   })
+      .def_prop_ro("complementarity", [](const Projection &p) {
+        return p.residual.complementarity;
+      });
 
   module.def("project", &project, "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a,
              "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "solver"_a = "apgd",
