@@ -6,6 +6,7 @@
 
 #include "lmptype.h"
 
+#include <algorithm>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -35,13 +36,15 @@ class ContactMemory {
   // Buffer layout: number of partners, then partner and force of each.
   static constexpr int packed_size(int partners) { return 1 + 2 * partners; }
 
-  int pack(int atom, double *buffer) const
+  // At most `partners` of them.
+  int pack(int atom, double *buffer, int partners) const
   {
+    const int packed = std::min(partners, number_of_partners(atom));
     int m = 0;
-    buffer[m++] = static_cast<double>(remembered_[atom].size());
-    for (const Entry &entry : remembered_[atom]) {
-      buffer[m++] = static_cast<double>(entry.partner);
-      buffer[m++] = entry.force;
+    buffer[m++] = packed;
+    for (int k = 0; k < packed; ++k) {
+      buffer[m++] = static_cast<double>(remembered_[atom][k].partner);
+      buffer[m++] = remembered_[atom][k].force;
     }
     return m;
   }

@@ -41,6 +41,7 @@ constexpr double SIMILAR_RADII = 1.1;    // up to here one cutoff for all pairs 
 
 constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
 constexpr double EXTREME = 1.0e300;      // below or above every value that is compared
+constexpr int SHARED_PARTNERS = 16;    // that a copy tells its owner; more lose only a first guess
 constexpr int REDUCED_SUMS = 4;
 constexpr int REDUCED_MAXIMA = 8;
 
@@ -78,7 +79,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false),
     expecting_(false), kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
     run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
-    run_unconverged_(0), run_shortened_(0), exchanged_(nullptr), memory_exchange_size_(0)
+    run_unconverged_(0), run_shortened_(0), exchanged_(nullptr), exchanging_memory_(false)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -167,7 +168,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
   force_reneighbor = 1;
   next_reneighbor = -1;
   comm_forward = 3;
-  comm_reverse = 3;
+  // LAMMPS sizes its buffers by these; most exchanges are of 3 values.
+  comm_reverse = ContactMemory::packed_size(SHARED_PARTNERS);
   maxexchange_dynamic = 1;
   create_attribute = 1;
   maxexchange = STATE_SIZE + ContactMemory::packed_size(0);
@@ -1044,20 +1046,16 @@ void FixInelastic::remember_contacts()
     memory_.remember(i, wall ? -wall : atom->tag[j], strength);
     if (!wall) memory_.remember(j, atom->tag[i], strength);
   }
-  auto most_partners = [this](int begin, int end) {
-    double most = 0.0;
-    for (int i = begin; i < end; ++i)
-      most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
-    reduce(nullptr, 0, &most, 1);
-    return static_cast<int>(most);
-  };
   if (has_copies()) {
-    memory_exchange_size_ =
-        ContactMemory::packed_size(most_partners(atom->nlocal, problem_.particles));
-    comm->reverse_comm(this, memory_exchange_size_);
-    memory_exchange_size_ = 0;
+    exchanging_memory_ = true;
+    comm->reverse_comm(this, ContactMemory::packed_size(SHARED_PARTNERS));
+    exchanging_memory_ = false;
   }
-  maxexchange = STATE_SIZE + ContactMemory::packed_size(most_partners(0, atom->nlocal));
+  double most = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
+  reduce(nullptr, 0, &most, 1);
+  maxexchange = STATE_SIZE + ContactMemory::packed_size(static_cast<int>(most));
 }
 
 void FixInelastic::grow_arrays(int nmax)
@@ -1088,7 +1086,7 @@ void FixInelastic::set_arrays(int i)
 int FixInelastic::pack_exchange(int i, double *buffer)
 {
   std::copy_n(state_[i], STATE_SIZE, buffer);
-  return STATE_SIZE + memory_.pack(i, buffer + STATE_SIZE);
+  return STATE_SIZE + memory_.pack(i, buffer + STATE_SIZE, memory_.number_of_partners(i));
 }
 
 int FixInelastic::unpack_exchange(int i, double *buffer)
@@ -1110,7 +1108,7 @@ void FixInelastic::sum_over_copies(double *per_particle)
 {
   if (!has_copies()) return;
   exchanged_ = per_particle;
-  comm->reverse_comm(this);
+  comm->reverse_comm(this, 3);
   comm->forward_comm(this);
 }
 
@@ -1145,9 +1143,10 @@ void FixInelastic::unpack_forward_comm(int n, int first, double *buffer)
 
 int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
 {
-  if (memory_exchange_size_ > 0) {
-    for (int k = 0; k < n; ++k) memory_.pack(first + k, buffer + k * memory_exchange_size_);
-    return n * memory_exchange_size_;
+  if (exchanging_memory_) {
+    constexpr int SIZE = ContactMemory::packed_size(SHARED_PARTNERS);
+    for (int k = 0; k < n; ++k) memory_.pack(first + k, buffer + k * SIZE, SHARED_PARTNERS);
+    return n * SIZE;
   }
   std::copy_n(exchanged_ + 3 * first, 3 * n, buffer);
   return 3 * n;
@@ -1155,8 +1154,9 @@ int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
 
 void FixInelastic::unpack_reverse_comm(int n, int *list, double *buffer)
 {
-  if (memory_exchange_size_ > 0) {
-    for (int k = 0; k < n; ++k) memory_.unpack(list[k], buffer + k * memory_exchange_size_);
+  if (exchanging_memory_) {
+    constexpr int SIZE = ContactMemory::packed_size(SHARED_PARTNERS);
+    for (int k = 0; k < n; ++k) memory_.unpack(list[k], buffer + k * SIZE);
     return;
   }
   for (int k = 0; k < n; ++k)

@@ -154,8 +154,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   // Communication
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
-  double *exchanged_;           // the per-particle vectors that pack and unpack work on
-  int memory_exchange_size_;    // values per atom while the memory is exchanged, otherwise 0
+  double *exchanged_;    // the per-particle vectors that pack and unpack work on
+  bool exchanging_memory_;
 
   // Host
   void sum_over_copies(double *) override;

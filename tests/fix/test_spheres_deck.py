@@ -1,0 +1,44 @@
+"""inputs/spheres.in as it is, on one rank and on two."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from lammps_run import Runner
+
+from lammps_inelastic.analysis import (
+    iterate_contact_frames,
+    largest_pair_overlap,
+    read_particle_frame,
+)
+
+VARIABLES = {
+    "steps_agitated": 300,
+    "steps_settling": 40,
+    "steps_tightening": 5,
+    "steps_measuring": 3,
+    "dump_every": 40,
+}
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
+    """1,000 spheres fall and settle; the dumps hold every sphere and only forces that push.
+
+    On two ranks hundreds of contacts cross the boundary, more than fit in the reserve of LAMMPS's
+    communication buffers.
+    """
+    deck = (files("lammps_inelastic.inputs") / "spheres.in").read_text()
+    result = lmp(deck, ranks=ranks, variables=VARIABLES)
+    assert not result.warnings, result.warnings
+    frame = read_particle_frame(result.folder / "out" / "particles.lammpsdump")
+    assert frame.step == 348
+    assert np.array_equal(frame.ids, np.arange(1, 1001))
+    # The tighter tolerance of the last phase; 1e-6 for round-off.
+    overlap = largest_pair_overlap(frame.positions, frame.radii).depth
+    assert overlap <= 0.0001 * 0.055 * (1 + 1e-6)
+    contacts = list(iterate_contact_frames(result.folder / "out" / "contacts.lammpsdump"))
+    assert [frame.step for frame in contacts] == [345, 346, 347, 348]
+    assert all(len(frame.ids) > 2000 for frame in contacts)  # a settled bed has 2,900
