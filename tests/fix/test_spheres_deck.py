@@ -6,13 +6,13 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from lammps_run import Runner
 
 from lammps_inelastic.analysis import (
     iterate_contact_frames,
     largest_pair_overlap,
     read_particle_frame,
 )
+from lammps_run import Runner
 
 VARIABLES = {
     "steps_agitated": 300,
