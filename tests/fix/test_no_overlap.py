@@ -116,7 +116,7 @@ def test_different_radii_and_masses(ratio: float, tmp_path: Path, lmp: Runner) -
         radii,
         tmp_path,
         tolerance=EPS,
-        skin=0.1,
+        skin=0.2,
         fixes="fix drag all viscous 0.001",
     )
     result = lmp(deck + DUMP_PARTICLES + "run 250\n")

@@ -181,13 +181,23 @@ def projection(record: Record) -> FloatArray:
     solution = solver.solve()
     assert str(solution.status) == "Solved"
     # An interior point is as far off as the square root of its tolerance: solve for the active
-    # constraints that it found, and see that the result is the solution.
+    # constraints that it found, correct those that it took for the wrong kind, and see that the
+    # result is the solution.
     active = np.array(solution.z) > np.array(solution.s)
-    of_active = g.toarray()[active]
-    multipliers = np.linalg.lstsq(of_active / weights @ of_active.T, -bound[active], rcond=None)[0]
-    u = of_active.T @ multipliers / weights
-    assert multipliers.min(initial=0) >= -1e-9  # of weights of order 1, lengths of order r
-    assert (g @ u + bound).min() >= -1e-11
+    dense = g.toarray()
+    for _ in range(20):
+        of_active = dense[active]
+        multipliers = np.linalg.lstsq(
+            of_active / weights @ of_active.T, -bound[active], rcond=None
+        )[0]
+        u = of_active.T @ multipliers / weights
+        pulling = np.flatnonzero(active)[multipliers < -1e-9]  # of weights of order 1
+        violated = np.flatnonzero(dense @ u + bound < -1e-11)  # of lengths of order r
+        if len(pulling) == len(violated) == 0:
+            break
+        active[pulling] = False
+        active[violated] = True
+    assert len(pulling) == len(violated) == 0
     return predicted + u.reshape(-1, 3) * RADIUS / h
 
 
