@@ -218,6 +218,8 @@ void FixInelastic::init()
     error->all(FLERR, "Fix inelastic does not work with run_style respa: use run_style verlet");
   if (update->whichflag == 2)
     error->all(FLERR, "Fix inelastic does not work with minimize: unfix it first");
+  if (!(update->dt > 0.0))
+    error->all(FLERR, "Fix inelastic needs a timestep greater than 0, not {}", update->dt);
 
   walls_->init();
   walls_->warn();

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.resources import files
 
 import numpy as np
@@ -42,3 +43,23 @@ def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
     contacts = list(iterate_contact_frames(result.folder / "out" / "contacts.lammpsdump"))
     assert [frame.step for frame in contacts] == [345, 346, 347, 348]
     assert all(len(frame.ids) > 2000 for frame in contacts)  # a settled bed has 2,900
+
+
+@pytest.mark.parametrize(
+    ("variables", "named"),
+    [
+        ({"diameter": 0}, "diameter must be between 0 and 1"),
+        ({"diameter": 1.5}, "diameter must be between 0 and 1"),
+        ({"particles": 0}, "particles must be at least 1"),
+        ({"tolerance": -1}, "tolerance must be a length greater than 0"),
+        ({"dt": 0}, "timestep greater than 0"),
+        # 1,000 spheres of this size fill the container more than completely.
+        ({"diameter": 0.22}, "leaves no room"),
+    ],
+)
+def test_wrong_parameters(
+    variables: dict[str, float], named: str, refused: Callable[..., str]
+) -> None:
+    """One line says what is wrong."""
+    deck = (files("lammps_inelastic.inputs") / "spheres.in").read_text()
+    assert named in refused(deck, variables=variables)
