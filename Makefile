@@ -27,7 +27,7 @@ test: setup
 	pytest -m "not validation"
 
 validate: setup
-	pytest -m validation --durations=0
+	pytest -m validation -s --durations=0
 
 tables: setup
 	python tests/tables.py

@@ -92,7 +92,7 @@ SCENES = {
             "region walls cylinder y 0.5 0.5 0.5 0 5 units box",
             "cylinder y 0.5 0.5 0.44 0.06 4.94",
         ),
-        {"particles": 800},
+        {},
         2.0,
     ),
     "moving floor": (
