@@ -18,6 +18,7 @@ from scenes import (
     FloatArray,
     deepest_in_box,
     deepest_pair,
+    mass,
     random_points,
     read_dump,
     scene,
@@ -182,18 +183,24 @@ CONTAINERS = {
 }
 
 
-@pytest.mark.parametrize("name", CONTAINERS)
-@pytest.mark.parametrize("speed", [0, 20, 80])
-def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
-    regions, names, depth = CONTAINERS[name]
-    random = np.random.default_rng(7)
-    points = random_points(
-        100,
+def points_in_container(name: str, number: int) -> FloatArray:
+    """Centres (number, 3) of spheres of radius 0.05 that touch neither one another nor a wall."""
+    _, _, depth = CONTAINERS[name]
+    return random_points(
+        number,
         ((-0.75, 0.75), (-0.7, 2.6) if name != "cone" else (0.1, 1.4), (-0.75, 0.75)),
         0.1,
         seed=4,
         inside=lambda x: np.array([depth(p[None], np.full(1, 0.051), 0) < 0 for p in x]),
     )
+
+
+@pytest.mark.parametrize("name", CONTAINERS)
+@pytest.mark.parametrize("speed", [0, 20, 80])
+def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
+    regions, names, depth = CONTAINERS[name]
+    random = np.random.default_rng(7)
+    points = points_in_container(name, 100)
     deck = scene(
         points,
         0.05,
@@ -212,21 +219,14 @@ def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runn
     assert of_walls <= 2 * EPS * SLACK
     assert result.thermo["f_contact[5]"][-1] > 30  # a heap has formed
     # Gravity gives at most its potential energy; nothing else may.
-    assert result.thermo["KinEng"].max() <= result.thermo["KinEng"][0] + 100 * 4.2e-3 * 0.125 * (
-        GRAVITY * 3.7
-    )
+    potential = 100 * mass(0.05) * GRAVITY * 3.7
+    assert result.thermo["KinEng"].max() <= result.thermo["KinEng"][0] + potential
 
 
 @pytest.mark.parametrize("name", CONTAINERS)
 def test_concave_walls_only_take_energy(name: str, tmp_path: Path, lmp: Runner) -> None:
-    regions, names, depth = CONTAINERS[name]
-    points = random_points(
-        60,
-        ((-0.75, 0.75), (-0.7, 2.6) if name != "cone" else (0.1, 1.4), (-0.75, 0.75)),
-        0.1,
-        seed=4,
-        inside=lambda x: np.array([depth(p[None], np.full(1, 0.051), 0) < 0 for p in x]),
-    )
+    regions, names, _ = CONTAINERS[name]
+    points = points_in_container(name, 60)
     deck = scene(
         points,
         0.05,
