@@ -1,5 +1,6 @@
 """From a run's dumps to numbers: arrays in, arrays or small frozen dataclasses out."""
 
+from .bodies import Particles, group_spheres
 from .contacts import ContactFrame, iterate_contact_frames
 from .coordination import (
     ContactCounts,
@@ -9,6 +10,7 @@ from .coordination import (
 )
 from .errors import AnalysisError, DumpError, InputError, PictureError
 from .geometry import particles_inside
+from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import PackingFraction, packing_fraction
 from .particles import ParticleDump, ParticleFrame, read_particle_frame
@@ -21,15 +23,19 @@ __all__ = [
     "CoordinationNumber",
     "DumpError",
     "InputError",
+    "Orientation",
     "PackingFraction",
     "PairOverlap",
     "ParticleDump",
     "ParticleFrame",
+    "Particles",
     "PictureError",
     "WallOverlap",
     "contact_counts",
     "coordination_number",
+    "dimer_orientation",
     "draw_packing",
+    "group_spheres",
     "iterate_contact_frames",
     "largest_pair_overlap",
     "largest_wall_overlap",

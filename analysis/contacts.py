@@ -34,7 +34,7 @@ class ContactFrame:
     Attributes
     ----------
     step : time step
-    ids : (m, 2), both sides; the second is -k for wall k
+    ids : (m, 2), spheres on both sides; the second is -k for wall k
     points : (m, 3), contact point, length
     normals : (m, 3), unit vector from side 2 to side 1
     gaps : (m,), negative where the two overlap, length
@@ -96,24 +96,24 @@ def _check(data: FloatArray, header: FrameHeader, path: Path) -> None:
     for wrong, message in (
         (
             (ids != np.rint(ids)).any(axis=1) | (ids[:, 0] < 1) | (ids[:, 1] == 0),
-            "id1 must be a particle's id and id2 a particle's id or minus a wall's number",
+            "id1 must be a sphere's id and id2 a sphere's id or minus a wall's number",
         ),
-        (ids[:, 0] == ids[:, 1], "a particle is in contact with itself"),
+        (ids[:, 0] == ids[:, 1], "a sphere is in contact with itself"),
         (data[:, 9] <= 0, "the force of a contact must be positive"),
-        (_repeated(ids), "this pair of particles is listed twice"),
+        (_repeated(ids), "this pair of spheres is listed twice"),
     ):
         if wrong.any():
             raise DumpError(path, message, header.first_row_line + int(np.argmax(wrong)))
 
 
 def _repeated(ids: FloatArray) -> BoolArray:
-    """Say which rows repeat an earlier pair of particles, in either order.
+    """Say which rows repeat an earlier pair of spheres, in either order.
 
     A pair counted once by each of two ranks would double the coordination number unseen. Walls are
-    left out: a particle may touch one curved wall at several points.
+    left out: a sphere may touch one curved wall at several points.
     """
-    between_particles = np.flatnonzero(ids[:, 1] > 0)
-    _, first = np.unique(np.sort(ids[between_particles], axis=1), axis=0, return_index=True)
+    between_spheres = np.flatnonzero(ids[:, 1] > 0)
+    _, first = np.unique(np.sort(ids[between_spheres], axis=1), axis=0, return_index=True)
     repeated = np.zeros(len(ids), dtype=bool)
-    repeated[np.delete(between_particles, first)] = True
+    repeated[np.delete(between_spheres, first)] = True
     return repeated

@@ -1,7 +1,7 @@
-"""Coordination numbers: contacts of a particle with other particles.
+"""Coordination numbers: contacts of a particle, a body or a free sphere, with other particles.
 
 In contact means that the contact carries a force. Walls are counted apart and never enter the
-coordination number.
+coordination number. Contacts are between spheres: two bodies may have several with each other.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .bodies import Particles
 from .errors import InputError
 from .geometry import FloatArray, IntArray
 
@@ -22,11 +23,13 @@ class ContactCounts:
 
     Attributes
     ----------
-    particles : (n,), contacts with other particles
-    walls : (n,), contacts with walls
+    particles : (p,), contacts with other particles, each between two spheres
+    neighbours : (p,), other particles in contact, however many contacts there are with each
+    walls : (p,), contacts with walls, each of one sphere
     """
 
     particles: IntArray
+    neighbours: IntArray
     walls: IntArray
 
 
@@ -59,25 +62,50 @@ class CoordinationNumber:
         return float(self.particles * self.distribution[fewest : most + 1].sum())
 
 
-def contact_counts(contact_ids: ArrayLike, particle_ids: ArrayLike) -> ContactCounts:
+def contact_counts(
+    contact_ids: ArrayLike, sphere_ids: ArrayLike, particles: Particles | None = None
+) -> ContactCounts:
     """Count every particle's contacts; a contact between two particles counts for both.
 
     Parameters
     ----------
-    contact_ids : (m, 2), both sides; the second is -k for wall k
-    particle_ids : (n,), ids of the particles in the order of the result, in any order
+    contact_ids : (m, 2), spheres on both sides; the second is -k for wall k. Every pair of spheres
+        is there once at most, as in a `ContactFrame`
+    sphere_ids : (n,), ids of the spheres, in any order
+    particles : which spheres make up which particle, in the order of `sphere_ids`; the result has
+        the order of the particles. None: all spheres are free, and in the order of the result
     """
     contacts = np.asarray(contact_ids, dtype=np.int64)
-    ids = np.asarray(particle_ids, dtype=np.int64)
+    ids = np.asarray(sphere_ids, dtype=np.int64)
     if contacts.ndim != 2 or contacts.shape[1] != 2:
         raise InputError(f"contact ids must have shape (m, 2), not {contacts.shape}")
     if ids.ndim != 1 or len(ids) == 0:
-        raise InputError(f"particle ids must have shape (n,) with n >= 1, not {ids.shape}")
+        raise InputError(f"sphere ids must have shape (n,) with n >= 1, not {ids.shape}")
+
+    if particles is not None and len(particles.index) != len(ids):
+        raise InputError(f"{len(ids)} sphere ids, but {len(particles.index)} spheres in particles")
 
     with_wall = contacts[:, 1] < 0
+    pairs = _index_of(contacts[~with_wall], ids)
+    at_wall = _index_of(contacts[with_wall, 0], ids)
+    if particles is None or not particles.composite:
+        between = np.bincount(pairs.ravel(), minlength=len(ids))
+        return ContactCounts(between, between, np.bincount(at_wall, minlength=len(ids)))
+
+    sides = np.sort(particles.index[pairs], axis=1)
+    within = sides[:, 0] == sides[:, 1]
+    if within.any():
+        one, other = ids[pairs[within][0]]
+        body = particles.bodies[sides[within][0, 0]]
+        raise InputError(
+            f"spheres {one} and {other} are in contact, but both belong to body {body}"
+        )
+    count = len(particles)
+    touching = np.concatenate(np.divmod(np.unique(sides @ [count, 1]), count))
     return ContactCounts(
-        particles=np.bincount(_index_of(contacts[~with_wall].ravel(), ids), minlength=len(ids)),
-        walls=np.bincount(_index_of(contacts[with_wall, 0], ids), minlength=len(ids)),
+        particles=np.bincount(sides.ravel(), minlength=count),
+        neighbours=np.bincount(touching, minlength=count),
+        walls=np.bincount(particles.index[at_wall], minlength=count),
     )
 
 
@@ -89,8 +117,8 @@ def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> Coord
 
     Parameters
     ----------
-    counts : one array (n,) per frame, such as `ContactCounts.particles`
-    chosen : (n,) of bool, such as the result of `particles_inside`
+    counts : one array (p,) per frame, such as `ContactCounts.particles`
+    chosen : (p,) of bool, such as the result of `particles_inside`
     """
     mask = np.asarray(chosen, dtype=np.bool_)
     particles = int(mask.sum())
@@ -119,10 +147,11 @@ def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> Coord
 
 
 def _index_of(wanted: IntArray, ids: IntArray) -> IntArray:
+    """Return the places of some ids among all, in the shape of `wanted`."""
     order = np.argsort(ids)
     place = np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)
     index = order[place]
     unknown = ids[index] != wanted
     if unknown.any():
-        raise InputError(f"a contact names particle {wanted[unknown][0]}, which does not exist")
+        raise InputError(f"a contact names sphere {wanted[unknown][0]}, which does not exist")
     return index

@@ -53,7 +53,7 @@ def particles_inside(positions: ArrayLike, box: ArrayLike) -> BoolArray:
 
     Parameters
     ----------
-    positions : (n, 3), length
+    positions : (n, 3), such as `Particles.centres`, length
     box : (3, 2), length
 
     Returns

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 from MDAnalysis.coordinates.LAMMPS import DumpReader
 
+from .bodies import Particles, group_spheres
 from .dump_text import (
     FrameHeader,
     malformed_row,
@@ -26,7 +28,7 @@ COLUMNS = ("id", "x", "y", "z", "vx", "vy", "vz", "radius")
 
 @dataclass(frozen=True, eq=False)
 class ParticleFrame:
-    """The particles at one step, ordered by id. A particle is one sphere, also in a body.
+    """The spheres at one step, ordered by id, and the particles that they make up.
 
     Attributes
     ----------
@@ -48,6 +50,11 @@ class ParticleFrame:
     bodies: IntArray | None
     box: FloatArray
     boundaries: tuple[str, str, str]
+
+    @cached_property
+    def particles(self) -> Particles:
+        """Which spheres make up which particle; all are free where the dump has no `mol`."""
+        return group_spheres(np.zeros_like(self.ids) if self.bodies is None else self.bodies)
 
 
 class ParticleDump:
@@ -124,7 +131,7 @@ class ParticleDump:
             row, column = np.argwhere(~finite)[0]
             raise DumpError(
                 self.path,
-                f"step {step}, particle {ids[row]:.0f}: "
+                f"step {step}, sphere {ids[row]:.0f}: "
                 f"{self._columns[column]} is {data[row, column]}",
             )
         if ids[0] < 1 or (np.diff(ids) == 0).any():
@@ -132,8 +139,18 @@ class ParticleDump:
         if (radii <= 0).any():
             first = np.argmax(radii <= 0)
             raise DumpError(
-                self.path, f"step {step}, particle {ids[first]:.0f}: radius is not positive"
+                self.path, f"step {step}, sphere {ids[first]:.0f}: radius is not positive"
             )
+        if "mol" in self._columns:
+            bodies = data[:, 8]
+            wrong = (bodies < 0) | (bodies != np.rint(bodies))
+            if wrong.any():
+                first = np.argmax(wrong)
+                raise DumpError(
+                    self.path,
+                    f"step {step}, sphere {ids[first]:.0f}: mol must be a body's number or 0, "
+                    f"not {bodies[first]:g}",
+                )
 
 
 def read_particle_frame(path: str | PathLike[str], index: int = -1) -> ParticleFrame:
@@ -142,19 +159,19 @@ def read_particle_frame(path: str | PathLike[str], index: int = -1) -> ParticleF
 
 
 def _scanned_headers(path: Path) -> list[FrameHeader]:
-    """Read all headers; see that every frame is whole and has the same particles and columns."""
+    """Read all headers; see that every frame is whole and has the same spheres and columns."""
     headers: list[FrameHeader] = []
     line = 1
     with open_dump(path) as dump:
         while header := read_header(dump, path, line):
             require_columns(header, COLUMNS, path)
             if header.rows == 0:
-                raise DumpError(path, f"the frame of step {header.step} has no particles", line + 3)
+                raise DumpError(path, f"the frame of step {header.step} has no spheres", line + 3)
             first = headers[0] if headers else header
             if header.rows != first.rows:
                 raise DumpError(
                     path,
-                    f"{header.rows} particles at step {header.step}, "
+                    f"{header.rows} spheres at step {header.step}, "
                     f"but {first.rows} at step {first.step}",
                     line + 3,
                 )

@@ -20,7 +20,7 @@ from .geometry import FloatArray, IntArray, as_box, as_spheres
 OVERSAMPLING = 2
 # LAMMPS's zoom at which a cube, seen from here, still fits into the image.
 ZOOM = 1.15
-MOST_CONTACTS = 10
+CONTACT_SHADES = 11
 RADIUS_SHADES = 8
 PALETTE = "viridis"
 BACKGROUND = (255, 255, 255)
@@ -54,6 +54,7 @@ def draw_packing(
     container: ArrayLike,
     contacts: ArrayLike | None = None,
     *,
+    contacts_per_colour: int = 1,
     pixels: int = 1200,
 ) -> None:
     """Write a PNG of a packing and the edges of its container; -y, where things fall, is down.
@@ -66,12 +67,18 @@ def draw_packing(
     positions : (n, 3), length
     radii : (n,), length
     container : (3, 2), lower and upper bound per axis, length
-    contacts : (n,), contacts of each sphere with others, for the colours; by radius if None
+    contacts : (n,), contacts of each sphere, or of its body, with others, for the colours; by
+        radius if None
+    contacts_per_colour : how many numbers of contacts share a colour: bodies have more contacts
+        than there are colours to tell apart
     pixels : the larger side of the picture, about
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(container)
-    shading = _by_radius(radius) if contacts is None else _by_contacts(contacts, len(radius))
+    if contacts is None:
+        shading = _by_radius(radius)
+    else:
+        shading = _by_contacts(contacts, len(radius), contacts_per_colour)
     with tempfile.TemporaryDirectory(prefix="inelastic-picture-") as folder:
         raw = Path(folder) / "packing.ppm"
         _render(raw, centres, radius, bounds, shading, pixels * OVERSAMPLING)
@@ -86,13 +93,17 @@ def draw_packing(
         raise PictureError(f"{target}: cannot be written: {error.strerror}") from None
 
 
-def _by_contacts(contacts: ArrayLike, count: int) -> _Shading:
+def _by_contacts(contacts: ArrayLike, count: int, width: int) -> _Shading:
     numbers = np.asarray(contacts, dtype=np.int64)
     if numbers.shape != (count,):
         raise InputError(f"contacts must have shape ({count},), not {numbers.shape}")
-    labels = [str(number) for number in range(MOST_CONTACTS)] + [f"{MOST_CONTACTS}+"]
+    if width < 1:
+        raise InputError(f"a colour stands for at least one number of contacts, not {width}")
+    starts = [shade * width for shade in range(CONTACT_SHADES)]
+    labels = [str(start) if width == 1 else f"{start}-{start + width - 1}" for start in starts]
+    labels[-1] = f"{starts[-1]}+"
     return _Shading(
-        index=np.clip(numbers, 0, MOST_CONTACTS),
+        index=np.clip(numbers // width, 0, CONTACT_SHADES - 1),
         colours=_palette(len(labels)),
         labels=labels,
         title="contacts with other particles",

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import (
     AnalysisError,
+    ContactCounts,
     CoordinationNumber,
+    Orientation,
     PackingFraction,
     PairOverlap,
     ParticleFrame,
@@ -23,6 +25,7 @@ from lammps_inelastic.analysis import (
     WallOverlap,
     contact_counts,
     coordination_number,
+    dimer_orientation,
     draw_packing,
     iterate_contact_frames,
     largest_pair_overlap,
@@ -39,7 +42,11 @@ PICTURE = "packing.png"
 # The box of the paper: a quarter of the container's width away from every wall and the floor.
 MEASURING_BOX = (0.25, 0.75, 0.25, 0.75, 0.25, 0.75)
 
+# A body in a packing has about ten contacts and more, a sphere about six.
+CONTACTS_PER_COLOUR_OF_BODIES = 2
+
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -108,8 +115,26 @@ def _complain(error: Exception) -> int:
 
 
 @dataclass(frozen=True, eq=False)
+class _Bodies:
+    """What is said of a packing only where some of its particles are bodies of several spheres.
+
+    Attributes
+    ----------
+    neighbours : as the coordination number, but a particle touched several times counts once
+    walls : as the coordination number, of contacts with walls
+    walls_in_all : contacts of all particles with walls, mean over the frames
+    orientation : of the dimers in the box; None if there are other bodies, or no dimer in the box
+    """
+
+    neighbours: CoordinationNumber
+    walls: CoordinationNumber
+    walls_in_all: float
+    orientation: Orientation | None
+
+
+@dataclass(frozen=True, eq=False)
 class _Look:
-    """What `inelastic look` found in a folder.
+    """What `inelastic look` found in a folder. A particle is a body, or a free sphere.
 
     Attributes
     ----------
@@ -120,7 +145,8 @@ class _Look:
     packing : packing fraction in the box
     coordination : coordination number of the particles in the box, over all contact frames
     contact_steps : first and last step of the contact frames
-    pair : largest overlap of two particles
+    bodies : None where every particle is one sphere
+    pair : largest overlap of two spheres of different particles
     wall : largest overlap with a wall; None where the walls are not known
     picture : where the picture is; None if there is none
     """
@@ -132,6 +158,7 @@ class _Look:
     packing: PackingFraction
     coordination: CoordinationNumber
     contact_steps: tuple[int, int]
+    bodies: _Bodies | None
     pair: PairOverlap
     wall: WallOverlap | None
     picture: Path | None
@@ -155,17 +182,18 @@ def _look(options: argparse.Namespace) -> int:
         )
 
     box = np.reshape(np.asarray(options.box, dtype=np.float64), (3, 2))
-    chosen = particles_inside(frame.positions, box)
+    particles = frame.particles
+    chosen = particles_inside(particles.centres(frame.positions), box)
     if not chosen.any():
         raise AnalysisError(
             f"{folder / PARTICLE_DUMP}: no particle's centre lies in the box {_as_ranges(box)} "
             f"at step {frame.step}; choose another with --box"
         )
     steps: list[int] = []
-    counts = []
+    counts: list[ContactCounts] = []
     for contacts in iterate_contact_frames(folder / CONTACT_DUMP):
         steps.append(contacts.step)
-        counts.append(contact_counts(contacts.ids, frame.ids).particles)
+        counts.append(contact_counts(contacts.ids, frame.ids, particles))
 
     walls: FloatArray | None = None
     if options.container is not None:
@@ -182,7 +210,8 @@ def _look(options: argparse.Namespace) -> int:
                 frame.positions,
                 frame.radii,
                 frame.box if walls is None else walls,
-                counts[-1],
+                counts[-1].particles[particles.index],
+                contacts_per_colour=CONTACTS_PER_COLOUR_OF_BODIES if particles.composite else 1,
             )
         # The numbers do not need the picture: they are printed, and what failed is said last.
         except PictureError as error:
@@ -196,8 +225,9 @@ def _look(options: argparse.Namespace) -> int:
         packing=packing_fraction(
             frame.positions, frame.radii, box, points=options.points, seed=options.seed
         ),
-        coordination=coordination_number(counts, chosen),
+        coordination=coordination_number((count.particles for count in counts), chosen),
         contact_steps=(steps[0], steps[-1]),
+        bodies=_of_bodies(frame, box, chosen, counts) if particles.composite else None,
         pair=largest_pair_overlap(frame.positions, frame.radii, frame.bodies),
         wall=None if walls is None else largest_wall_overlap(frame.positions, frame.radii, walls),
         picture=picture,
@@ -206,37 +236,53 @@ def _look(options: argparse.Namespace) -> int:
     return 0 if failure is None else _complain(failure)
 
 
+def _of_bodies(
+    frame: ParticleFrame, box: FloatArray, chosen: BoolArray, counts: Sequence[ContactCounts]
+) -> _Bodies:
+    particles = frame.particles
+    is_body = particles.bodies > 0
+    dimers = bool((particles.sizes[is_body] == 2).all() and (is_body & chosen).any())
+    return _Bodies(
+        neighbours=coordination_number((count.neighbours for count in counts), chosen),
+        walls=coordination_number((count.walls for count in counts), chosen),
+        walls_in_all=float(np.mean([count.walls.sum() for count in counts])),
+        orientation=dimer_orientation(frame.positions, particles, box) if dimers else None,
+    )
+
+
 def _as_text(found: _Look) -> str:
-    coordination, ids = found.coordination, found.frame.ids
+    coordination, ids, bodies = found.coordination, found.frame.ids, found.bodies
     first, last = found.contact_steps
     if coordination.scatter is None:
-        mean = f"{coordination.mean:.3f}"
         over = f"one frame, step {first}"
     else:
-        mean = f"{coordination.mean:.3f} ± {coordination.scatter:.3f}"
         over = f"{coordination.frames} frames, steps {first} to {last}; ± is their scatter"
 
     pair, wall = found.pair, found.wall
-    where_pair = f"particles {ids[pair.pair[0]]} and {ids[pair.pair[1]]}" if pair.pair else "none"
+    # Overlaps are between spheres; where every particle is a sphere, they are between particles.
+    one = "particle" if bodies is None else "sphere"
+    where_pair = f"{one}s {ids[pair.pair[0]]} and {ids[pair.pair[1]]}" if pair.pair else "none"
     if wall is None:
         with_wall = ("-", "the box is not fixed: give --container or --walls")
     else:
-        touched = "none" if wall.particle is None else f"particle {ids[wall.particle]}, {wall.face}"
+        touched = "none" if wall.particle is None else f"{one} {ids[wall.particle]}, {wall.face}"
         with_wall = (f"{wall.depth / found.smallest_radius:.3g} r", touched)
 
     rows = [
-        ("particles", f"{len(ids)}", f"step {found.frame.step}"),
+        ("particles", f"{len(found.frame.particles)}", f"step {found.frame.step}"),
+        *([] if bodies is None else [("  spheres", f"{len(ids)}", _sizes(found.frame))]),
         (
             "packing fraction",
             f"{found.packing.value:.4f} ± {found.packing.uncertainty:.4f}",
             f"{found.packing.points:,} points, seed {found.seed}",
         ),
-        ("coordination number", mean, over),
+        ("coordination number", _as_mean(coordination), over),
         (
             "  0 or 1 contacts",
             f"{coordination.particles_with(0, 1):.1f} particles",
             f"of the {coordination.particles} in the box",
         ),
+        *([] if bodies is None else _body_rows(bodies)),
         ("largest overlap", f"{pair.depth / found.smallest_radius:.3g} r", where_pair),
         ("  with a wall", *with_wall),
     ]
@@ -258,11 +304,44 @@ def _as_text(found: _Look) -> str:
     )
 
 
+def _as_mean(number: CoordinationNumber) -> str:
+    return f"{number.mean:.3f}" + ("" if number.scatter is None else f" ± {number.scatter:.3f}")
+
+
+def _sizes(frame: ParticleFrame) -> str:
+    sizes = frame.particles.sizes
+    fewest, most = int(sizes.min()), int(sizes.max())
+    return f"{most} in each" if fewest == most else f"{fewest} to {most} in each"
+
+
+def _body_rows(bodies: _Bodies) -> list[tuple[str, str, str]]:
+    rows = [
+        ("  neighbours", _as_mean(bodies.neighbours), "several contacts with one count once"),
+        (
+            "  wall contacts",
+            _as_mean(bodies.walls),
+            f"in the box; {bodies.walls_in_all:.1f} contacts with walls in all",
+        ),
+    ]
+    lie = bodies.orientation
+    if lie is not None:
+        errors = [None] * 3 if lie.standard_errors is None else lie.standard_errors.tolist()
+        notes = (
+            f"root mean square of x_i - x_j in the {lie.dimers} dimers in the box",
+            "of y_i - y_j; ± is the standard error",
+            f"of z_i - z_j; isotropic: {lie.isotropic:.4g}",
+        )
+        for axis, mean, error, note in zip("xyz", lie.components, errors, notes, strict=True):
+            value = f"{mean:.4g}" if error is None else f"{mean:.4g} ± {error:.2g}"
+            rows.append((f"a_{axis}", value, note))
+    return rows
+
+
 def _as_json(found: _Look) -> str:
     coordination, ids, wall = found.coordination, found.frame.ids, found.wall
     report: dict[str, Any] = {
         "step": found.frame.step,
-        "particles": len(ids),
+        "particles": len(found.frame.particles),
         "smallest_radius": found.smallest_radius,
         "box": found.box.tolist(),
         "packing_fraction": {
@@ -297,7 +376,31 @@ def _as_json(found: _Look) -> str:
             "picture": None if found.picture is None else str(found.picture),
         },
     }
+    if found.bodies is not None:
+        report |= _bodies_report(found.bodies, len(ids))
     return json.dumps(report, indent=2, allow_nan=False)
+
+
+def _bodies_report(bodies: _Bodies, spheres: int) -> dict[str, Any]:
+    lie = bodies.orientation
+    errors = None if lie is None else lie.standard_errors
+    return {
+        "spheres": spheres,
+        "neighbours": {"mean": bodies.neighbours.mean, "scatter": bodies.neighbours.scatter},
+        "wall_contacts": {
+            "mean": bodies.walls.mean,
+            "scatter": bodies.walls.scatter,
+            "in_all": bodies.walls_in_all,
+        },
+        "orientation": None
+        if lie is None
+        else {
+            "components": lie.components.tolist(),
+            "standard_errors": None if errors is None else errors.tolist(),
+            "isotropic": lie.isotropic,
+            "dimers": lie.dimers,
+        },
+    }
 
 
 def _as_ranges(box: FloatArray) -> str:

@@ -76,9 +76,9 @@ def test_all_particles_in_the_mean():
 
 
 def test_unknown_particle():
-    with pytest.raises(InputError, match="names particle 25, which does not exist"):
+    with pytest.raises(InputError, match="names sphere 25, which does not exist"):
         contact_counts([[10, 25]], IDS)
-    with pytest.raises(InputError, match="names particle 41"):
+    with pytest.raises(InputError, match="names sphere 41"):
         contact_counts([[41, -1]], IDS)
 
 
@@ -98,5 +98,5 @@ def test_wrong_input(frames, chosen, message):
 def test_wrong_shapes():
     with pytest.raises(InputError, match=r"contact ids must have shape \(m, 2\), not \(2,\)"):
         contact_counts([1, 2], IDS)
-    with pytest.raises(InputError, match=r"particle ids must have shape \(n,\)"):
+    with pytest.raises(InputError, match=r"sphere ids must have shape \(n,\)"):
         contact_counts([[1, 2]], [])

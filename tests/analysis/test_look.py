@@ -134,6 +134,144 @@ def test_spheres_of_a_body_may_overlap(tmp_path, write_particles, write_contacts
     assert pair["depth"] == pytest.approx(0.05, abs=1e-15)
 
 
+# From layer to layer: spheres that touch have their centres 0.05 apart along x and along z.
+HEIGHT = np.sqrt((0.2 - 1e-4) ** 2 - 2 * 0.05**2)
+# The centres of the second and the third dimer are inside; the spheres of the third are not.
+MIDDLE = ["--box", "0.48", "0.52", "0.2", "0.6", "0.48", "0.6"]
+
+
+@pytest.fixture
+def dimers(tmp_path, write_particles, write_contacts):
+    """Return a folder with a pile of four dimers of two spheres of radius 0.1, 0.1 apart.
+
+    They lie crosswise on top of each other and on the floor, 1e-4 too deep, along x, z, x and z.
+    The first one's spheres have the ids 1 and 5, and so on.
+    """
+    rows = []
+    for layer in range(4):
+        arm = np.array([0.05, 0, 0] if layer % 2 == 0 else [0, 0, 0.05])
+        centre = np.array([0.5, 0.1 - 1e-4 + layer * HEIGHT, 0.5])
+        for id_, at in ((1 + layer, centre - arm), (5 + layer, centre + arm)):
+            rows.append([id_, 10 + layer, 1, *at, 0, 0, 0, 0.1])
+    write_particles({90: rows}, columns="id mol type x y z vx vy vz radius")
+    contacts = [
+        [a, b, 0, 0, 0, 0, -1, 0, -1e-4, 1]
+        for layer in (1, 2, 3)
+        for a in (layer, layer + 4)
+        for b in (layer + 1, layer + 5)
+    ]
+    floor = [[id_, -3, 0, 0, 0, 0, 1, 0, 0, 1] for id_ in (1, 5)]
+    # In the second frame a contact between the second and the third dimer is missing.
+    missing = [row for row in contacts if row[:2] != [2, 3]]
+    write_contacts({80: contacts + floor, 90: missing + floor})
+    return tmp_path
+
+
+def test_dimers(dimers, capsys):
+    assert main(["look", str(dimers), *MIDDLE, "--no-picture", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["step"], found["particles"], found["spheres"]) == (90, 4, 8)
+
+    # Eight contacts each, with two neighbours; in the second frame seven.
+    coordination = found["coordination_number"]
+    assert (coordination["particles"], coordination["frames"]) == (2, 2)
+    assert coordination["mean"] == 7.5
+    # The standard deviation of 8 and 7.
+    assert coordination["scatter"] == pytest.approx(np.sqrt(0.5), rel=1e-14)
+    assert coordination["particles_with_0_or_1"] == 0
+    assert found["neighbours"] == {"mean": 2, "scatter": 0}
+    assert found["wall_contacts"] == {"mean": 0, "scatter": 0, "in_all": 2}
+
+    # One along z, one along x, each 0.1 long: the squares are 0.01 and 0. Differences of
+    # coordinates near 1 in float64.
+    orientation = found["orientation"]
+    expected = [0.1 / np.sqrt(2), 0, 0.1 / np.sqrt(2)]
+    assert orientation["components"] == pytest.approx(expected, abs=1e-15)
+    assert orientation["standard_errors"] == pytest.approx(np.array(expected) / 2, abs=1e-15)
+    assert orientation["isotropic"] == pytest.approx(0.1 / np.sqrt(3), abs=1e-15)
+    assert orientation["dimers"] == 2
+
+    # Spheres of one dimer overlap by 0.1, those of different dimers by 1e-4.
+    pair = found["largest_pair_overlap"]
+    assert pair["depth"] == pytest.approx(1e-4, abs=1e-15)
+    below, above = sorted((id_ - 1) % 4 for id_ in pair["ids"])
+    assert above == below + 1
+
+
+def test_text_and_picture_of_dimers(dimers, capsys):
+    assert main(["look", str(dimers), *MIDDLE]) == 0
+    output = " ".join(capsys.readouterr().out.split())
+    for expected in (
+        "particles 4 step 90 spheres 8 2 in each packing fraction 0.",
+        "coordination number 7.500 ± 0.707 2 frames, steps 80 to 90",
+        "0 or 1 contacts 0.0 particles of the 2 in the box",
+        "neighbours 2.000 ± 0.000 several contacts with one count once",
+        "wall contacts 0.000 ± 0.000 in the box; 2.0 contacts with walls in all",
+        "a_x 0.07071 ± 0.035 root mean square of x_i - x_j in the 2 dimers in the box",
+        "a_y 0 ± 0 of y_i - y_j; ± is the standard error",
+        "a_z 0.07071 ± 0.035 of z_i - z_j; isotropic: 0.05774",
+        "largest overlap 0.001 r spheres ",
+        "with a wall 0.001 r sphere 1, ylo",
+    ):
+        assert expected in output
+    assert (dimers / "packing.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_colours_are_the_contacts_of_bodies(dimers, monkeypatch):
+    drawn = {}
+
+    def remember(path, positions, radii, container, contacts, *, contacts_per_colour):
+        drawn["contacts"], drawn["contacts_per_colour"] = contacts.tolist(), contacts_per_colour
+
+    monkeypatch.setattr("lammps_inelastic.workflow.main.draw_packing", remember)
+    assert main(["look", str(dimers), *MIDDLE]) == 0
+    # Of the last frame, sphere by sphere in the order of the ids.
+    assert drawn == {"contacts": [4, 7, 7, 4] * 2, "contacts_per_colour": 2}
+
+
+@pytest.mark.parametrize(
+    ("bodies", "dimers_in_box"),
+    [
+        ([1, 1, 2, 2, 0, 0, 0, 0], 2),
+        ([1, 1, 0, 0, 0, 0, 2, 2], 1),
+        ([0, 0, 0, 0, 0, 0, 1, 1], None),
+        ([1, 1, 2, 2, 2, 0, 0, 0], None),
+        ([1, 1, 2, 3, 3, 3, 3, 0], None),
+    ],
+    ids=["dimers and free spheres", "one of two", "none of one", "a trimer", "one, two and four"],
+)
+def test_orientation_only_of_dimers(
+    tmp_path, write_particles, write_contacts, capsys, bodies, dimers_in_box
+):
+    rows = [[i + 1, bodies[i], 1, 0.1 * (i + 1), 1, 0.5, 0, 0, 0, 0.05] for i in range(8)]
+    write_particles({0: rows}, columns="id mol type x y z vx vy vz radius")
+    write_contacts({0: []})
+    command = ["look", str(tmp_path), "--box", "0", "0.72", "0", "5", "0", "1", "--no-picture"]
+    assert main([*command, "--json"]) == 0
+    orientation = json.loads(capsys.readouterr().out)["orientation"]
+    assert main(command) == 0
+    assert ("a_x" in capsys.readouterr().out) == (dimers_in_box is not None)
+    assert (orientation and orientation["dimers"]) == dimers_in_box
+    if dimers_in_box == 1:
+        assert orientation["standard_errors"] is None
+
+
+@pytest.mark.parametrize("numbers", [[0] * 125, range(1, 126)], ids=["free", "bodies of one"])
+def test_bodies_of_one_sphere_look_like_spheres(run, write_particles, capsys, numbers):
+    def shown():
+        arguments = ["look", str(run), *BOX, "--no-picture", "--points", "1000"]
+        assert main(arguments) == 0
+        assert main([*arguments, "--json"]) == 0
+        return capsys.readouterr().out
+
+    without = shown()
+    lines = (run / "particles.lammpsdump").read_text().splitlines()[-125:]
+    rows = [[float(field) for field in line.split()] for line in lines]
+    rows = [[row[0], number, *row[1:]] for row, number in zip(rows, numbers, strict=True)]
+    write_particles({90: rows}, columns="id mol type x y z vx vy vz radius")
+    assert shown() == without
+
+
 def failure_of(arguments, capsys):
     """Run the command line; return what it says, after seeing that it is one line and no more."""
     assert main(arguments) == 2
@@ -161,7 +299,13 @@ def test_truncated_dump(run, capsys):
 
 def test_contact_of_an_unknown_particle(run, write_contacts, capsys):
     write_contacts({0: [[1, 999, 0, 0, 0, 1, 0, 0, 0, 1]]})
-    assert "names particle 999" in failure_of(["look", str(run)], capsys)
+    assert "names sphere 999" in failure_of(["look", str(run)], capsys)
+
+
+def test_contact_within_a_body(dimers, write_contacts, capsys):
+    write_contacts({0: [[6, 2, 0, 0, 0, 1, 0, 0, -0.1, 1]]})
+    message = "spheres 6 and 2 are in contact, but both belong to body 11"
+    assert message in failure_of(["look", str(dimers), *MIDDLE], capsys)
 
 
 def test_periodic_box(run, capsys):

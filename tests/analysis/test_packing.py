@@ -38,6 +38,21 @@ def test_overlap_counts_once():
     assert_within_four_sigma(packing_fraction(centres, [0.3, 0.3], UNIT), 2 * ball(0.3) - lens)
 
 
+@pytest.mark.parametrize("separation", [0.5, 1.0])
+def test_dimers(separation):
+    # On a grid, no two dimers overlap. V = 2 (pi d^3 / 6) - lens, where the centres are half a
+    # diameter apart, or a diameter (no lens).
+    diameter = 0.16
+    distance = separation * diameter
+    lens = np.pi / 12 * (2 * diameter + distance) * (diameter - distance) ** 2
+    grid = (np.mgrid[:3, :3, :3].reshape(3, -1).T + 0.5) / 3
+    arms = np.random.default_rng(4).normal(size=grid.shape)
+    arms *= distance / 2 / np.linalg.norm(arms, axis=1)[:, None]
+    centres = np.vstack([grid - arms, grid + arms])
+    measured = packing_fraction(centres, np.full(len(centres), diameter / 2), UNIT)
+    assert_within_four_sigma(measured, len(grid) * (2 * np.pi * diameter**3 / 6 - lens))
+
+
 def test_the_same_sphere_twice_counts_once():
     once = packing_fraction([[0.5, 0.5, 0.5]], [0.4], UNIT, seed=3)
     twice = packing_fraction([[0.5, 0.5, 0.5]] * 2, [0.4, 0.4], UNIT, seed=3)

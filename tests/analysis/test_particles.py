@@ -39,6 +39,26 @@ def test_molecules_are_bodies(write_particles):
     assert frame.bodies.tolist() == [4, 0]
 
 
+def test_spheres_of_a_molecule_are_one_particle(write_particles):
+    rows = [[1, 4, *FIRST[1:]], [2, 0, *SECOND[1:]], [3, 4, *FIRST[1:]]]
+    frame = read_particle_frame(write_particles({0: rows}, "id mol type x y z vx vy vz radius"))
+    assert frame.particles.index.tolist() == [0, 1, 0]
+    assert frame.particles.bodies.tolist() == [4, 0]
+
+
+def test_without_molecules_every_sphere_is_a_particle(write_particles):
+    frame = read_particle_frame(write_particles({0: [FIRST, SECOND]}))
+    assert frame.particles.index.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("mol", [-1, 1.5])
+def test_molecule_that_is_no_body(write_particles, mol):
+    rows = [[1, 0, *FIRST[1:]], [2, mol, *SECOND[1:]]]
+    path = write_particles({0: rows}, "id mol type x y z vx vy vz radius")
+    with pytest.raises(DumpError, match=f"sphere 2: mol must be a body's number or 0, not {mol}"):
+        read_particle_frame(path)
+
+
 def test_frames_by_index_and_in_order(write_particles):
     frames = {step: [[1, 1, step / 8, 0, 0, 0, 0, 0, 1]] for step in (0, 3, 5)}
     dump = ParticleDump(write_particles(frames))
@@ -53,7 +73,7 @@ def test_a_frame_is_read_only_when_asked_for(write_particles):
     bad = [*FIRST[:-1], np.nan]
     dump = ParticleDump(write_particles({0: [FIRST], 1: [bad]}))
     assert dump[0].radii.tolist() == [0.055]
-    with pytest.raises(DumpError, match="step 1, particle 1: radius is nan"):
+    with pytest.raises(DumpError, match="step 1, sphere 1: radius is nan"):
         dump[1]
 
 
@@ -127,13 +147,13 @@ def test_wrong_number_of_rows(write_particles, announced):
 
 
 def test_frame_without_particles(write_particles):
-    with pytest.raises(DumpError, match="line 4: the frame of step 5 has no particles"):
+    with pytest.raises(DumpError, match="line 4: the frame of step 5 has no spheres"):
         read_particle_frame(write_particles({5: []}))
 
 
 def test_number_of_particles_changes(write_particles):
     path = write_particles({0: [FIRST, SECOND], 1: [FIRST]})
-    with pytest.raises(DumpError, match="line 15: 1 particles at step 1, but 2 at step 0"):
+    with pytest.raises(DumpError, match="line 15: 1 spheres at step 1, but 2 at step 0"):
         read_particle_frame(path)
 
 
@@ -150,8 +170,8 @@ def test_columns_change(write_particles):
     [
         (" 0.11 ", " 0.1x1 ", "line 11: radius = '0.1x1' is no number"),
         (" 0.11 ", " ", "line 11: expected 9 values, found 8"),
-        (" 0.11 ", " inf ", "step 0, particle 2: radius is inf"),
-        (" 0.11 ", " 0 ", "step 0, particle 2: radius is not positive"),
+        (" 0.11 ", " inf ", "step 0, sphere 2: radius is inf"),
+        (" 0.11 ", " 0 ", "step 0, sphere 2: radius is not positive"),
         (" 0.11 ", " \xe9 ", "line 11: radius = .* is no number"),
         ("\n2 1", "\n1 1", "step 0: ids must be positive and each there once"),
         ("ff ff ff", "xy xz yz ff ff ff", "line 5: expected an orthogonal box"),

@@ -31,6 +31,33 @@ def test_colours_and_gravity(tmp_path):
     assert np.median(violet[:, 0]) < np.median(yellow[:, 0])
 
 
+def test_colours_of_bodies(tmp_path):
+    # Thirteen contacts are yellow; where each colour stands for two numbers they are green.
+    green_pixels = []
+    path = tmp_path / "packing.png"
+    for width in (1, 2):
+        draw_packing(
+            path, CENTRES, RADII, CONTAINER, [1, 13], contacts_per_colour=width, pixels=300
+        )
+        red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
+        green_pixels.append(np.count_nonzero((green > red + 60) & (green > blue + 20)))
+    # The sphere is about 60 pixels wide; the legend's three green discs have below 100 pixels each.
+    assert green_pixels[0] < 300
+    assert green_pixels[1] > 1000
+
+
+def test_overlapping_spheres_meet_in_a_plane(tmp_path):
+    # Side by side, at right angles to the view: each is seen up to the plane between them.
+    path = tmp_path / "packing.png"
+    across = 0.1 * np.array([-0.3725, 0, 0.928])
+    draw_packing(path, [0.5 - across, 0.5 + across], [0.2, 0.2], CONTAINER, [12, 0], pixels=300)
+    red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
+    yellow = np.count_nonzero((red > blue + 20) & (green > blue + 20))
+    violet = np.count_nonzero((red > green + 20) & (blue > green + 20))
+    # Up to dark pixels and the legend. Of a sphere drawn over the other 1.6 times as much is seen.
+    assert yellow / violet == pytest.approx(1, abs=0.3)
+
+
 @pytest.mark.parametrize("size", [(1, 1, 1), (1, 5, 1), (5, 1, 1), (1, 1, 5)])
 def test_nothing_is_cut_off(tmp_path, size):
     path = tmp_path / "packing.png"
@@ -67,3 +94,10 @@ def test_picture_into_no_folder(tmp_path):
 def test_wrong_number_of_contacts(tmp_path):
     with pytest.raises(InputError, match=r"contacts must have shape \(2,\), not \(3,\)"):
         draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2, 3])
+
+
+def test_a_colour_for_no_contacts_at_all(tmp_path):
+    with pytest.raises(InputError, match="at least one number of contacts, not 0"):
+        draw_packing(
+            tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2], contacts_per_colour=0
+        )
