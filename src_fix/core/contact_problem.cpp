@@ -30,6 +30,10 @@ void GapOperator::prepare(const ContactProblem &problem)
         problem.timestep *
             (n[0] * (vi[0] - vj[0]) + n[1] * (vi[1] - vj[1]) + n[2] * (vi[2] - vj[2]));
   }
+  if (problem.bodies.empty()) return;
+  free_particles_.clear();
+  for (int i = 0; i <= problem.particles; ++i)
+    if (i == problem.particles || problem.bodies.body[i] < 0) free_particles_.push_back(i);
 }
 
 // Contacts come in runs with the same first particle, in the order of the neighbour list. Its sum
@@ -84,11 +88,18 @@ void GapOperator::velocity_change(const ContactProblem &problem, const double *i
   std::fill(change_.begin(), change_.end(), 0.0);
   scatter_impulses(problem.contacts, impulse, change);
   host.sum_over_copies(change);
-  for (std::size_t i = 0; i <= static_cast<std::size_t>(problem.particles); ++i) {
+  auto divide_by_mass = [&](std::size_t i) {
     const double w = problem.inverse_mass[i];
     change[3 * i] *= w;
     change[3 * i + 1] *= w;
     change[3 * i + 2] *= w;
+  };
+  if (problem.bodies.empty()) {
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(problem.particles); ++i)
+      divide_by_mass(i);
+  } else {
+    for (const int i : free_particles_) divide_by_mass(i);
+    problem.bodies.velocity_change(change);
   }
 }
 

@@ -16,6 +16,7 @@
 
 #include "contact_set.h"
 #include "host.h"
+#include "rigid_bodies.h"
 
 #include <vector>
 
@@ -25,11 +26,22 @@ struct ContactProblem {
   double timestep = 0.0;
   int particles = 0;                         // owned particles and copies of other ranks' particles
   std::vector<double> predicted_velocity;    // 3 per particle, then 3 zeros for the dummy particle
-  std::vector<double> inverse_mass;          // per particle, then a zero; zero = frozen
+  std::vector<double> inverse_mass;          // per particle, then a zero; zero = frozen; not read
+                                             // for particles in bodies
+  RigidBodies bodies;                        // empty in a scene of free particles
   ContactSet contacts;
 
   // Sets the number of particles and the dummy particle that stands for every wall.
+  // Bodies are as `bodies.clear` and `bodies.add` leave them.
   void resize(int number_of_particles);
+
+  // n . M^-1 n: velocity along a unit vector that a unit impulse along it gives. Zero = frozen.
+  double mobility(int particle, const double *direction) const
+  {
+    return bodies.empty() || particle == particles || bodies.body[particle] < 0
+        ? inverse_mass[particle]
+        : bodies.mobility(particle, direction);
+  }
 };
 
 // End-of-step gaps w of the linearised constraints for given impulses: the only place where the
@@ -51,6 +63,8 @@ class GapOperator {
   void velocity_change(const ContactProblem &problem, const double *impulse, Host &host);
 
   std::vector<double> free_gap_;
+  std::vector<int>
+      free_particles_;            // those in no body, the dummy too; only where there are bodies
   std::vector<double> change_;    // impulse, then velocity change, of each particle and the dummy
 };
 

@@ -125,9 +125,11 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   gap_operator_.prepare(problem);
 
   diagonal_.resize(count);
-  for (std::size_t c = 0; c < count; ++c)
+  for (std::size_t c = 0; c < count; ++c) {
+    const double *const n = &contacts.normal[3 * c];
     diagonal_[c] = problem.timestep *
-        (problem.inverse_mass[contacts.first[c]] + problem.inverse_mass[contacts.second[c]]);
+        (problem.mobility(contacts.first[c], n) + problem.mobility(contacts.second[c], n));
+  }
 
   impulse_.resize(count);
   for (std::size_t c = 0; c < count; ++c) impulse_[c] = std::max(0.0, contacts.impulse[c]);

@@ -73,9 +73,9 @@ double norm(const double *a)
 
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
-    warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), list_(nullptr),
-    margin_(-1.0), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
-    state_(nullptr), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
+    warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), first_list_of_run_(false),
+    list_(nullptr), margin_(-1.0), came_back_(false), relinearisations_(0), phase_(Phase::CONTACT),
+    bad_overlap_(false), state_(nullptr), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
     spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false),
     expecting_(false), kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
     run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
@@ -88,7 +88,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     error->all(FLERR, 3, "Fix inelastic tolerance must be a length greater than 0, not {}", arg[3]);
 
   auto is_keyword = [](const char *word) {
-    for (const char *keyword : {"region", "solver", "maxiter", "frozen", "record", "shorten"})
+    for (const char *keyword :
+         {"region", "rigid", "solver", "maxiter", "frozen", "record", "shorten"})
       if (strcmp(word, keyword) == 0) return true;
     return false;
   };
@@ -98,8 +99,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     const std::string keyword = arg[iarg];
     if (!is_keyword(arg[iarg]))
       error->all(FLERR, iarg,
-                 "Unknown fix inelastic keyword {}: use region, solver, maxiter, frozen, record or "
-                 "shorten",
+                 "Unknown fix inelastic keyword {}: use region, rigid, solver, maxiter, frozen, "
+                 "record or shorten",
                  keyword);
     if (iarg + 2 > narg) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error);
     const std::string value = arg[iarg + 1];
@@ -107,6 +108,17 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     if (keyword == "region") {
       regions.push_back(value);
       while (iarg < narg && !is_keyword(arg[iarg])) regions.emplace_back(arg[iarg++]);
+    } else if (keyword == "rigid") {
+      const std::string inertia = iarg < narg ? arg[iarg] : "nothing";
+      if (inertia != "point" && inertia != "solid")
+        error->all(FLERR, iarg - 1,
+                   "Fix inelastic needs rigid FIX-ID point or rigid FIX-ID solid (the mass of each "
+                   "sphere in its centre, or a solid ball), not {}",
+                   inertia);
+      ++iarg;
+      rigid_ = std::make_unique<RigidMotion>(lmp, value,
+                                             inertia == "point" ? RigidMotion::Inertia::POINT
+                                                                : RigidMotion::Inertia::SOLID);
     } else if (keyword == "solver") {
       solver_name_ = value;
     } else if (keyword == "maxiter") {
@@ -172,7 +184,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
   comm_reverse = ContactMemory::packed_size(SHARED_PARTNERS);
   maxexchange_dynamic = 1;
   create_attribute = 1;
-  maxexchange = STATE_SIZE + ContactMemory::packed_size(0);
+  maxexchange = carried_size() + ContactMemory::packed_size(0);
 
   MPI_Op_create(&combine, 1, &reduction_);
   MPI_Type_contiguous(sizeof(Reduced) / sizeof(double), MPI_DOUBLE, &reduction_type_);
@@ -223,6 +235,8 @@ void FixInelastic::init()
 
   walls_->init();
   walls_->warn();
+  if (rigid_) rigid_->init();
+  first_list_of_run_ = true;
   wall_force_.assign(3 * static_cast<std::size_t>(walls_->number_of_walls()), 0.0);
   wall_force_total_ = wall_force_;
   wall_force_step_ = -1;
@@ -277,6 +291,8 @@ void FixInelastic::post_neighbor()
         "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
         listed, widest, 2.0 * largest_radius_);
   list_reach_ = one_cutoff_ ? listed - 2.0 * largest_radius_ : neighbor->skin;
+  if (rigid_) rigid_->find_bodies(problem_, *this, groupbit, frozen_bit_, first_list_of_run_);
+  first_list_of_run_ = false;
 }
 
 // In setup LAMMPS has whole-step velocities and applies only half a kick before the next move.
@@ -285,7 +301,18 @@ void FixInelastic::post_neighbor()
 void FixInelastic::setup(int vflag)
 {
   expecting_ = false;
+  if (rigid_) {
+    rigid_->measure(problem_);
+    fail_together(rigid_->disagreement(problem_));
+  }
   advance(vflag, 0.5);
+  if (!rigid_) return;
+  // Fix rigid/small takes the forces of its first half kick in its own setup. Where it is defined
+  // before this fix it has taken them without the contacts, and is asked again.
+  for (Fix *fix : modify->get_fix_list()) {
+    if (fix == this) return;
+    if (fix == rigid_->fix()) return fix->setup(vflag);
+  }
 }
 
 void FixInelastic::post_force(int vflag)
@@ -295,6 +322,7 @@ void FixInelastic::post_run()
 {
   if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
   // Restart files and the next run start from the momentum alone.
+  // (Not those of bodies: their momenta are in fix rigid/small, out of reach.)
   for (int i = 0; i < atom->nlocal; ++i)
     for (int d = 0; d < 3; ++d) {
       atom->v[i][d] -= state_[i][PUSH_HELD + d];
@@ -310,8 +338,9 @@ void FixInelastic::post_run()
   if (run_largest_excess_ > 0.0)
     utils::logmesg(
         lmp,
-        "  the curvature of walls left overlaps of up to {:.6g} beyond 2 tolerances: a shorter "
-        "timestep, or shorten yes, avoids them\n",
+        "  {} left overlaps of up to {:.6g} beyond 2 tolerances: a shorter timestep, or shorten "
+        "yes, avoids them\n",
+        rigid_ ? "turning bodies, or the curvature of walls," : "the curvature of walls",
         run_largest_excess_);
   if (run_unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
@@ -334,9 +363,13 @@ void FixInelastic::advance(int vflag, double kick_steps)
     spread_at_start_ = spread_since_build(nullptr);
     // The prediction moves nearly as far as the projection will: where the list cannot reach that
     // far there is no use in solving first.
-    if (shorten_ && spread_at_start_ < list_reach_ && !list_reaches(problem_.predicted_velocity)) {
-      shorten_step(room_in_list(problem_.predicted_velocity));
-      continue;
+    if (shorten_ && spread_at_start_ < list_reach_) {
+      if (rigid_) rigid_->turn(problem_, problem_.predicted_velocity);
+      const std::vector<double> &towards = rigid_ ? rigid_->motion() : problem_.predicted_velocity;
+      if (!list_reaches(towards)) {
+        shorten_step(room_in_list(towards));
+        continue;
+      }
     }
     phase_ = Phase::CONTACT;
     collect();
@@ -350,9 +383,9 @@ void FixInelastic::advance(int vflag, double kick_steps)
       record_problem(result);
     if (bad_overlap_) push_apart(result);
     if (!result.converged || !result.complete) unconverged(result);
-    if (!list_reaches(velocity_)) {
+    if (!list_reaches(motion())) {
       if (!shorten_ || spread_at_start_ >= list_reach_) {
-        const double needed = spread_at_start_ + problem_.timestep * spread(velocity_.data());
+        const double needed = spread_at_start_ + problem_.timestep * spread(motion().data());
         error->all(
             FLERR,
             "Fix inelastic: step {}: spheres move by up to {:.6g} relative to one another, further "
@@ -360,7 +393,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
             "least {:.6g}, or lower the timestep, or use shorten yes",
             update->ntimestep, needed, list_reach_, 1.2 * needed);
       }
-      shorten_step(room_in_list(velocity_));
+      shorten_step(room_in_list(motion()));
     } else if (shorten_ && output_[EXCESS] > 0.0) {
       shorten_step(0.5);
     } else {
@@ -368,18 +401,18 @@ void FixInelastic::advance(int vflag, double kick_steps)
     }
   }
 
-  apply_forces(kick_steps);
   update_outputs(result);
+  apply_forces(kick_steps);
   remember_contacts();
 
   // Rebuild before the list could fall short, with room for the next step to be half as fast again.
-  const double next_start = spread_since_build(velocity_.data());
-  const double motion = problem_.timestep * spread(velocity_.data());
-  const bool short_of_reach = next_start + 1.5 * motion > list_reach_ || growth_ > 0.0;
+  const double next_start = spread_since_build(motion().data());
+  const double next_motion = problem_.timestep * spread(motion().data());
+  const bool short_of_reach = next_start + 1.5 * next_motion > list_reach_ || growth_ > 0.0;
   next_reneighbor = short_of_reach ? update->ntimestep + 1 : -1;
 
   // More pairs at once when the last projection had to come back for some, fewer otherwise.
-  margin_ *= result.rounds > 1 ? 1.1 : 0.95;
+  margin_ *= came_back_ ? 1.1 : 0.95;
   margin_ = std::clamp(margin_, 4.0 * tolerance_, std::max(4.0 * tolerance_, list_reach_));
   expecting_ = true;
 }
@@ -398,6 +431,7 @@ void FixInelastic::predict(double kick_steps)
     problem_.inverse_mass[i] = moves ? 1.0 / mass(i) : 0.0;
   }
   for (int i = 0; i < nlocal; ++i) {
+    if (is_member(i)) continue;
     const double kick_per_force = kick_ * force->ftm2v * problem_.inverse_mass[i];
     // What pushed overlaps apart is no momentum; between runs it is not in the velocity.
     const double *const push = state_[i] + PUSH_NEXT;
@@ -406,6 +440,10 @@ void FixInelastic::predict(double kick_steps)
           atom->v[i][d] - (kick_steps == 1.0 ? push[d] : 0.0) + kick_per_force * atom->f[i][d];
   }
   share_with_copies(problem_.predicted_velocity.data());
+  if (rigid_) {
+    rigid_->measure(problem_);
+    rigid_->predict(problem_, *this, kick_ * force->ftm2v, expecting_, state_, EXPECTED_V);
+  }
   message_.clear();
   for (int i = 0; i < nlocal; ++i)
     if (!std::isfinite(norm(&problem_.predicted_velocity[3 * i])))
@@ -421,6 +459,7 @@ void FixInelastic::collect()
   bad_overlap_ = false;
   output_[OVERLAP] = output_[EXCESS] = 0.0;
   relinearisations_ = 0;
+  came_back_ = false;
   collect_pairs();
   if (!walls_->empty()) collect_walls();
 
@@ -459,6 +498,9 @@ template <typename Visitor> void FixInelastic::for_each_listed_pair(Visitor &&vi
       if (!(mask[j] & groupbit)) continue;
       // Without newton a pair across ranks is on both lists: one of them takes it.
       if (j >= nlocal && !force->newton_pair && tag[i] > tag[j]) continue;
+      if (rigid_ && problem_.bodies.body[i] >= 0 &&
+          problem_.bodies.body[i] == problem_.bodies.body[j])
+        continue;
       visit(slot, i, j);
     }
   }
@@ -522,9 +564,8 @@ void FixInelastic::note_overlap(double gap)
   if (is_bad(gap)) bad_overlap_ = true;
 }
 
-// Looks at the walls from where atoms are, or from where they will be after the step's motion.
-std::vector<RegionWalls::Look> FixInelastic::looks(const double *velocity, bool at_end,
-                                                   double beyond) const
+// Looks at the walls from where atoms are, as far as the step takes them.
+std::vector<RegionWalls::Look> FixInelastic::looks(const double *velocity, double beyond) const
 {
   std::vector<RegionWalls::Look> looks;
   const double h = problem_.timestep;
@@ -532,11 +573,22 @@ std::vector<RegionWalls::Look> FixInelastic::looks(const double *velocity, bool 
     if (problem_.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
     const double *const v = velocity + 3 * i;
-    const double reach = atom->radius[i] + beyond;
-    if (at_end)
-      looks.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
-    else
-      looks.push_back({i, {x[0], x[1], x[2]}, reach + h * norm(v)});
+    looks.push_back({i, {x[0], x[1], x[2]}, atom->radius[i] + beyond + h * norm(v)});
+  }
+  return looks;
+}
+
+// Looks from where the step takes those atoms for which the constraint of a wall may be inexact.
+std::vector<RegionWalls::Look> FixInelastic::looks_at_end(const std::vector<double> &velocity) const
+{
+  const std::vector<double> &moved = rigid_ ? rigid_->motion() : velocity;
+  std::vector<RegionWalls::Look> looks;
+  const double h = problem_.timestep;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (problem_.inverse_mass[i] == 0.0 || (walls_->exact() && !is_member(i))) continue;
+    const double *const x = atom->x[i];
+    const double *const v = &moved[3 * i];
+    looks.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, atom->radius[i]});
   }
   return looks;
 }
@@ -545,7 +597,7 @@ void FixInelastic::collect_walls()
 {
   const double *const velocity = problem_.predicted_velocity.data();
   walls_->view(
-      looks(velocity, false, margin_), false,
+      looks(velocity, margin_), false,
       [&](const RegionWalls::Look &look, const WallView &view) {
         const double gap = view.distance - atom->radius[look.atom];
         note_overlap(view.distance_now - atom->radius[look.atom]);
@@ -573,10 +625,19 @@ void FixInelastic::take_wall(const RegionWalls::Look &look, const WallView &view
 long FixInelastic::refine(const std::vector<double> &velocity, inelastic::ContactProblem &)
 {
   message_.clear();
+  if (rigid_) rigid_->turn(problem_, velocity);
   long changed = add_violated_pairs(velocity);
-  if (!walls_->empty()) {
-    changed += add_violated_walls(velocity);
-    if (!walls_->exact()) changed += relinearise_walls(velocity);
+  if (!walls_->empty()) changed += add_violated_walls(velocity);
+  double added = static_cast<double>(changed);
+  reduce(&added, 1, nullptr, 0);
+  if (added > 0.0) came_back_ = true;
+  const bool walls_turn = !walls_->empty() && (rigid_ || !walls_->exact());
+  if (rigid_ || walls_turn) {
+    ++relinearisations_;
+    output_[EXCESS] = 0.0;
+    if (rigid_) changed += relinearise_pairs(velocity);
+    if (walls_turn) changed += relinearise_walls(velocity);
+    reduce(nullptr, 0, &output_[EXCESS], 1);
   }
   fail_together(message_);
   return changed;
@@ -605,7 +666,7 @@ long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
 {
   const std::size_t before = problem_.contacts.size();
   walls_->view(
-      looks(velocity.data(), false, 0.0), false,
+      looks(velocity.data(), 0.0), false,
       [&](const RegionWalls::Look &look, const WallView &view) {
         const double gap = view.distance - atom->radius[look.atom];
         const double opening = problem_.timestep * dot(view.normal, &velocity[3 * look.atom]);
@@ -617,14 +678,68 @@ long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
   return static_cast<long>(problem_.contacts.size() - before);
 }
 
+// The distance between turning bodies is not convex: where two spheres end up overlapping, their
+// constraint is replaced by one about that end, n and gap such that it is exact for this velocity.
+long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
+{
+  const double *const *const x = atom->x;
+  const double *const radius = atom->radius;
+  const double h = problem_.timestep;
+  const std::vector<double> &moved = rigid_->motion();
+  inelastic::ContactSet &contacts = problem_.contacts;
+  long changed = 0;
+  double away[3];
+  auto gap_at_end = [&](int i, int j) {
+    for (int d = 0; d < 3; ++d)
+      away[d] = x[i][d] - x[j][d] + h * (moved[3 * i + d] - moved[3 * j + d]);
+    return norm(away) - radius[i] - radius[j];
+  };
+  auto relinearise = [&](std::size_t c, double gap) {
+    const double distance = norm(away);
+    double opening = 0.0;
+    for (int d = 0; d < 3; ++d) {
+      const double n = away[d] / distance;
+      opening += n * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
+      contacts.normal[3 * c + d] = n;
+    }
+    contacts.gap[c] = gap - h * opening;
+    ++changed;
+  };
+
+  const bool may_change = relinearisations_ <= MAX_RELINEARISATIONS;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const int i = contacts.first[c], j = contacts.second[c];
+    if (origin_[c].wall != 0 || !(is_member(i) || is_member(j))) continue;
+    if (is_bad(origin_[c].gap_now)) continue;
+    const double gap = gap_at_end(i, j);
+    output_[EXCESS] = std::max(output_[EXCESS], -gap - REGULAR_OVERLAP * tolerance_);
+    if (may_change && gap < -RELINEARISE_BEYOND * tolerance_) relinearise(c, gap);
+  }
+  for_each_listed_pair([&](std::size_t slot, int i, int j) {
+    if (listed_pair_taken_[slot] || !(is_member(i) || is_member(j))) return;
+    const double gap = gap_at_end(i, j);
+    if (!(gap < -RELINEARISE_BEYOND * tolerance_)) return;
+    output_[EXCESS] = std::max(output_[EXCESS], -gap - REGULAR_OVERLAP * tolerance_);
+    if (!may_change) return;
+    const std::size_t before = contacts.size();
+    take_pair(slot, i, j);
+    if (contacts.size() > before) relinearise(before, gap);
+  });
+  return changed;
+}
+
+bool FixInelastic::same_plane(std::size_t c, const double *normal) const
+{
+  constexpr double SAME = 1.0e-12;    // of 1 - cos of the angle between two unit vectors
+  return dot(&problem_.contacts.normal[3 * c], normal) > 1.0 - SAME;
+}
+
 // Inside a concave wall the distance is not convex: where a sphere ends up overlapping, the wall's
 // tangent plane at that end is added. The planes seen before stay: all of them bound the container
 // from outside, and at the tip of a cone a sphere rests on several.
 long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
 {
-  ++relinearisations_;
   long changed = 0;
-  output_[EXCESS] = 0.0;
   auto add_plane = [&](const RegionWalls::Look &look, const WallView &view) {
     if (relinearisations_ > MAX_RELINEARISATIONS) return;
     const int i = look.atom;
@@ -633,24 +748,27 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     if (known && is_bad(origin_[existing->second].gap_now)) return;
     ++changed;
     const double gap_there = view.distance - atom->radius[i];
-    const double from_here[3] = {look.where[0] - atom->x[i][0], look.where[1] - atom->x[i][1],
-                                 look.where[2] - atom->x[i][2]};
-    const double gap_here = gap_there - dot(view.normal, from_here);
+    const double gap_here = gap_there - problem_.timestep * dot(view.normal, &velocity[3 * i]);
     const double motion = view.distance_now - view.distance;
     const double gap_now = known ? origin_[existing->second].gap_now : gap_here + motion;
     // A region can show a wall late: from inside one part of a union the others are not seen.
     note_overlap(gap_now);
     const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - motion
                                        : gap_here;
+    if (known && same_plane(existing->second, view.normal)) {
+      problem_.contacts.gap[existing->second] = gap;
+      return;
+    }
     wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
     problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
     origin_.push_back({view.wall, gap_now, atom->radius[i], motion});
   };
 
-  const std::vector<RegionWalls::Look> ends = looks(velocity.data(), true, 0.0);
+  const std::vector<RegionWalls::Look> ends = looks_at_end(velocity);
+  const bool inexact_only = !rigid_;
   std::vector<RegionWalls::Look> beyond;
   walls_->view(
-      ends, true,
+      ends, inexact_only,
       [&](const RegionWalls::Look &look, const WallView &view) {
         const double overlap = atom->radius[look.atom] - view.distance;
         output_[EXCESS] = std::max(output_[EXCESS], overlap - 2.0 * tolerance_);
@@ -666,16 +784,13 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     for (const RegionWalls::Look &look : beyond)
       output_[EXCESS] = std::max(output_[EXCESS], atom->radius[look.atom]);
     walls_->view(
-        last_inside(beyond), true,
+        last_inside(beyond), inexact_only,
         [&](const RegionWalls::Look &look, const WallView &view) {
           add_plane(look, view);
         },
         [](const RegionWalls::Look &, const std::string &) {
         });
   }
-  double excess = output_[EXCESS];
-  reduce(nullptr, 0, &excess, 1);
-  output_[EXCESS] = excess;
   return changed;
 }
 
@@ -700,7 +815,7 @@ FixInelastic::last_inside(const std::vector<RegionWalls::Look> &beyond)
     const std::vector<RegionWalls::Look> looks = looks_at(middle);
     std::vector<char> out(beyond.size(), 0);
     walls_->view(
-        looks, true,
+        looks, !rigid_,
         [](const RegionWalls::Look &, const WallView &) {
         },
         [&](const RegionWalls::Look &look, const std::string &) {
@@ -715,7 +830,7 @@ FixInelastic::last_inside(const std::vector<RegionWalls::Look> &beyond)
 // that takes the spheres apart at a bounded speed.
 void FixInelastic::push_apart(inelastic::ProjectionResult &result)
 {
-  std::vector<double> impulse = problem_.contacts.impulse;
+  const inelastic::ContactSet contacts = problem_.contacts;
   std::copy_n(velocity_.begin(), 3 * static_cast<std::size_t>(problem_.particles),
               problem_.predicted_velocity.begin());
   phase_ = Phase::PUSH;
@@ -725,7 +840,6 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
       problem_.contacts.gap[c] = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
     problem_.contacts.impulse[c] = 0.0;
   }
-  const std::vector<double> kept = velocity_;
   const inelastic::ProjectionResult pushed = inelastic::project(
       problem_, *this, *solver_, {tolerance_, std::max(0L, max_iterations_ - result.iterations)},
       MAX_ROUNDS, *this, velocity_);
@@ -736,10 +850,9 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
   result.residual.complementarity =
       std::max(result.residual.complementarity, pushed.residual.complementarity);
 
-  impulse.resize(problem_.contacts.size(), 0.0);
-  problem_.contacts.impulse = impulse;
-  problem_.predicted_velocity.assign(kept.begin(), kept.end());
-  problem_.predicted_velocity.resize(3 * (static_cast<std::size_t>(problem_.particles) + 1), 0.0);
+  problem_.contacts = contacts;
+  origin_.resize(contacts.size());
+  if (rigid_) rigid_->note_push(problem_, velocity_);
 }
 
 void FixInelastic::apply_forces(double kick_steps)
@@ -749,6 +862,15 @@ void FixInelastic::apply_forces(double kick_steps)
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(mask[i] & groupbit)) continue;
     double *const state = state_[i];
+    if (is_member(i)) {
+      for (int d = 0; d < 3; ++d) {
+        atom->f[i][d] += contact_force_[3 * i + d];
+        state[EXPECTED_X + d] = atom->x[i][d] + h * motion()[3 * i + d];
+      }
+      rigid_->finish(problem_, i, kick_ * force->ftm2v, kick_steps == 1.0, atom->f[i]);
+      rigid_->velocity_after(problem_, i, state + EXPECTED_V);
+      continue;
+    }
     const bool moves = problem_.inverse_mass[i] > 0.0;
     for (int d = 0; d < 3; ++d) {
       const double v = velocity_[3 * i + d];
@@ -781,8 +903,9 @@ void FixInelastic::check_expected()
                               atom->v[i][1] - state[EXPECTED_V + 1],
                               atom->v[i][2] - state[EXPECTED_V + 2]};
     const bool frozen = (atom->mask[i] & frozen_bit_) != 0;
-    const double round_off =
-        EXPECTED_RELATIVE * (norm(atom->x[i]) + largest_radius_ + h * norm(&state[EXPECTED_V]));
+    const double round_off = EXPECTED_RELATIVE *
+        (norm(atom->x[i]) + largest_radius_ + h * norm(&state[EXPECTED_V])) *
+        (rigid_ ? rigid_->round_off_growth(i) : 1.0);
     const double allowed = (frozen ? 1.0 : EXPECTED_IN_EPS) * tolerance_ + round_off;
     const double position_error = norm(off);
     const double velocity_error = frozen ? 0.0 : h * norm(faster);
@@ -805,13 +928,25 @@ void FixInelastic::check_expected()
       else if ((passed && (modify->fmask[k] & POST_FORCE)) || (modify->fmask[k] & END_OF_STEP))
         later += fmt::format(" {} ({})", fixes[k]->id, fixes[k]->style);
     }
+    const std::string mover = !is_member(i) ? "nve or nve/sphere"
+                                            : fmt::format("{} (without its keywords gravity and "
+                                                          "langevin, forces not taken early)",
+                                                          rigid_->fix()->id);
     message = fmt::format("atom {} did not move as predicted: its {} is off by {:.3g}. Move it "
-                          "with fix nve or nve/sphere "
-                          "alone; define every fix that adds forces before fix {}; let nothing "
-                          "else change velocities{}{}",
+                          "with fix {} alone; define every fix that adds forces before fix {}; let "
+                          "nothing else change velocities{}{}",
                           atom->tag[i], position_error > velocity_error ? "position" : "velocity",
-                          position_error > velocity_error ? position_error : norm(faster), id,
-                          later.empty() ? "" : ". Fixes that may have:", later);
+                          position_error > velocity_error ? position_error : norm(faster), mover,
+                          id, later.empty() ? "" : ". Fixes that may have:", later);
+  }
+  if (rigid_) {
+    // Another inertia is the better explanation where there is one.
+    double failed = message.empty() ? 0.0 : 1.0;
+    reduce(&failed, 1, nullptr, 0);
+    if (failed > 0.0) {
+      rigid_->measure(problem_);
+      fail_together(rigid_->disagreement(problem_));
+    }
   }
   fail_together(message);
 }
@@ -839,24 +974,24 @@ double FixInelastic::spread(const double *values)
 }
 
 // Pairs that are not listed were at least list_reach_ apart when the list was built.
-bool FixInelastic::list_reaches(const std::vector<double> &velocity)
-{ return spread_at_start_ + problem_.timestep * spread(velocity.data()) <= list_reach_; }
+bool FixInelastic::list_reaches(const std::vector<double> &motion)
+{ return spread_at_start_ + problem_.timestep * spread(motion.data()) <= list_reach_; }
 
 // The part of the time step for which the list would reach, with some reserve.
-double FixInelastic::room_in_list(const std::vector<double> &velocity)
+double FixInelastic::room_in_list(const std::vector<double> &motion)
 {
   constexpr double RESERVE = 0.9;
-  return RESERVE * (list_reach_ - spread_at_start_) / (problem_.timestep * spread(velocity.data()));
+  return RESERVE * (list_reach_ - spread_at_start_) / (problem_.timestep * spread(motion.data()));
 }
 
-// Spread of the displacements since the list was built, at present or after moving with `velocity`.
-double FixInelastic::spread_since_build(const double *velocity)
+// Spread of the displacements since the list was built, at present or after a step's motion.
+double FixInelastic::spread_since_build(const double *motion)
 {
   displacement_.resize(3 * static_cast<std::size_t>(atom->nlocal));
   for (int i = 0; i < atom->nlocal; ++i)
     for (int d = 0; d < 3; ++d)
       displacement_[3 * i + d] = atom->x[i][d] - position_at_build_[3 * i + d] +
-          (velocity ? problem_.timestep * velocity[3 * i + d] : 0.0);
+          (motion ? problem_.timestep * motion[3 * i + d] : 0.0);
   growth_ = 0.0;
   for (int i = 0; i < atom->nlocal; ++i)
     growth_ = std::max(growth_, atom->radius[i] - radius_at_build_[i]);
@@ -1057,7 +1192,7 @@ void FixInelastic::remember_contacts()
   for (int i = 0; i < atom->nlocal; ++i)
     most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
   reduce(nullptr, 0, &most, 1);
-  maxexchange = STATE_SIZE + ContactMemory::packed_size(static_cast<int>(most));
+  maxexchange = carried_size() + ContactMemory::packed_size(static_cast<int>(most));
 }
 
 void FixInelastic::grow_arrays(int nmax)
@@ -1065,6 +1200,7 @@ void FixInelastic::grow_arrays(int nmax)
   memory->grow(state_, nmax, STATE_SIZE, "inelastic:state");
   memory->grow(array_atom, nmax, size_peratom_cols, "inelastic:array_atom");
   memory_.resize(nmax);
+  if (rigid_) rigid_->resize(nmax);
   max_atoms_ = nmax;
 }
 
@@ -1073,6 +1209,7 @@ void FixInelastic::copy_arrays(int i, int j, int)
   std::copy_n(state_[i], STATE_SIZE, state_[j]);
   std::copy_n(array_atom[i], size_peratom_cols, array_atom[j]);
   memory_.copy(i, j);
+  if (rigid_) rigid_->copy(i, j);
 }
 
 void FixInelastic::set_arrays(int i)
@@ -1080,6 +1217,7 @@ void FixInelastic::set_arrays(int i)
   std::fill_n(state_[i], STATE_SIZE, 0.0);
   std::fill_n(array_atom[i], size_peratom_cols, 0.0);
   memory_.forget(i);
+  if (rigid_) rigid_->forget(i);
   // An atom that is created during a run moves on from where it is.
   std::copy_n(atom->x[i], 3, state_[i] + EXPECTED_X);
   std::copy_n(atom->v[i], 3, state_[i] + EXPECTED_V);
@@ -1087,8 +1225,10 @@ void FixInelastic::set_arrays(int i)
 
 int FixInelastic::pack_exchange(int i, double *buffer)
 {
-  std::copy_n(state_[i], STATE_SIZE, buffer);
-  return STATE_SIZE + memory_.pack(i, buffer + STATE_SIZE, memory_.number_of_partners(i));
+  double *out = std::copy_n(state_[i], STATE_SIZE, buffer);
+  if (rigid_) out += rigid_->pack(i, out);
+  out += memory_.pack(i, out, memory_.number_of_partners(i));
+  return static_cast<int>(out - buffer);
 }
 
 int FixInelastic::unpack_exchange(int i, double *buffer)
@@ -1096,7 +1236,10 @@ int FixInelastic::unpack_exchange(int i, double *buffer)
   std::copy_n(buffer, STATE_SIZE, state_[i]);
   std::fill_n(array_atom[i], size_peratom_cols, 0.0);
   memory_.forget(i);
-  return STATE_SIZE + memory_.unpack(i, buffer + STATE_SIZE);
+  double *in = buffer + STATE_SIZE;
+  if (rigid_) in += rigid_->unpack(i, in);
+  in += memory_.unpack(i, in);
+  return static_cast<int>(in - buffer);
 }
 
 /* ----------------------------------------------------------------------
@@ -1211,9 +1354,11 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
 // One .npz per recorded step; ../doc/fix_inelastic.md lists its arrays.
 void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
 {
-  constexpr int PER_ATOM = 13;
+  constexpr int PER_ATOM = 17;
   constexpr int PER_CONTACT = 9;
-  std::vector<double> atoms, contacts;
+  constexpr int PER_BODY = 8;
+  const inelastic::RigidBodies &rigid_bodies = problem_.bodies;
+  std::vector<double> atoms, contacts, bodies;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
     const double *const predicted = &problem_.predicted_velocity[3 * i];
@@ -1223,6 +1368,21 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
                                atom->radius[i], x[0], x[1], x[2], predicted[0], predicted[1],
                                predicted[2], projected[0], projected[1], projected[2], mass(i)})
       atoms.push_back(value);
+    const double free[4] = {};
+    if (!is_member(i)) {
+      atoms.insert(atoms.end(), free, free + 4);
+      continue;
+    }
+    const int b = rigid_bodies.body[i];
+    const int place = rigid_bodies.place[i];
+    const double molecule = static_cast<double>(atom->molecule[i]);
+    atoms.push_back(molecule);
+    atoms.insert(atoms.end(), &rigid_bodies.arm[3 * place], &rigid_bodies.arm[3 * place] + 3);
+    if (place != rigid_bodies.start[b]) continue;
+    bodies.push_back(molecule);
+    bodies.push_back(rigid_bodies.inverse_mass[b]);
+    bodies.insert(bodies.end(), &rigid_bodies.inverse_inertia[6 * b],
+                  &rigid_bodies.inverse_inertia[6 * b] + 6);
   }
   for (std::size_t c = 0; c < problem_.contacts.size(); ++c) {
     const int j = problem_.contacts.second[c];
@@ -1236,6 +1396,7 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
   }
   const std::vector<double> all_atoms = gather(atoms);
   const std::vector<double> all_contacts = gather(contacts);
+  const std::vector<double> all_bodies = gather(bodies);
   std::string message;
   if (comm->me == 0) {
     const std::size_t number = all_atoms.size() / PER_ATOM;
@@ -1271,6 +1432,19 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
     file.add("predicted_velocity", column(6, 3), 3);
     file.add("velocity", column(9, 3), 3);
     file.add("mass", column(12, 1));
+    if (rigid_) {
+      auto body_column = [&](int from, int width) {
+        std::vector<double> values;
+        for (std::size_t k = 0; k < all_bodies.size() / PER_BODY; ++k)
+          for (int d = 0; d < width; ++d) values.push_back(all_bodies[PER_BODY * k + from + d]);
+        return values;
+      };
+      file.add("molecule", integers(column(13, 1)));
+      file.add("arm", column(14, 3), 3);
+      file.add("body_molecule", integers(body_column(0, 1)));
+      file.add("body_inverse_mass", body_column(1, 1));
+      file.add("body_inverse_inertia", body_column(2, 6), 6);
+    }
     file.add("id1", integers(contact_column(0, 1)));
     file.add("id2", integers(contact_column(1, 1)));
     file.add("normal", contact_column(2, 3), 3);

@@ -21,6 +21,7 @@ FixStyle(inelastic,FixInelastic);
 #include "host.h"
 #include "projection.h"
 #include "region_walls.h"
+#include "rigid_motion.h"
 
 #include <cstdint>
 #include <memory>
@@ -77,6 +78,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   inelastic::ContactProblem problem_;
   std::vector<double> velocity_;    // the projection, 3 per atom, copies included
   std::unique_ptr<RegionWalls> walls_;
+  std::unique_ptr<RigidMotion> rigid_;    // null in a scene of free spheres
+  bool first_list_of_run_;
   class NeighList *list_;
 
   // Beside each constraint of problem_.contacts
@@ -90,6 +93,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::vector<char> listed_pair_taken_;    // per pair of the neighbour list: is it in the problem?
   std::unordered_map<std::uint64_t, std::size_t> wall_constraint_;    // atom and wall -> constraint
   double margin_;           // what comes closer than this is in the problem from the start
+  bool came_back_;          // for constraints that were not in the problem from the start
   int relinearisations_;    // in this step
   std::string message_;     // what went wrong on this rank while collecting
 
@@ -178,6 +182,9 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void record_problem(const inelastic::ProjectionResult &);
 
   // Constraints
+  // Mean velocity of every particle during the step: bodies turn.
+  const std::vector<double> &motion() const { return rigid_ ? rigid_->motion() : velocity_; }
+  bool is_member(int i) const { return rigid_ && rigid_->is_member(problem_, i); }
   template <typename Visitor> void for_each_listed_pair(Visitor &&) const;
   void collect_pairs();
   void collect_walls();
@@ -185,9 +192,12 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void take_wall(const RegionWalls::Look &, const WallView &);
   long add_violated_pairs(const std::vector<double> &velocity);
   long add_violated_walls(const std::vector<double> &velocity);
+  long relinearise_pairs(const std::vector<double> &velocity);
   long relinearise_walls(const std::vector<double> &velocity);
   std::vector<RegionWalls::Look> last_inside(const std::vector<RegionWalls::Look> &beyond);
-  std::vector<RegionWalls::Look> looks(const double *velocity, bool at_end, double beyond) const;
+  std::vector<RegionWalls::Look> looks(const double *velocity, double beyond) const;
+  std::vector<RegionWalls::Look> looks_at_end(const std::vector<double> &velocity) const;
+  bool same_plane(std::size_t c, const double *normal) const;
   double effective_gap(double gap_now, double size) const;
   bool is_bad(double gap) const;
   void note_overlap(double gap);
@@ -196,9 +206,9 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   // Reach and time step
   double spread(const double *values);
-  double spread_since_build(const double *velocity);
-  bool list_reaches(const std::vector<double> &velocity);
-  double room_in_list(const std::vector<double> &velocity);
+  double spread_since_build(const double *motion);
+  bool list_reaches(const std::vector<double> &motion);
+  double room_in_list(const std::vector<double> &motion);
   void shorten_step(double factor);
   void set_timestep(double timestep);
 
@@ -208,6 +218,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void fail_together(const std::string &message);
   std::vector<double> gather(std::vector<double> mine) const;
   double mass(int i) const;
+  int carried_size() const { return STATE_SIZE + (rigid_ ? RigidMotion::CARRIED_SIZE : 0); }
 };
 
 }    // namespace LAMMPS_NS

@@ -1,0 +1,611 @@
+#include "rigid_motion.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "compute.h"
+#include "domain.h"
+#include "error.h"
+#include "fix.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+using namespace LAMMPS_NS;
+
+namespace {
+
+constexpr double SPHERE_MOMENT = 0.4;    // of a solid ball, in m R^2
+constexpr double COLLINEAR = 1.0e-7;     // smallest moment over the others; LAMMPS drops it there
+constexpr double AGREEMENT = 1.0e-6;     // relative, of two ways to compute moments and momenta
+
+void cross(const double *a, const double *b, double *c)
+{
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+double dot(const double *a, const double *b)
+{ return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Symmetric matrices are xx yy zz xy xz yz.
+void multiply(const double *a, const double *x, double *y)
+{
+  y[0] = a[0] * x[0] + a[3] * x[1] + a[4] * x[2];
+  y[1] = a[3] * x[0] + a[1] * x[1] + a[5] * x[2];
+  y[2] = a[4] * x[0] + a[5] * x[1] + a[2] * x[2];
+}
+
+double trace(const double *a)
+{ return a[0] + a[1] + a[2]; }
+
+double determinant(const double *a)
+{
+  return a[0] * (a[1] * a[2] - a[5] * a[5]) - a[3] * (a[3] * a[2] - a[5] * a[4]) +
+      a[4] * (a[3] * a[5] - a[1] * a[4]);
+}
+
+double trace_of_square(const double *a)
+{
+  return a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + 2.0 * (a[3] * a[3] + a[4] * a[4] + a[5] * a[5]);
+}
+
+// Of an inertia; its pseudo-inverse where the masses lie on a line (two equal moments t and a third
+// of zero: A A = t A) or in one point.
+void invert_inertia(const double *a, double *inverse)
+{
+  const double t = 0.5 * trace(a);
+  const double det = determinant(a);
+  if (det <= COLLINEAR * t * t * t) {
+    for (int k = 0; k < 6; ++k) inverse[k] = t > 0.0 ? a[k] / (t * t) : 0.0;
+    return;
+  }
+  inverse[0] = (a[1] * a[2] - a[5] * a[5]) / det;
+  inverse[1] = (a[0] * a[2] - a[4] * a[4]) / det;
+  inverse[2] = (a[0] * a[1] - a[3] * a[3]) / det;
+  inverse[3] = (a[4] * a[5] - a[3] * a[2]) / det;
+  inverse[4] = (a[3] * a[5] - a[4] * a[1]) / det;
+  inverse[5] = (a[3] * a[4] - a[0] * a[5]) / det;
+}
+
+// Quaternions are w x y z.
+void normalise(double *q)
+{
+  const double scale = 1.0 / std::sqrt(q[0] * q[0] + dot(q + 1, q + 1));
+  for (int k = 0; k < 4; ++k) q[k] *= scale;
+}
+
+// (1 + s w) q, normalised.
+void turn_by(const double *q, double s, const double *w, double *turned)
+{
+  double across[3];
+  cross(w, q + 1, across);
+  turned[0] = q[0] - s * dot(w, q + 1);
+  for (int d = 0; d < 3; ++d) turned[1 + d] = q[1 + d] + s * (q[0] * w[d] + across[d]);
+  normalise(turned);
+}
+
+// By how much a rotation displaces x; exact to round-off for small rotations too.
+void displacement(const double *q, double sign, const double *x, double *displaced)
+{
+  const double axis[3] = {sign * q[1], sign * q[2], sign * q[3]};
+  double once[3], twice[3];
+  cross(axis, x, once);
+  cross(axis, once, twice);
+  for (int d = 0; d < 3; ++d) displaced[d] = 2.0 * (q[0] * once[d] + twice[d]);
+}
+
+void rotate(const double *q, double sign, const double *x, double *rotated)
+{
+  double displaced[3];
+  displacement(q, sign, x, displaced);
+  for (int d = 0; d < 3; ++d) rotated[d] = x[d] + displaced[d];
+}
+
+// Angular velocity for an angular momentum after a turn from the orientation that the inertia is of.
+void angular_velocity_turned(const double *q, const double *inverse_inertia, const double *momentum,
+                             double *angular_velocity)
+{
+  double before[3], slow[3];
+  rotate(q, -1.0, momentum, before);
+  multiply(inverse_inertia, before, slow);
+  rotate(q, 1.0, slow, angular_velocity);
+}
+
+}    // namespace
+
+/* ---------------------------------------------------------------------- */
+
+RigidMotion::RigidMotion(LAMMPS *lmp, std::string fix_id, Inertia inertia) :
+    Pointers(lmp), fix_id_(std::move(fix_id)), inertia_(inertia), fix_(nullptr), pushing_(false)
+{
+}
+
+void RigidMotion::init()
+{
+  fix_ = modify->get_fix_by_id(fix_id_);
+  if (!fix_) error->all(FLERR, "Fix inelastic rigid: there is no fix {}", fix_id_);
+  if (!utils::strmatch(fix_->style, "^rigid/small$") &&
+      !utils::strmatch(fix_->style, "^rigid/small/omp$"))
+    error->all(FLERR, "Fix inelastic rigid: fix {} is of style {}, and must be rigid/small",
+               fix_id_, fix_->style);
+}
+
+double RigidMotion::mass(int i) const
+{ return atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]]; }
+
+/* ----------------------------------------------------------------------
+   who belongs to which body
+------------------------------------------------------------------------- */
+
+namespace {
+
+const int *bodies_of_atoms(Fix *fix)
+{
+  int dimension;
+  return static_cast<const int *>(fix->extract("body", dimension));
+}
+
+}    // namespace
+
+void RigidMotion::count_spheres(int groupbit, int frozen_bit)
+{
+  const int *const body = bodies_of_atoms(fix_);
+  const int *const mask = atom->mask;
+  tagint largest = 0, most = 0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (body[i] >= 0) largest = std::max(largest, atom->molecule[i]);
+  MPI_Allreduce(&largest, &most, 1, MPI_LMP_TAGINT, MPI_MAX, world);
+
+  const std::size_t molecules = static_cast<std::size_t>(most) + 1;
+  std::vector<int> mine(3 * molecules, 0), all(3 * molecules);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (body[i] < 0) continue;
+    const tagint molecule = atom->molecule[i];
+    ++mine[molecule];
+    if (!(mask[i] & groupbit)) ++mine[molecules + molecule];
+    if (mask[i] & frozen_bit) ++mine[2 * molecules + molecule];
+  }
+  MPI_Allreduce(mine.data(), all.data(), static_cast<int>(all.size()), MPI_INT, MPI_SUM, world);
+  for (std::size_t m = 0; m < molecules; ++m) {
+    const int outside = all[molecules + m];
+    if (outside > 0 && outside < all[m])
+      error->all(FLERR,
+                 "Fix inelastic rigid: the body of molecule {} is partly outside the fix's group: "
+                 "put all its spheres in, or none",
+                 m);
+    if (all[2 * molecules + m] > 0)
+      error->all(FLERR,
+                 "Fix inelastic rigid: a sphere of molecule {} is frozen: frozen spheres cannot "
+                 "belong to a body",
+                 m);
+  }
+  all.resize(molecules);
+  spheres_in_ = all;
+}
+
+void RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelastic::Host &host,
+                              int groupbit, int frozen_bit, bool first_of_run)
+{
+  if (!bodies_of_atoms(fix_))
+    error->all(FLERR, "Fix inelastic rigid: fix {} has not set up its bodies", fix_id_);
+  if (first_of_run) count_spheres(groupbit, frozen_bit);
+
+  const int nlocal = atom->nlocal;
+  const int nall = nlocal + atom->nghost;
+  const int *const body = bodies_of_atoms(fix_);
+  linear_.assign(3 * static_cast<std::size_t>(nall), 0.0);
+  for (int i = 0; i < nlocal; ++i)
+    linear_[3 * i] = body[i] >= 0 && (atom->mask[i] & groupbit) ? 1.0 : 0.0;
+  host.share_with_copies(linear_.data());
+
+  std::vector<int> order;
+  for (int i = 0; i < nall; ++i)
+    if (linear_[3 * i] > 0.0) order.push_back(i);
+  const tagint *const molecule = atom->molecule;
+  const tagint *const tag = atom->tag;
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    if (molecule[a] != molecule[b]) return molecule[a] < molecule[b];
+    if (tag[a] != tag[b]) return tag[a] < tag[b];
+    return a < b;    // the owned sphere before its copies
+  });
+
+  problem.bodies.clear(nall);
+  copy_of_.clear();
+  incomplete_.assign(nall, 0);
+  std::string message;
+  for (std::size_t begin = 0, end; begin < order.size(); begin = end) {
+    const tagint id = molecule[order[begin]];
+    std::vector<int> originals, copies, copy_of;
+    for (end = begin; end < order.size() && molecule[order[end]] == id; ++end) {
+      const int i = order[end];
+      if (originals.empty() || tag[originals.back()] != tag[i]) {
+        originals.push_back(i);
+      } else {
+        copies.push_back(i);
+        copy_of.push_back(static_cast<int>(originals.size()) - 1);
+      }
+    }
+    const int number = static_cast<int>(originals.size());
+    const bool known = id < static_cast<tagint>(spheres_in_.size());
+    if (!known || number != spheres_in_[id]) {
+      for (std::size_t k = begin; k < end; ++k) incomplete_[order[k]] = 1;
+      for (const int i : originals)
+        if (i < nlocal)
+          message = fmt::format("the body of molecule {} has {} spheres, of which a rank sees {}: "
+                                "raise comm_modify cutoff, and create no bodies during a run",
+                                id, known ? spheres_in_[id] : 0, number);
+      continue;
+    }
+    for (int k = 0; k < number; ++k) copy_of_.push_back(k);
+    copy_of_.insert(copy_of_.end(), copy_of.begin(), copy_of.end());
+    originals.insert(originals.end(), copies.begin(), copies.end());
+    const std::vector<double> nothing(3 * originals.size() + 6, 0.0);
+    problem.bodies.add(originals.data(), nothing.data(), static_cast<int>(originals.size()), number,
+                       0.0, nothing.data());
+  }
+  bodies_.resize(problem.bodies.size());
+  double wrong = message.empty() ? 0.0 : 1.0;
+  host.reduce(nullptr, 0, &wrong, 1);
+  if (!message.empty()) error->one(FLERR, "Fix inelastic rigid: {}", message);
+  if (wrong > 0.0) error->all(FLERR, "Fix inelastic rigid: a body is not whole on another rank");
+
+  if (!first_of_run) return;
+  measure(problem);
+  double extent = 0.0;
+  const std::vector<double> &arm = problem.bodies.arm;
+  for (std::size_t k = 0; k < problem.bodies.member.size(); ++k)
+    extent = std::max(extent, 2.0 * std::sqrt(dot(&arm[3 * k], &arm[3 * k])));
+  host.reduce(nullptr, 0, &extent, 1);
+  check_reach(extent);
+}
+
+// A sphere of another rank that touches one of this rank's brings its whole body with it.
+void RigidMotion::check_reach(double extent) const
+{
+  const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;
+  if (comm->nprocs == 1 && !periodic) return;
+  const double needed = neighbor->cutneighmax + extent;
+  const double cutoff = std::max(comm->cutghostuser, neighbor->cutneighmax);
+  if (cutoff < needed)
+    error->all(FLERR,
+               "Fix inelastic rigid: ranks and periodic images see {:.6g} far, which is too short "
+               "for bodies of this size: set comm_modify cutoff to at least {:.6g}",
+               cutoff, needed);
+  const double period[3] = {domain->xperiodic ? domain->xprd : 2.0 * needed,
+                            domain->yperiodic ? domain->yprd : 2.0 * needed,
+                            domain->zperiodic ? domain->zprd : 2.0 * needed};
+  for (const double length : period)
+    if (length < 2.0 * needed)
+      error->all(
+          FLERR,
+          "Fix inelastic rigid: the periodic box is {:.6g} wide and must be at least {:.6g}, "
+          "so that no body can meet its own image",
+          length, 2.0 * needed);
+}
+
+/* ----------------------------------------------------------------------
+   inertia and momenta
+------------------------------------------------------------------------- */
+
+void RigidMotion::measure(inelastic::ContactProblem &problem)
+{
+  inelastic::RigidBodies &bodies = problem.bodies;
+  const double *const *const x = atom->x;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const int begin = bodies.start[b], end = bodies.start[b + 1];
+    const int last_original = begin + bodies.originals[b];
+    double *const arm = bodies.arm.data();
+    const double *const x0 = x[bodies.member[begin]];
+    double total = 0.0, centre[3] = {0.0, 0.0, 0.0};
+    for (int k = begin; k < last_original; ++k) {
+      const int i = bodies.member[k];
+      double *const r = arm + 3 * k;
+      for (int d = 0; d < 3; ++d) r[d] = x[i][d] - x0[d];
+      domain->minimum_image(FLERR, r);
+      const double m = mass(i);
+      total += m;
+      for (int d = 0; d < 3; ++d) centre[d] += m * r[d];
+    }
+    Body &body = bodies_[b];
+    body.mass = total;
+    double *const point = body.point_inertia;
+    std::fill_n(point, 6, 0.0);
+    double balls = 0.0;
+    for (int k = begin; k < last_original; ++k) {
+      const int i = bodies.member[k];
+      double *const r = arm + 3 * k;
+      for (int d = 0; d < 3; ++d) r[d] -= centre[d] / total;
+      const double m = mass(i), square = dot(r, r);
+      for (int d = 0; d < 3; ++d) point[d] += m * (square - r[d] * r[d]);
+      point[3] -= m * r[0] * r[1];
+      point[4] -= m * r[0] * r[2];
+      point[5] -= m * r[1] * r[2];
+      balls += SPHERE_MOMENT * m * atom->radius[i] * atom->radius[i];
+    }
+    for (int k = last_original; k < end; ++k)
+      std::copy_n(arm + 3 * (begin + copy_of_[k]), 3, arm + 3 * k);
+    invert_inertia(point, body.point_inverse);
+    std::copy_n(point, 6, body.inertia);
+    if (inertia_ == Inertia::SOLID)
+      for (int d = 0; d < 3; ++d) body.inertia[d] += balls;
+    bodies.inverse_mass[b] = 1.0 / total;
+    invert_inertia(body.inertia, &bodies.inverse_inertia[6 * b]);
+  }
+}
+
+void RigidMotion::predict(inelastic::ContactProblem &problem, inelastic::Host &host, double kick,
+                          bool carried, const double *const *expected, int column)
+{
+  const inelastic::RigidBodies &bodies = problem.bodies;
+  const std::size_t size = 3 * static_cast<std::size_t>(problem.particles);
+  linear_.assign(size, 0.0);
+  change_.assign(size, 0.0);
+  carried_part_.assign(size, 0.0);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const int b = bodies.body[i];
+    if (b < 0) continue;
+    const Body &body = bodies_[b];
+    const Carried &of_body = carried_[i];
+    const Push &push = carried ? of_body.next : of_body.held;
+    const double m = mass(i);
+    for (int d = 0; d < 3; ++d) {
+      const double forced = kick * atom->f[i][d];
+      linear_[3 * i + d] = m * (atom->v[i][d] - push.velocity[d]) + forced;
+      // What is carried along is set right by the round-off that v shows.
+      change_[3 * i + d] = m * (atom->v[i][d] - (carried ? expected[i][column + d] : 0.0)) + forced;
+    }
+    double *const part = &carried_part_[3 * i];
+    if (bodies.place[i] == bodies.start[b]) {
+      // Forces on the spheres can take away no more of a push than this.
+      double slow[3], removed[3];
+      multiply(body.point_inverse, push.angular_momentum.data(), slow);
+      multiply(body.point_inertia, slow, removed);
+      for (int d = 0; d < 3; ++d)
+        part[d] = (carried ? of_body.angular_momentum[d] : 0.0) - removed[d];
+    }
+    if (!carried && inertia_ == Inertia::SOLID)
+      for (int d = 0; d < 3; ++d)
+        part[d] += SPHERE_MOMENT * m * atom->radius[i] * atom->radius[i] * atom->omega[i][d];
+  }
+  host.share_with_copies(linear_.data());
+  host.share_with_copies(change_.data());
+  host.share_with_copies(carried_part_.data());
+
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    Body &body = bodies_[b];
+    double momentum[3] = {};
+    std::fill_n(body.angular_momentum, 3, 0.0);
+    const int begin = bodies.start[b], end = bodies.start[b + 1];
+    for (int k = begin; k < begin + bodies.originals[b]; ++k) {
+      const std::size_t i = 3 * static_cast<std::size_t>(bodies.member[k]);
+      double moment[3];
+      cross(&bodies.arm[3 * k], &change_[i], moment);
+      for (int d = 0; d < 3; ++d) {
+        momentum[d] += linear_[i + d];
+        body.angular_momentum[d] += moment[d] + carried_part_[i + d];
+      }
+    }
+    for (int d = 0; d < 3; ++d) body.velocity[d] = momentum[d] / body.mass;
+    double spin[3];
+    multiply(&bodies.inverse_inertia[6 * b], body.angular_momentum, spin);
+    for (int k = begin; k < end; ++k) {
+      double around[3];
+      cross(spin, &bodies.arm[3 * k], around);
+      for (int d = 0; d < 3; ++d)
+        problem.predicted_velocity[3 * static_cast<std::size_t>(bodies.member[k]) + d] =
+            body.velocity[d] + around[d];
+    }
+  }
+  predicted_ = problem.predicted_velocity;
+  pushing_ = false;
+}
+
+/* ----------------------------------------------------------------------
+   the step
+------------------------------------------------------------------------- */
+
+// What a body has beyond a reference, both given by the velocities of its spheres. They do not show
+// a spin about a line through all of them, which contacts cannot change.
+void RigidMotion::difference(const inelastic::RigidBodies &bodies, std::size_t b,
+                             const double *velocity, const double *reference, Push &push) const
+{
+  const Body &body = bodies_[b];
+  double momentum[3] = {}, moment[3] = {};
+  const int begin = bodies.start[b];
+  for (int k = begin; k < begin + bodies.originals[b]; ++k) {
+    const std::size_t i = 3 * static_cast<std::size_t>(bodies.member[k]);
+    const double m = mass(bodies.member[k]);
+    double faster[3], turning[3];
+    for (int d = 0; d < 3; ++d) faster[d] = m * (velocity[i + d] - reference[i + d]);
+    cross(&bodies.arm[3 * k], faster, turning);
+    for (int d = 0; d < 3; ++d) {
+      momentum[d] += faster[d];
+      moment[d] += turning[d];
+    }
+  }
+  double spin[3];
+  multiply(body.point_inverse, moment, spin);
+  multiply(body.inertia, spin, push.angular_momentum.data());
+  for (int d = 0; d < 3; ++d) push.velocity[d] = momentum[d] / body.mass;
+}
+
+void RigidMotion::turn(const inelastic::ContactProblem &problem,
+                       const std::vector<double> &velocity)
+{
+  const inelastic::RigidBodies &bodies = problem.bodies;
+  const double h = problem.timestep;
+  motion_ = velocity;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    Body &body = bodies_[b];
+    Push gained;
+    difference(bodies, b, velocity.data(), predicted_.data(), gained);
+    for (int d = 0; d < 3; ++d) {
+      body.velocity_end[d] = body.velocity[d] + gained.velocity[d];
+      body.angular_momentum_end[d] = body.angular_momentum[d] + gained.angular_momentum[d];
+    }
+    const double *const inverse = &bodies.inverse_inertia[6 * b];
+    const double none[4] = {1.0, 0.0, 0.0, 0.0};
+    double spin[3], full[4], half[4], two_halves[4];
+    multiply(inverse, body.angular_momentum_end, spin);
+    turn_by(none, 0.5 * h, spin, full);
+    turn_by(none, 0.25 * h, spin, half);
+    angular_velocity_turned(half, inverse, body.angular_momentum_end, body.angular_velocity_end);
+    turn_by(half, 0.25 * h, body.angular_velocity_end, two_halves);
+    for (int k = 0; k < 4; ++k) body.turned[k] = 2.0 * two_halves[k] - full[k];
+    normalise(body.turned);
+    for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) {
+      double displaced[3];
+      displacement(body.turned, 1.0, &bodies.arm[3 * k], displaced);
+      for (int d = 0; d < 3; ++d)
+        motion_[3 * static_cast<std::size_t>(bodies.member[k]) + d] =
+            body.velocity_end[d] + displaced[d] / h;
+    }
+  }
+}
+
+void RigidMotion::velocity_after(const inelastic::ContactProblem &problem, int i,
+                                 double *velocity) const
+{
+  const Body &body = bodies_[problem.bodies.body[i]];
+  double arm[3];
+  rotate(body.turned, 1.0, &problem.bodies.arm[3 * problem.bodies.place[i]], arm);
+  cross(body.angular_velocity_end, arm, velocity);
+  for (int d = 0; d < 3; ++d) velocity[d] += body.velocity_end[d];
+}
+
+void RigidMotion::note_push(const inelastic::ContactProblem &problem,
+                            const std::vector<double> &velocity)
+{
+  pushing_ = true;
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    difference(problem.bodies, b, velocity.data(), problem.predicted_velocity.data(),
+               bodies_[b].push);
+}
+
+void RigidMotion::finish(const inelastic::ContactProblem &problem, int i, double kick,
+                         bool whole_kick, double *force)
+{
+  const inelastic::RigidBodies &bodies = problem.bodies;
+  const Body &body = bodies_[bodies.body[i]];
+  Carried &of_body = carried_[i];
+  const Push push = pushing_ ? body.push : Push{};
+  const Push &before = whole_kick ? of_body.next : of_body.held;
+  // Forces m (a + alpha x r) with the right sum and the right moment.
+  double change[3], spin[3], around[3];
+  for (int d = 0; d < 3; ++d) change[d] = push.angular_momentum[d] - before.angular_momentum[d];
+  multiply(body.point_inverse, change, spin);
+  cross(spin, &bodies.arm[3 * bodies.place[i]], around);
+  for (int d = 0; d < 3; ++d)
+    force[d] += mass(i) * (push.velocity[d] - before.velocity[d] + around[d]) / kick;
+
+  if (whole_kick)
+    for (int d = 0; d < 3; ++d) {
+      of_body.held.velocity[d] = 0.5 * (of_body.next.velocity[d] + push.velocity[d]);
+      of_body.held.angular_momentum[d] =
+          0.5 * (of_body.next.angular_momentum[d] + push.angular_momentum[d]);
+    }
+  of_body.next = push;
+  std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
+  of_body.angle =
+      problem.timestep * std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end));
+}
+
+int RigidMotion::pack(int i, double *buffer) const
+{
+  const Carried &of_body = carried_[i];
+  double *out = std::copy_n(of_body.angular_momentum.begin(), 3, buffer);
+  for (const Push *push : {&of_body.next, &of_body.held}) {
+    out = std::copy_n(push->velocity.begin(), 3, out);
+    out = std::copy_n(push->angular_momentum.begin(), 3, out);
+  }
+  *out++ = of_body.angle;
+  return static_cast<int>(out - buffer);
+}
+
+int RigidMotion::unpack(int i, const double *buffer)
+{
+  Carried &of_body = carried_[i];
+  const double *in = buffer;
+  auto take = [&in](std::array<double, 3> &values) {
+    std::copy_n(in, 3, values.begin());
+    in += 3;
+  };
+  take(of_body.angular_momentum);
+  for (Push *push : {&of_body.next, &of_body.held}) {
+    take(push->velocity);
+    take(push->angular_momentum);
+  }
+  of_body.angle = *in++;
+  return static_cast<int>(in - buffer);
+}
+
+/* ----------------------------------------------------------------------
+   do LAMMPS's bodies agree with these?
+------------------------------------------------------------------------- */
+
+namespace {
+
+// Same trace, same sum of squares and same product of the principal moments.
+bool same_moments(const double *inertia, const double *moments)
+{
+  const double sum = moments[0] + moments[1] + moments[2];
+  const double squares = dot(moments, moments);
+  const double product = moments[0] * moments[1] * moments[2];
+  return std::abs(trace(inertia) - sum) <= AGREEMENT * sum &&
+      std::abs(trace_of_square(inertia) - squares) <= AGREEMENT * squares &&
+      std::abs(determinant(inertia) - product) <= AGREEMENT * sum * sum * sum;
+}
+
+}    // namespace
+
+std::string RigidMotion::disagreement(const inelastic::ContactProblem &problem)
+{
+  const std::string compute_id = "inelastic_bodies_of_" + fix_id_;
+  Compute *const compute = modify->add_compute(
+      fmt::format("{} all rigid/local {} id mass inertiax inertiay inertiaz", compute_id, fix_id_));
+  compute->init();
+  compute->compute_local();
+  std::string message;
+  for (int row = 0; row < compute->size_local_rows && message.empty(); ++row) {
+    const double *const found = compute->array_local[row];
+    const int i = atom->map(static_cast<tagint>(found[0]));
+    const int b = i < 0 ? -1 : problem.bodies.body[i];
+    if (b < 0) continue;    // outside the fix's group
+    const Body &body = bodies_[b];
+    const tagint molecule = atom->molecule[i];
+    if (std::abs(body.mass - found[1]) > AGREEMENT * body.mass) {
+      message =
+          fmt::format("fix {} gives the body of molecule {} the mass {:.6g}, its spheres have "
+                      "{:.6g}: bodies must be molecules (rigid/small molecule), their masses "
+                      "set before fix {}",
+                      fix_id_, molecule, found[1], body.mass, fix_id_);
+      continue;
+    }
+    const double *const moments = found + 2;
+    if (same_moments(body.inertia, moments)) continue;
+    double balls[6];
+    std::copy_n(body.point_inertia, 6, balls);
+    const int begin = problem.bodies.start[b];
+    for (int k = begin; k < begin + problem.bodies.originals[b]; ++k) {
+      const int j = problem.bodies.member[k];
+      for (int d = 0; d < 3; ++d)
+        balls[d] += SPHERE_MOMENT * mass(j) * atom->radius[j] * atom->radius[j];
+    }
+    const char *const kind = same_moments(body.point_inertia, moments) ? "of point masses"
+        : same_moments(balls, moments)                                 ? "of solid spheres"
+                                       : "neither of point masses nor of solid spheres";
+    message = fmt::format(
+        "fix {} turns the body of molecule {} with the moments of inertia {:.6g}, {:.6g}, {:.6g}, "
+        "{}, where fix inelastic has rigid {} {}. Spheres count as point masses for rigid/small if "
+        "their diameter is 0 when its bodies are set up",
+        fix_id_, molecule, moments[0], moments[1], moments[2], kind, fix_id_,
+        inertia_ == Inertia::POINT ? "point" : "solid");
+  }
+  modify->delete_compute(compute_id);
+  return message;
+}
