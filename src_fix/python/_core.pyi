@@ -6,6 +6,14 @@ negative for an overlap. ``inverse_mass`` (n,) [1 / mass], zero for a frozen par
 float64 and C-contiguous. TypeError for arrays of another dimension; ValueError for wrong lengths,
 indices out of range, numbers that are not finite, negative masses, normals that have not length 1,
 a contact of a particle with itself and contacts between two particles that cannot move.
+
+Particles may be in b rigid bodies, by four more arguments, all of them or none. ``body`` (n,) int64
+names each particle's body, 0 ... b - 1, or -1 for a free particle; a body has at least one
+particle. ``arm`` (n, 3) [length] points from the body's centre of mass to the particle and is not
+read for free particles. ``body_inverse_mass`` (b,) [1 / mass]; ``body_inverse_inertia`` (b, 3, 3)
+[1 / (mass length^2)] is symmetric and positive semi-definite: the pseudo-inverse of the inertia for
+point masses on a line. The ``inverse_mass`` of particles in bodies is not read. ValueError also for
+a contact between two particles of one body.
 """
 
 import numpy as np
@@ -38,6 +46,10 @@ def project(
     solver: str = "apgd",
     max_iterations: int = 100000,
     impulse: NDArray[np.float64] | None = None,
+    body: NDArray[np.int64] | None = None,
+    arm: NDArray[np.float64] | None = None,
+    body_inverse_mass: NDArray[np.float64] | None = None,
+    body_inverse_inertia: NDArray[np.float64] | None = None,
 ) -> Projection:
     """Project ``predicted_velocity`` (n, 3) onto the velocities that keep every contact apart.
 
@@ -55,6 +67,10 @@ def residual(
     impulse: NDArray[np.float64],
     *,
     timestep: float,
+    body: NDArray[np.int64] | None = None,
+    arm: NDArray[np.float64] | None = None,
+    body_inverse_mass: NDArray[np.float64] | None = None,
+    body_inverse_inertia: NDArray[np.float64] | None = None,
 ) -> tuple[float, float]:
     """Feasibility and complementarity [length] of given impulses."""
 
@@ -65,6 +81,10 @@ def largest_eigenvalue(
     normal: NDArray[np.float64],
     *,
     timestep: float,
+    body: NDArray[np.int64] | None = None,
+    arm: NDArray[np.float64] | None = None,
+    body_inverse_mass: NDArray[np.float64] | None = None,
+    body_inverse_inertia: NDArray[np.float64] | None = None,
 ) -> float:
     """Largest eigenvalue of h G M^-1 G^T [time / mass], from below and mostly to 1e-3."""
 

@@ -11,6 +11,7 @@
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -26,7 +27,16 @@ namespace {
 
 using Vectors = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Scalars = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrices = nb::ndarray<const double, nb::shape<-1, 3, 3>, nb::c_contig, nb::device::cpu>;
 using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// The arguments that put particles into rigid bodies: all of them or none.
+struct Bodies {
+  std::optional<Indices> body;
+  std::optional<Vectors> arm;
+  std::optional<Scalars> inverse_mass;
+  std::optional<Matrices> inverse_inertia;
+};
 
 nb::ndarray<nb::numpy, double> to_numpy(const std::vector<double> &values, std::size_t columns)
 {
@@ -52,20 +62,86 @@ void require_length(const Array &array, std::size_t length, const char *name)
                               .c_str());
 }
 
-template <typename Array> void require_finite(const Array &array, const char *name)
+void require_finite(const double *values, std::size_t count, const char *name)
 {
-  for (std::size_t k = 0; k < array.size(); ++k)
-    if (!std::isfinite(array.data()[k]))
+  for (std::size_t k = 0; k < count; ++k)
+    if (!std::isfinite(values[k]))
       throw nb::value_error((std::string(name) + " holds a number that is not finite").c_str());
 }
 
-constexpr double NOT_UNIT = 1.0e-6;    // of a squared length: far above round-off
+template <typename Array> void require_finite(const Array &array, const char *name)
+{ require_finite(array.data(), array.size(), name); }
+
+void require_inverse_mass(double value, const char *name)
+{
+  require_finite(&value, 1, name);
+  if (value < 0.0) throw nb::value_error((std::string(name) + " must not be negative").c_str());
+}
+
+constexpr double FLAW = 1.0e-6;    // of a matrix, and of a squared length: far above round-off
+
+// In the order of RigidBodies::inverse_inertia.
+std::array<double, 6> symmetric(const double *a, std::size_t body)
+{
+  double flaw = 0.0;
+  for (int k = 0; k < 9; ++k) flaw = std::max(flaw, FLAW * std::abs(a[k]));
+  const double xx = a[0], yy = a[4], zz = a[8];
+  const double xy = 0.5 * (a[1] + a[3]), xz = 0.5 * (a[2] + a[6]), yz = 0.5 * (a[5] + a[7]);
+  // Elimination leaves positive pivots, after the allowance for round-off.
+  const double x = xx + flaw, y = yy + flaw - xy * (xy / x), off = yz - xy * (xz / x);
+  const bool positive = x > 0.0 && y > 0.0 && zz + flaw - xz * (xz / x) - off * (off / y) > 0.0;
+  const double skew =
+      std::max({std::abs(a[1] - a[3]), std::abs(a[2] - a[6]), std::abs(a[5] - a[7])});
+  if (flaw > 0.0 && !(positive && skew <= flaw))
+    throw nb::value_error(("body_inverse_inertia of body " + std::to_string(body) +
+                           " is not symmetric and positive semi-definite")
+                              .c_str());
+  return {xx, yy, zz, xy, xz, yz};
+}
+
+void add_bodies(inelastic::ContactProblem &problem, const Bodies &given)
+{
+  if (!given.body && !given.arm && !given.inverse_mass && !given.inverse_inertia) return;
+  if (!given.body || !given.arm || !given.inverse_mass || !given.inverse_inertia)
+    throw nb::value_error("body, arm, body_inverse_mass and body_inverse_inertia go together");
+  const auto particles = static_cast<std::size_t>(problem.particles);
+  const std::size_t count = given.inverse_mass->shape(0);
+  require_length(*given.body, particles, "body");
+  require_length(*given.arm, particles, "arm");
+  require_length(*given.inverse_inertia, count, "body_inverse_inertia");
+  require_finite(*given.inverse_inertia, "body_inverse_inertia");
+
+  std::vector<std::vector<int>> members(count);
+  std::vector<std::vector<double>> arms(count);
+  for (std::size_t i = 0; i < particles; ++i) {
+    const std::int64_t b = given.body->data()[i];
+    if (b < -1 || b >= static_cast<std::int64_t>(count))
+      throw nb::value_error(("particle " + std::to_string(i) + " is in a body outside -1 ... " +
+                             std::to_string(static_cast<std::int64_t>(count) - 1))
+                                .c_str());
+    if (b < 0) continue;
+    const double *const arm = given.arm->data() + 3 * i;
+    require_finite(arm, 3, "arm");
+    members[b].push_back(static_cast<int>(i));
+    arms[b].insert(arms[b].end(), arm, arm + 3);
+  }
+  problem.bodies.clear(problem.particles);
+  for (std::size_t b = 0; b < count; ++b) {
+    const int size = static_cast<int>(members[b].size());
+    if (size == 0)
+      throw nb::value_error(("body " + std::to_string(b) + " has no particle").c_str());
+    const double inverse_mass = given.inverse_mass->data()[b];
+    require_inverse_mass(inverse_mass, "body_inverse_mass");
+    problem.bodies.add(members[b].data(), arms[b].data(), size, size, inverse_mass,
+                       symmetric(given.inverse_inertia->data() + 9 * b, b).data());
+  }
+}
 
 inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
                                        const Scalars &inverse_mass, const Indices &first,
                                        const Indices &second, const Vectors &normal,
                                        const Scalars &gap, double timestep,
-                                       const std::optional<Scalars> &impulse)
+                                       const std::optional<Scalars> &impulse, const Bodies &bodies)
 {
   const std::size_t particles = predicted_velocity.shape(0);
   const std::size_t count = gap.shape(0);
@@ -77,18 +153,21 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
   if (!(timestep > 0.0) || std::isinf(timestep))
     throw nb::value_error("timestep must be finite and greater than 0");
   require_finite(predicted_velocity, "predicted_velocity");
-  require_finite(inverse_mass, "inverse_mass");
   require_finite(normal, "normal");
   require_finite(gap, "gap");
   if (impulse) require_finite(*impulse, "impulse");
-  for (std::size_t i = 0; i < particles; ++i)
-    if (inverse_mass.data()[i] < 0.0) throw nb::value_error("inverse_mass must not be negative");
 
   inelastic::ContactProblem problem;
   problem.timestep = timestep;
   problem.resize(static_cast<int>(particles));
   std::copy_n(predicted_velocity.data(), 3 * particles, problem.predicted_velocity.begin());
   std::copy_n(inverse_mass.data(), particles, problem.inverse_mass.begin());
+  add_bodies(problem, bodies);
+  auto body_of = [&](std::size_t i) {
+    return problem.bodies.empty() ? -1 : problem.bodies.body[i];
+  };
+  for (std::size_t i = 0; i < particles; ++i)
+    if (body_of(i) < 0) require_inverse_mass(inverse_mass.data()[i], "inverse_mass");
   const auto limit = static_cast<std::int64_t>(particles);
   for (std::size_t c = 0; c < count; ++c) {
     const std::int64_t i = first.data()[c];
@@ -100,17 +179,20 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
     if (i == j)
       throw nb::value_error(
           ("contact " + std::to_string(c) + " is of a particle with itself").c_str());
+    if (j >= 0 && body_of(i) >= 0 && body_of(i) == body_of(j))
+      throw nb::value_error(
+          ("contact " + std::to_string(c) + " is between two particles of one body").c_str());
     const double *const n = normal.data() + 3 * c;
-    if (std::abs(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0) > NOT_UNIT)
+    if (std::abs(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0) > FLAW)
       throw nb::value_error(
           ("the normal of contact " + std::to_string(c) + " has not length 1").c_str());
-    const double w =
-        problem.inverse_mass[i] + (j < 0 ? 0.0 : problem.inverse_mass[static_cast<std::size_t>(j)]);
+    const int second_or_wall = j < 0 ? problem.particles : static_cast<int>(j);
+    const double w = problem.mobility(static_cast<int>(i), n) + problem.mobility(second_or_wall, n);
     if (!(w > 0.0))
       throw nb::value_error(
           ("contact " + std::to_string(c) + " is between particles that cannot move").c_str());
-    problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j), n,
-                         gap.data()[c], impulse ? impulse->data()[c] : 0.0);
+    problem.contacts.add(static_cast<int>(i), second_or_wall, n, gap.data()[c],
+                         impulse ? impulse->data()[c] : 0.0);
   }
   return problem;
 }
@@ -137,7 +219,10 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
                    const Indices &first, const Indices &second, const Vectors &normal,
                    const Scalars &gap, double timestep, double tolerance,
                    const std::string &solver_name, long max_iterations,
-                   const std::optional<Scalars> &impulse)
+                   const std::optional<Scalars> &impulse, const std::optional<Indices> &body,
+                   const std::optional<Vectors> &arm,
+                   const std::optional<Scalars> &body_inverse_mass,
+                   const std::optional<Matrices> &body_inverse_inertia)
 {
   if (!(tolerance > 0.0) || std::isinf(tolerance))
     throw nb::value_error("tolerance must be finite and greater than 0");
@@ -145,7 +230,8 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
   inelastic::ContactProblem problem =
-      make_problem(predicted_velocity, inverse_mass, first, second, normal, gap, timestep, impulse);
+      make_problem(predicted_velocity, inverse_mass, first, second, normal, gap, timestep, impulse,
+                   {body, arm, body_inverse_mass, body_inverse_inertia});
   inelastic::SerialHost host;
   Projection projection;
   const inelastic::SolverResult result = solver->solve(problem, {tolerance, max_iterations}, host);
@@ -189,24 +275,32 @@ NB_MODULE(_core, module)
 
   module.def("project", &project, "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a,
              "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "solver"_a = "apgd",
-             "max_iterations"_a = 100000, "impulse"_a = nb::none());
+             "max_iterations"_a = 100000, "impulse"_a = nb::none(), "body"_a = nb::none(),
+             "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
+             "body_inverse_inertia"_a = nb::none());
 
   module.def(
       "residual",
       [](const Vectors &predicted_velocity, const Scalars &inverse_mass, const Indices &first,
          const Indices &second, const Vectors &normal, const Scalars &gap, const Scalars &impulse,
-         double timestep) {
-        const inelastic::Residual worst = residual_of(make_problem(
-            predicted_velocity, inverse_mass, first, second, normal, gap, timestep, impulse));
+         double timestep, const std::optional<Indices> &body, const std::optional<Vectors> &arm,
+         const std::optional<Scalars> &body_inverse_mass,
+         const std::optional<Matrices> &body_inverse_inertia) {
+        const inelastic::Residual worst = residual_of(
+            make_problem(predicted_velocity, inverse_mass, first, second, normal, gap, timestep,
+                         impulse, {body, arm, body_inverse_mass, body_inverse_inertia}));
         return nb::make_tuple(worst.feasibility, worst.complementarity);
       },
       "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, "gap"_a,
-      "impulse"_a, nb::kw_only(), "timestep"_a);
+      "impulse"_a, nb::kw_only(), "timestep"_a, "body"_a = nb::none(), "arm"_a = nb::none(),
+      "body_inverse_mass"_a = nb::none(), "body_inverse_inertia"_a = nb::none());
 
   module.def(
       "largest_eigenvalue",
       [](const Scalars &inverse_mass, const Indices &first, const Indices &second,
-         const Vectors &normal, double timestep) {
+         const Vectors &normal, double timestep, const std::optional<Indices> &body,
+         const std::optional<Vectors> &arm, const std::optional<Scalars> &body_inverse_mass,
+         const std::optional<Matrices> &body_inverse_inertia) {
         const std::vector<double> zeros(3 * inverse_mass.shape(0) + first.shape(0), 0.0);
         const std::size_t velocity_shape[2] = {inverse_mass.shape(0), 3};
         const std::size_t gap_shape[1] = {first.shape(0)};
@@ -214,9 +308,13 @@ NB_MODULE(_core, module)
         const Scalars gap(zeros.data(), 1, gap_shape);
         inelastic::SerialHost host;
         return inelastic::largest_eigenvalue(
-            make_problem(velocity, inverse_mass, first, second, normal, gap, timestep, {}), host);
+            make_problem(velocity, inverse_mass, first, second, normal, gap, timestep, {},
+                         {body, arm, body_inverse_mass, body_inverse_inertia}),
+            host);
       },
-      "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, nb::kw_only(), "timestep"_a);
+      "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, nb::kw_only(), "timestep"_a,
+      "body"_a = nb::none(), "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
+      "body_inverse_inertia"_a = nb::none());
 
   module.def(
       "uniform_vector",

@@ -5,6 +5,7 @@ Lengths are in sphere diameters, velocities near 1, masses near 1, time steps ne
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -21,8 +22,32 @@ UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
+class Bodies:
+    """The arguments of ``core.project`` about rigid bodies."""
+
+    body: Indices
+    arm: Floats
+    inverse_mass: Floats
+    inverse_inertia: Floats
+
+    @property
+    def members(self) -> list[Indices]:
+        """The particles of each body."""
+        return [np.flatnonzero(self.body == b) for b in range(self.inverse_mass.size)]
+
+
+def no_bodies(particles: int) -> Bodies:
+    return Bodies(
+        np.full(particles, -1), np.zeros((particles, 3)), np.zeros(0), np.zeros((0, 3, 3))
+    )
+
+
+@dataclass(frozen=True)
 class Problem:
-    """The arguments of ``core.project`` (their shapes, signs and units are in _core.pyi)."""
+    """The arguments of ``core.project`` (their shapes, signs and units are in _core.pyi).
+
+    The inverse masses of particles in bodies are those of the body's parts.
+    """
 
     predicted_velocity: Floats
     inverse_mass: Floats
@@ -31,17 +56,30 @@ class Problem:
     normal: Floats
     gap: Floats
     timestep: float
+    bodies: Bodies
 
     @property
     def arguments(self) -> tuple[Floats, Floats, Indices, Indices, Floats, Floats]:
         return (
             self.predicted_velocity,
-            self.inverse_mass,
+            np.where(self.bodies.body < 0, self.inverse_mass, np.nan),  # not read in bodies
             self.first,
             self.second,
             self.normal,
             self.gap,
         )
+
+    @property
+    def body_arguments(self) -> dict[str, Floats | Indices]:
+        """Nothing in a scene without bodies."""
+        if self.bodies.inverse_mass.size == 0:
+            return {}
+        return {
+            "body": self.bodies.body,
+            "arm": np.where(self.bodies.body[:, None] < 0, np.nan, self.bodies.arm),  # not read
+            "body_inverse_mass": self.bodies.inverse_mass,
+            "body_inverse_inertia": self.bodies.inverse_inertia,
+        }
 
     @property
     def mass(self) -> Floats:
@@ -54,7 +92,13 @@ class Problem:
         return float(np.abs(self.predicted_velocity).max())
 
     def project(self, tolerance: float, **options) -> core.Projection:
-        return core.project(*self.arguments, timestep=self.timestep, tolerance=tolerance, **options)
+        return core.project(
+            *self.arguments,
+            timestep=self.timestep,
+            tolerance=tolerance,
+            **self.body_arguments,
+            **options,
+        )
 
     def jacobian(self) -> Floats:
         """G (m, 3 n), dense: (G V)_c = n_c . (v_first - v_second)."""
@@ -64,15 +108,36 @@ class Problem:
         rows[contacts, self.second] -= self.normal  # a wall's -1 is the last, dropped particle
         return rows[:, :-1].reshape(self.gap.size, -1)
 
+    def root(self) -> Floats:
+        """R (3 n, 3 n + 6 b), dense, with M^-1 = R R^T: V = R y for coordinates y of unit mass.
+
+        Those of free particles are their velocities times the root of the mass. Those of a body are
+        its velocity and its angular velocities about the axes of inertia, so scaled; about the line
+        of point masses there is no motion, and the column is zero.
+        """
+        bodies = self.bodies
+        free = np.where(bodies.body < 0, self.inverse_mass, 0)
+        columns = [np.diag(np.sqrt(np.repeat(free, 3)))]
+        for b, members in enumerate(bodies.members):
+            inverse_moment, axes = np.linalg.eigh(bodies.inverse_inertia[b])
+            inverse_moment[inverse_moment < 1e-9 * inverse_moment[-1]] = 0
+            turns = (axes * np.sqrt(inverse_moment)).T
+            block = np.zeros((self.inverse_mass.size, 3, 6))
+            block[members, :, :3] = np.sqrt(bodies.inverse_mass[b]) * np.eye(3)
+            block[members, :, 3:] = np.cross(turns, bodies.arm[members, None]).transpose(0, 2, 1)
+            columns.append(block.reshape(-1, 6))
+        return np.hstack(columns)
+
     def delassus(self) -> Floats:
         """A = h G M^-1 G^T (m, m), dense."""
-        jacobian = self.jacobian()
-        return self.timestep * (jacobian * np.repeat(self.inverse_mass, 3)) @ jacobian.T
+        product = self.jacobian() @ self.root()
+        return self.timestep * product @ product.T
 
     def velocity(self, impulse: Floats) -> Floats:
         """V* + M^-1 G^T lambda."""
-        sums = (self.jacobian().T @ impulse).reshape(-1, 3)
-        return self.predicted_velocity + self.inverse_mass[:, None] * sums
+        root = self.root()
+        change = root @ (root.T @ (self.jacobian().T @ impulse))
+        return self.predicted_velocity + change.reshape(-1, 3)
 
     def gap_at_end(self, velocity: Floats) -> Floats:
         return self.gap + self.timestep * self.jacobian() @ velocity.ravel()
@@ -83,7 +148,9 @@ class Problem:
         return -gap.min(initial=0.0), gap[impulse > 0].max(initial=0.0)
 
     def kinetic_energy(self, velocity: Floats) -> float:
-        return float(0.5 * self.mass @ (velocity**2).sum(axis=1))
+        """Of rigid motions of the bodies; without the spin of spheres in a row about their line."""
+        coordinates = np.linalg.lstsq(self.root(), velocity.ravel(), rcond=1e-9)[0]
+        return float(0.5 * coordinates @ coordinates)
 
     def with_contacts(self, order: Indices) -> Problem:
         """Return the problem with these of its contacts, in this order; one may come twice."""
@@ -128,7 +195,43 @@ def problem(velocity, mass, contacts, timestep=0.01) -> Problem:
         np.array(normal, float).reshape(-1, 3),
         np.array(gap, float),
         timestep,
+        no_bodies(len(mass)),
     )
+
+
+def in_bodies(
+    given: Problem, position, groups: Sequence[Sequence[int]], radius: float = 0.0
+) -> Problem:
+    """Join each group of particles, point masses or solid spheres of a radius, to a rigid body.
+
+    It has their momentum and their angular momentum, without spins. Contacts within it go.
+    """
+    position = np.array(position, float)
+    velocity = given.predicted_velocity.copy()
+    bodies = no_bodies(given.inverse_mass.size)
+    inverse_mass, inverse_inertia = [], []
+    for b, group in enumerate(groups):
+        members = np.array(group)
+        mass = given.mass[members]
+        inverse_mass.append(1 / mass.sum())
+        arm = position[members] - mass @ position[members] / mass.sum()
+        common = mass @ velocity[members] / mass.sum()
+        solid = 0.4 * mass.sum() * radius**2 + mass @ (arm**2).sum(axis=1)
+        inertia = solid * np.eye(3) - (mass * arm.T) @ arm
+        inverse_inertia.append(np.linalg.pinv(inertia, rtol=1e-9, hermitian=True))
+        turn = inverse_inertia[-1] @ (mass @ np.cross(arm, velocity[members]))
+        velocity[members] = common + np.cross(turn, arm)
+        bodies.body[members] = b
+        bodies.arm[members] = arm
+    bodies = replace(
+        bodies,
+        inverse_mass=np.array(inverse_mass),
+        inverse_inertia=np.array(inverse_inertia).reshape(-1, 3, 3),
+    )
+    first, second = bodies.body[given.first], bodies.body[given.second]
+    apart = (given.second == WALL) | (first < 0) | (first != second)
+    joined = replace(given, predicted_velocity=velocity, bodies=bodies)
+    return joined.with_contacts(np.flatnonzero(apart))
 
 
 def column(mass, velocity) -> Problem:
@@ -152,12 +255,15 @@ def heap(
     frozen: int = 0,
     overlap: float = 0.0,
     mass_ratio: float = 1.0,
+    bodies: Sequence[int] = (),
+    radius: float = 0.0,
 ) -> Problem:
     """Random points, each in contact with those nearby and the lower ones with a floor.
 
     About three contacts per particle. Gaps lie between -overlap and one step's motion, and are
-    positive without overlap, so that V = 0 is admissible; with overlap, and nothing frozen, V
-    pointing away from the origin is. Frozen particles have no velocity.
+    positive without overlap, so that V = 0 is admissible; with overlap, nothing frozen and no
+    bodies, V pointing away from the origin is. Frozen particles have no velocity. Each number in
+    ``bodies`` joins so many particles that are near to each other (see ``in_bodies``).
     """
     generator = np.random.default_rng(seed)
     timestep = 0.01
@@ -178,7 +284,16 @@ def heap(
     movable = np.maximum(first, second) >= frozen  # a wall has second = -1
     first, second, normal = first[movable], second[movable], normal[movable]
     gap = generator.uniform(-overlap if overlap else 0.02 * timestep, timestep, first.size)
-    return Problem(velocity, inverse_mass, first, second, normal, gap, timestep)
+    free = np.arange(frozen, particles)
+    groups = []
+    for size in bodies:
+        nearest = np.argsort(distance[free[0], free])[:size]
+        groups.append(free[nearest])
+        free = np.delete(free, nearest)
+    given = Problem(
+        velocity, inverse_mass, first, second, normal, gap, timestep, no_bodies(particles)
+    )
+    return in_bodies(given, position, groups, radius)
 
 
 def cubic_crystal(side: int, seed: int, *, walls: int = 1) -> Problem:
@@ -201,6 +316,13 @@ def cubic_crystal(side: int, seed: int, *, walls: int = 1) -> Problem:
             ]
     velocity = np.random.default_rng(seed).uniform(-1, 1, (side**3, 3))
     return problem(velocity, np.ones(side**3), contacts)
+
+
+def bricks(side: int, seed: int, *, length: int, radius: float = 0.0, walls: int = 1) -> Problem:
+    """A cubic crystal of rods, each of this many spheres on top of each other."""
+    position = np.moveaxis(np.indices((side,) * 3), 0, -1).reshape(-1, 3)
+    rods = np.arange(side**3).reshape(-1, length).tolist()
+    return in_bodies(cubic_crystal(side, seed, walls=walls), position, rods, radius)
 
 
 def dense_crystal(side: int, seed: int) -> Problem:

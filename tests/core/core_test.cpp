@@ -1,5 +1,5 @@
-// The core without Python: both solvers, the projection in rounds, several ranks, random numbers
-// and the .npz writer. Small, because it is there to be run under the address and
+// The core without Python: both solvers, rigid bodies, the projection in rounds, several ranks,
+// random numbers and the .npz writer. Small, because it is there to be run under the address and
 // undefined-behaviour sanitizers; the solvers are judged in test_solver*.py. Returns 1 when a check
 // failed.
 
@@ -9,6 +9,7 @@
 #include "npz.h"
 #include "projection.h"
 #include "random.h"
+#include "rigid_bodies.h"
 #include "solver.h"
 
 #include <algorithm>
@@ -142,17 +143,15 @@ ContactProblem make_problem(const std::vector<double> &velocity,
 }
 
 void add_contact(ContactProblem &problem, int first, int second, const double *normal, double gap)
-{
-  problem.contacts.add(first, second == WALL ? problem.particles : second, normal, gap, 0.0);
-}
+{ problem.contacts.add(first, second == WALL ? problem.particles : second, normal, gap, 0.0); }
 
 // Unit spheres on top of each other, the lowest on a floor, all falling at g h = 0.1. With the
 // contacts or, for a source to find them, without.
 ContactProblem make_column(int count, bool with_contacts)
 {
   const std::size_t size = static_cast<std::size_t>(count);
-  ContactProblem problem = make_problem(std::vector<double>(3 * size, 0.0),
-                                        std::vector<double>(size, 1.0));
+  ContactProblem problem =
+      make_problem(std::vector<double>(3 * size, 0.0), std::vector<double>(size, 1.0));
   for (int i = 0; i < count; ++i) {
     problem.predicted_velocity[3 * static_cast<std::size_t>(i) + 2] = -0.1;
     if (with_contacts) add_contact(problem, i, i - 1, UP, 0.0);    // i - 1 is WALL for the lowest
@@ -189,21 +188,87 @@ ContactProblem make_crystal(int side)
   return problem;
 }
 
+// Unit point masses: two on a line along z, and three at a right angle in the plane of x and y.
+constexpr double ROD_ARMS[6] = {0.0, 0.0, -0.5, 0.0, 0.0, 0.5};
+constexpr double ROD_INVERSE_INERTIA[6] = {2.0, 2.0, 0.0, 0.0, 0.0, 0.0};
+constexpr double ANGLE_ARMS[9] = {-1.0 / 3, -1.0 / 3, 0.0,     2.0 / 3, -1.0 / 3,
+                                  0.0,      -1.0 / 3, 2.0 / 3, 0.0};
+constexpr double ANGLE_INVERSE_INERTIA[6] = {2.0, 2.0, 0.75, -1.0, 0.0, 0.0};
+
+// The crystal of side 4 with 4 angles, 8 rods and 36 free spheres.
+ContactProblem make_crystal_of_bodies()
+{
+  ContactProblem problem = make_crystal(4);
+  RigidBodies &bodies = problem.bodies;
+  bodies.clear(problem.particles);
+  for (int z = 0; z < 4; ++z) {
+    const int members[3] = {z, 16 + z, 4 + z};
+    bodies.add(members, ANGLE_ARMS, 3, 3, 1.0 / 3.0, ANGLE_INVERSE_INERTIA);
+  }
+  for (const int x : {2, 3})
+    for (const int y : {0, 2})
+      for (const int z : {0, 2}) {
+        const int low = 16 * x + 4 * y + z;
+        const int members[2] = {low, low + 1};
+        bodies.add(members, ROD_ARMS, 2, 2, 0.5, ROD_INVERSE_INERTIA);
+      }
+  for (const int i : bodies.member)
+    problem.inverse_mass[static_cast<std::size_t>(i)] = std::numeric_limits<double>::quiet_NaN();
+
+  const ContactSet all = problem.contacts;
+  problem.contacts.clear();
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    const auto body_of = [&](int i) {
+      return i == problem.particles ? -1 : bodies.body[static_cast<std::size_t>(i)];
+    };
+    const int first = body_of(all.first[c]);
+    if (first < 0 || first != body_of(all.second[c]))
+      problem.contacts.add(all.first[c], all.second[c], &all.normal[3 * c], all.gap[c], 0.0);
+  }
+  return problem;
+}
+
+std::array<double, 3> cross(const double *a, const double *b)
+{ return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+
+// Where element (row, column) of a symmetric matrix is in RigidBodies::inverse_inertia.
+constexpr std::size_t ELEMENT[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
+
 // V* + M^-1 G^T lambda, by the formula and not by the operator.
 std::vector<double> velocity_of(const ContactProblem &problem)
 {
   std::vector<double> velocity = problem.predicted_velocity;
+  std::vector<double> push(velocity.size(), 0.0);
   const ContactSet &contacts = problem.contacts;
-  for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const auto i = static_cast<std::size_t>(contacts.first[c]);
-    const auto j = static_cast<std::size_t>(contacts.second[c]);
+  for (std::size_t c = 0; c < contacts.size(); ++c)
     for (std::size_t d = 0; d < 3; ++d) {
-      const double push = contacts.impulse[c] * contacts.normal[3 * c + d];
-      velocity[3 * i + d] += problem.inverse_mass[i] * push;
-      velocity[3 * j + d] -= problem.inverse_mass[j] * push;
+      const double along = contacts.impulse[c] * contacts.normal[3 * c + d];
+      push[3 * static_cast<std::size_t>(contacts.first[c]) + d] += along;
+      push[3 * static_cast<std::size_t>(contacts.second[c]) + d] -= along;
     }
-  }
-  velocity.resize(3 * static_cast<std::size_t>(problem.particles));
+  const auto particles = static_cast<std::size_t>(problem.particles);
+  const RigidBodies &bodies = problem.bodies;
+  for (std::size_t i = 0; i < particles; ++i)
+    if (bodies.empty() || bodies.body[i] < 0)
+      for (std::size_t d = 0; d < 3; ++d)
+        velocity[3 * i + d] += problem.inverse_mass[i] * push[3 * i + d];
+  // Of every member on every member of the same body.
+  for (std::size_t k = 0; k < bodies.member.size(); ++k)
+    for (std::size_t l = 0; l < bodies.member.size(); ++l) {
+      const auto to = static_cast<std::size_t>(bodies.member[k]);
+      const auto from = static_cast<std::size_t>(bodies.member[l]);
+      if (bodies.body[to] != bodies.body[from]) continue;
+      const auto b = static_cast<std::size_t>(bodies.body[to]);
+      const std::array<double, 3> moment = cross(&bodies.arm[3 * l], &push[3 * from]);
+      double turn[3] = {0.0, 0.0, 0.0};
+      for (std::size_t d = 0; d < 3; ++d)
+        for (std::size_t e = 0; e < 3; ++e)
+          turn[d] += bodies.inverse_inertia[6 * b + ELEMENT[d][e]] * moment[e];
+      const std::array<double, 3> turned = cross(turn, &bodies.arm[3 * k]);
+      for (std::size_t d = 0; d < 3; ++d)
+        velocity[3 * to + d] += bodies.inverse_mass[b] * push[3 * from + d] + turned[d];
+    }
+  velocity.resize(3 * particles);
   return velocity;
 }
 
@@ -316,19 +381,95 @@ void test_residual()
 void test_gap_operator()
 {
   SerialHost host;
-  ContactProblem problem = make_crystal(3);
-  for (std::size_t c = 0; c < problem.contacts.size(); ++c)
-    problem.contacts.impulse[c] = 0.1 * static_cast<double>(c % 7);
-  GapOperator gap_operator;
-  gap_operator.prepare(problem);
-  CHECK_ALL_NEAR(gap_operator.free_gap(),
-                 gaps_of(problem, without_dummy(problem.predicted_velocity)), ROUNDING);
-  std::vector<double> gaps(problem.contacts.size());
-  gap_operator.apply(problem, problem.contacts.impulse.data(), gaps.data(), host);
-  CHECK_ALL_NEAR(gaps, gaps_of(problem, velocity_of(problem)), ROUNDING);
-  std::vector<double> velocity(3 * static_cast<std::size_t>(problem.particles));
-  gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
-  CHECK_ALL_NEAR(velocity, velocity_of(problem), ROUNDING);
+  GapOperator gap_operator;    // one for scenes with and without bodies
+  for (ContactProblem problem :
+       {make_crystal(3), make_crystal_of_bodies(), make_crystal_of_bodies(), make_crystal(4)}) {
+    for (double &inverse_mass : problem.inverse_mass) inverse_mass *= 0.7;
+    for (std::size_t c = 0; c < problem.contacts.size(); ++c)
+      problem.contacts.impulse[c] = 0.1 * static_cast<double>(c % 7);
+    gap_operator.prepare(problem);
+    CHECK_ALL_NEAR(gap_operator.free_gap(),
+                   gaps_of(problem, without_dummy(problem.predicted_velocity)), ROUNDING);
+    std::vector<double> gaps(problem.contacts.size());
+    gap_operator.apply(problem, problem.contacts.impulse.data(), gaps.data(), host);
+    CHECK_ALL_NEAR(gaps, gaps_of(problem, velocity_of(problem)), ROUNDING);
+    std::vector<double> velocity(3 * static_cast<std::size_t>(problem.particles));
+    gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
+    CHECK_ALL_NEAR(velocity, velocity_of(problem), ROUNDING);
+  }
+}
+
+void test_rigid_bodies()
+{
+  constexpr double NOT_READ = std::numeric_limits<double>::quiet_NaN();
+  constexpr double UNTOUCHED = 7.0;
+  RigidBodies bodies;
+  CHECK(bodies.empty());
+  for (int round = 0; round < 2; ++round) {    // the second finds nothing left of the first
+    // An angle of particles 3, 1 and 4, of which 5 and 7 are copies of 1 and 0 of 4; a rod of
+    // 6 and 8.
+    bodies.clear(9);
+    CHECK(bodies.empty());
+    const int angle[6] = {3, 1, 4, 5, 7, 0};
+    std::vector<double> arms(ANGLE_ARMS, ANGLE_ARMS + 9);
+    for (const int original : {1, 1, 2})
+      arms.insert(arms.end(), ANGLE_ARMS + 3 * original, ANGLE_ARMS + 3 * original + 3);
+    bodies.add(angle, arms.data(), 6, 3, 1.0 / 3.0, ANGLE_INVERSE_INERTIA);
+    CHECK(!bodies.empty());
+    const int rod[2] = {6, 8};
+    bodies.add(rod, ROD_ARMS, 2, 2, 0.5, ROD_INVERSE_INERTIA);
+    CHECK_EQUAL(bodies.size(), std::size_t{2});
+    CHECK(bodies.body == std::vector<int>({0, 0, -1, 0, 0, 0, 1, 0, 1}));
+    for (std::size_t k = 0; k < bodies.member.size(); ++k)
+      CHECK_EQUAL(bodies.place[static_cast<std::size_t>(bodies.member[k])], static_cast<int>(k));
+
+    // The corner of the angle moves on its own; its ends do not move.
+    std::vector<double> moved(27, 0.0);
+    for (const std::size_t copy : {5, 7, 0}) std::fill_n(&moved[3 * copy], 3, NOT_READ);
+    std::fill_n(&moved[6], 3, UNTOUCHED);
+    moved[3 * 3 + 2] = 2.0;
+    // Both ends of the rod, in opposite directions: it turns at 1/2 of a moment of 3.
+    moved[3 * 6 + 1] = -3.0;
+    moved[3 * 8 + 1] = 3.0;
+    bodies.velocity_change(moved.data());
+    std::vector<double> expected(27, 0.0);
+    std::fill_n(&expected[6], 3, UNTOUCHED);
+    expected[3 * 3 + 2] = 2.0;
+    expected[3 * 6 + 1] = -3.0;
+    expected[3 * 8 + 1] = 3.0;
+    CHECK_ALL_NEAR(moved, expected, ROUNDING);
+
+    // A unit impulse along any direction: copies move like their originals.
+    const double direction[3] = {0.6, -0.48, 0.64};
+    for (const std::size_t original : {3, 1, 4, 6, 8}) {
+      std::fill(moved.begin(), moved.end(), 0.0);
+      std::copy_n(direction, 3, &moved[3 * original]);
+      bodies.velocity_change(moved.data());
+      const double along = direction[0] * moved[3 * original] +
+          direction[1] * moved[3 * original + 1] + direction[2] * moved[3 * original + 2];
+      CHECK_NEAR(bodies.mobility(static_cast<int>(original), direction), along, ROUNDING);
+      CHECK(std::equal(&moved[3], &moved[3] + 3, &moved[15]));
+      CHECK(std::equal(&moved[3], &moved[3] + 3, &moved[21]));
+      CHECK(std::equal(&moved[12], &moved[12] + 3, &moved[0]));
+    }
+    CHECK_EQUAL(bodies.mobility(5, direction), bodies.mobility(1, direction));
+    CHECK_EQUAL(bodies.mobility(0, direction), bodies.mobility(4, direction));
+  }
+}
+
+void test_mobility()
+{
+  ContactProblem problem = make_problem(std::vector<double>(9, 0.0), {0.25, 9.0, 9.0});
+  CHECK_EQUAL(problem.mobility(0, UP), 0.25);
+  CHECK_EQUAL(problem.mobility(3, UP), 0.0);    // a wall
+  problem.bodies.clear(3);
+  const int members[2] = {1, 2};
+  problem.bodies.add(members, ROD_ARMS, 2, 2, 0.5, ROD_INVERSE_INERTIA);
+  const double across[3] = {0.6, 0.8, 0.0};
+  CHECK_EQUAL(problem.mobility(0, UP), 0.25);
+  CHECK_EQUAL(problem.mobility(3, UP), 0.0);
+  CHECK_NEAR(problem.mobility(1, UP), 0.5, ROUNDING);
+  CHECK_NEAR(problem.mobility(2, across), 1.0, ROUNDING);
 }
 
 void test_sphere_falling_on_the_floor()
@@ -374,12 +515,12 @@ void test_column()
   }
 }
 
-void test_crystal()
+void test_crystal(const ContactProblem &crystal)
 {
   SerialHost host;
   std::vector<double> other_solver;
   for (const std::string &name : SOLVERS) {
-    ContactProblem problem = make_crystal(4);
+    ContactProblem problem = crystal;
     const SolverResult result = make_solver(name)->solve(problem, {TOLERANCE, 10000}, host);
     CHECK(result.converged);
     const std::vector<double> gaps = gaps_of(problem, velocity_of(problem));
@@ -456,8 +597,7 @@ void test_names_of_solvers()
 // Knows all contacts of a problem and hands out those that a velocity violates.
 class HiddenContacts final : public ConstraintSource {
  public:
-  explicit HiddenContacts(const ContactProblem &all)
-      : all_(all), known_(all.contacts.size(), false)
+  explicit HiddenContacts(const ContactProblem &all) : all_(all), known_(all.contacts.size(), false)
   {
   }
 
@@ -605,10 +745,10 @@ void test_concave_wall_is_linearised_again()
     // overlap only squared: the root of the tolerance, over the step.
     const double distance = std::hypot(1.1, 0.4);
     const double accuracy = std::sqrt(2.0 * TOLERANCE) / TIMESTEP;
-    CHECK_ALL_NEAR(velocity,
-                   std::vector<double>({(1.1 / distance - 0.8) / TIMESTEP,
-                                        0.4 / distance / TIMESTEP, 1.0}),
-                   accuracy);
+    CHECK_ALL_NEAR(
+        velocity,
+        std::vector<double>({(1.1 / distance - 0.8) / TIMESTEP, 0.4 / distance / TIMESTEP, 1.0}),
+        accuracy);
   }
 }
 
@@ -624,8 +764,8 @@ struct Share {
 
 class Ranks {
  public:
-  Ranks(std::vector<Share> shares, int particles)
-      : shares_(std::move(shares)), particles_(particles), arrays_(shares_.size())
+  Ranks(std::vector<Share> shares, int particles) :
+      shares_(std::move(shares)), particles_(particles), arrays_(shares_.size())
   {
   }
 
@@ -654,22 +794,32 @@ class Ranks {
       return;
     }
     const long mine = exchanges_;
-    if (!all_here_.wait_for(lock, PATIENCE, [&] { return exchanges_ > mine; }))
+    if (!all_here_.wait_for(lock, PATIENCE, [&] {
+          return exchanges_ > mine;
+        }))
       give_up("one rank waits in " + name + " for the others");
   }
 
   void sum_over_copies()
   {
     std::vector<double> sums(3 * static_cast<std::size_t>(particles_), 0.0);
-    for_each_value(false, [&](double &mine, std::size_t k) { sums[k] += mine; });
-    for_each_value(false, [&](double &mine, std::size_t k) { mine = sums[k]; });
+    for_each_value(false, [&](double &mine, std::size_t k) {
+      sums[k] += mine;
+    });
+    for_each_value(false, [&](double &mine, std::size_t k) {
+      mine = sums[k];
+    });
   }
 
   void share_with_copies()
   {
     std::vector<double> owned(3 * static_cast<std::size_t>(particles_), 0.0);
-    for_each_value(true, [&](double &mine, std::size_t k) { owned[k] = mine; });
-    for_each_value(false, [&](double &mine, std::size_t k) { mine = owned[k]; });
+    for_each_value(true, [&](double &mine, std::size_t k) {
+      owned[k] = mine;
+    });
+    for_each_value(false, [&](double &mine, std::size_t k) {
+      mine = owned[k];
+    });
   }
 
   void reduce()
@@ -695,8 +845,8 @@ class Ranks {
   {
     for (std::size_t rank = 0; rank < shares_.size(); ++rank) {
       const Share &share = shares_[rank];
-      const std::size_t count =
-          owned_only ? static_cast<std::size_t>(share.owned) : share.particles.size();
+      const std::size_t count = owned_only ? static_cast<std::size_t>(share.owned)
+                                           : share.particles.size();
       for (std::size_t i = 0; i < count; ++i)
         for (std::size_t d = 0; d < 3; ++d)
           visit(arrays_[rank].per_particle[3 * i + d],
@@ -751,16 +901,51 @@ class RankHost final : public Host {
   std::size_t rank_;
 };
 
+// The bodies among a rank's particles. The first time that a particle is there counts as the
+// original, whoever owns it; a rank has all of a body or nothing.
+RigidBodies bodies_of(const RigidBodies &whole, const std::vector<int> &particles)
+{
+  RigidBodies bodies;
+  bodies.clear(static_cast<int>(particles.size()));
+  for (std::size_t b = 0; b < whole.size(); ++b) {
+    std::vector<int> members;
+    std::vector<double> arms;
+    int originals = 0;
+    for (const bool original : {true, false}) {
+      for (int k = whole.start[b]; k < whole.start[b + 1]; ++k) {
+        const double *const arm = &whole.arm[3 * static_cast<std::size_t>(k)];
+        bool seen = false;
+        for (std::size_t l = 0; l < particles.size(); ++l) {
+          if (particles[l] != whole.member[static_cast<std::size_t>(k)]) continue;
+          if (seen != original) {
+            members.push_back(static_cast<int>(l));
+            arms.insert(arms.end(), arm, arm + 3);
+          }
+          seen = true;
+        }
+      }
+      if (original) originals = static_cast<int>(members.size());
+    }
+    if (members.empty()) continue;
+    CHECK_EQUAL(originals, whole.originals[b]);
+    bodies.add(members.data(), arms.data(), static_cast<int>(members.size()), originals,
+               whole.inverse_mass[b], &whole.inverse_inertia[6 * b]);
+  }
+  return bodies;
+}
+
 // What one rank has of a problem: its particles, the contacts that are given to it, and copies of
-// the particles of other ranks that those touch. The copies' velocities come from the host.
+// the particles of other ranks that those touch. The copies' velocities come from the host. Where a
+// particle is there several times, the last one is in every other contact.
 ContactProblem part_of(const ContactProblem &whole, const Share &share,
                        const std::vector<std::size_t> &contacts)
 {
-  std::vector<int> local(static_cast<std::size_t>(whole.particles), WALL);
+  std::vector<int> local(static_cast<std::size_t>(whole.particles), WALL), image = local;
   std::vector<double> velocity, inverse_mass;
   for (std::size_t k = 0; k < share.particles.size(); ++k) {
     const auto i = static_cast<std::size_t>(share.particles[k]);
     if (local[i] == WALL) local[i] = static_cast<int>(k);
+    image[i] = static_cast<int>(k);
     const bool owned = k < static_cast<std::size_t>(share.owned);
     for (std::size_t d = 0; d < 3; ++d)
       velocity.push_back(owned ? whole.predicted_velocity[3 * i + d]
@@ -770,10 +955,12 @@ ContactProblem part_of(const ContactProblem &whole, const Share &share,
   ContactProblem part = make_problem(velocity, inverse_mass);
   for (const std::size_t c : contacts) {
     const int second = whole.contacts.second[c];
-    add_contact(part, local[static_cast<std::size_t>(whole.contacts.first[c])],
-                second == whole.particles ? WALL : local[static_cast<std::size_t>(second)],
+    const std::vector<int> &here = c % 2 == 0 ? local : image;
+    add_contact(part, here[static_cast<std::size_t>(whole.contacts.first[c])],
+                second == whole.particles ? WALL : here[static_cast<std::size_t>(second)],
                 &whole.contacts.normal[3 * c], whole.contacts.gap[c]);
   }
+  if (!whole.bodies.empty()) part.bodies = bodies_of(whole.bodies, share.particles);
   return part;
 }
 
@@ -854,8 +1041,9 @@ void check_agreement(const std::vector<RankOutcome> &outcomes, const Ranks &rank
 
 long count_calls(const Ranks &ranks, const std::string &start)
 {
-  return std::count_if(ranks.calls.begin(), ranks.calls.end(),
-                       [&](const std::string &call) { return call.rfind(start, 0) == 0; });
+  return std::count_if(ranks.calls.begin(), ranks.calls.end(), [&](const std::string &call) {
+    return call.rfind(start, 0) == 0;
+  });
 }
 
 // Gives every particle i to rank owner(i) and contact c between two ranks to either in turn.
@@ -886,6 +1074,60 @@ Division divide(const ContactProblem &whole, const std::function<int(int)> &owne
   return division;
 }
 
+// Gives every rank all of the bodies of which it has a part, and another copy of every third
+// particle that it has, as over a periodic boundary.
+void complete(const RigidBodies &bodies, std::vector<Share> &shares)
+{
+  for (Share &share : shares) {
+    std::vector<int> &here = share.particles;
+    for (std::size_t k = 0; k < here.size(); ++k) {    // grows on the way
+      const int b = bodies.body[static_cast<std::size_t>(here[k])];
+      for (std::size_t m = 0; m < bodies.member.size(); ++m) {
+        const int i = bodies.member[m];
+        if (b >= 0 && bodies.body[static_cast<std::size_t>(i)] == b &&
+            std::find(here.begin(), here.end(), i) == here.end())
+          here.push_back(i);
+      }
+    }
+    const std::size_t count = here.size();
+    for (std::size_t k = 0; k < count; k += 3) here.push_back(here[k]);
+  }
+}
+
+// Bodies lie across the ranks, and each rank has some of their particles twice.
+void test_bodies_on_two_ranks()
+{
+  constexpr double BOUND = 100.0 * TOLERANCE / TIMESTEP;    // as in test_two_ranks
+  const ContactProblem whole = make_crystal_of_bodies();
+  const std::vector<std::function<int(int)>> owners = {
+      // the rods' ends on two ranks
+      [](int i) {
+        return i % 2;
+      },
+      // the angles' ends on two ranks
+      [](int i) {
+        return i / 16 % 2;
+      },
+      [](int) {
+        return 1;
+      },
+  };
+  for (const std::string &name : SOLVERS)
+    for (const auto &owner : owners)
+      for (const bool hide_contacts : {false, true}) {
+        Division division = divide(whole, owner);
+        complete(whole.bodies, division.shares);
+        Ranks ranks(division.shares, whole.particles);
+        const auto outcomes =
+            solve_on_ranks(whole, ranks, division.contacts, name, TOLERANCE, hide_contacts);
+        check_agreement(outcomes, ranks, solve_on_one_rank(whole, name, TOLERANCE), BOUND);
+        CHECK_EQUAL(outcomes[0].result.rounds > 1, hide_contacts);
+        if (name == "apgd")    // bodies need no exchange of their own
+          CHECK_EQUAL(count_calls(ranks, "sum_over_copies"),
+                      outcomes[0].result.iterations + 2 * outcomes[0].result.rounds);
+      }
+}
+
 void test_two_ranks()
 {
   // Rounding in another order moves the last iteration by no more than the tolerance; along a few
@@ -893,9 +1135,18 @@ void test_two_ranks()
   constexpr double BOUND = 100.0 * TOLERANCE / TIMESTEP;
   const ContactProblem whole = make_crystal(3);
   const std::vector<std::function<int(int)>> owners = {
-      [](int i) { return i / 18; },    // two layers and one
-      [](int i) { return i % 2; },     // every neighbour is on the other rank
-      [](int) { return 1; },           // nothing on rank 0
+      // two layers and one
+      [](int i) {
+        return i / 18;
+      },
+      // every neighbour is on the other rank
+      [](int i) {
+        return i % 2;
+      },
+      // nothing on rank 0
+      [](int) {
+        return 1;
+      },
   };
   for (const std::string &name : SOLVERS)
     for (const auto &owner : owners)
@@ -931,11 +1182,11 @@ void test_two_ranks_with_nothing()
   }
 }
 
-// One rank whose only copies are periodic images of its own particles: a closed ring of spheres can
-// only turn as a whole, at the mean speed.
-void test_periodic_images()
+// One rank whose only copies are periodic images of its own particles: a closed ring of spheres, or
+// of pairs of them, can only turn as a whole, at the mean speed.
+void test_periodic_images(bool joined)
 {
-  constexpr int COUNT = 7;
+  constexpr int COUNT = 8;
   const double along[3] = {1.0, 0.0, 0.0};
   for (const std::string &name : SOLVERS) {
     Share share;
@@ -951,9 +1202,21 @@ void test_periodic_images()
     share.particles.push_back(0);    // the image of the first, behind the last
     inverse_mass.push_back(inverse_mass[0]);
     ContactProblem problem = make_problem({}, inverse_mass);
+    problem.bodies.clear(problem.particles);
     for (int i = 0; i < COUNT; ++i) {
       problem.predicted_velocity[3 * static_cast<std::size_t>(i)] = 0.1 * (i * i % 5);
-      add_contact(problem, i + 1, i, along, 0.0);
+      if (!joined || i % 2 == 1) add_contact(problem, i + 1, i, along, 0.0);
+    }
+    for (int i = 0; joined && i < COUNT; i += 2) {
+      const double first = 1 + i % 3, second = 1 + (i + 1) % 3, sum = first + second;
+      const double arms[9] = {-second / sum, 0.0,           0.0, first / sum, 0.0,
+                              0.0,           -second / sum, 0.0, 0.0};
+      const double across = sum / (first * second);
+      const double inverse_inertia[6] = {0.0, across, across, 0.0, 0.0, 0.0};
+      const int members[3] = {i, i + 1, COUNT};
+      problem.bodies.add(members, arms, i == 0 ? 3 : 2, 2, 1.0 / sum, inverse_inertia);
+      double *const velocity = &problem.predicted_velocity[3 * static_cast<std::size_t>(i)];
+      velocity[0] = velocity[3] = (first * velocity[0] + second * velocity[3]) / sum;
     }
     Ranks ranks({share}, COUNT);
     RankHost host(ranks, 0);
@@ -973,10 +1236,13 @@ void test_periodic_images()
 
 void test_largest_eigenvalue_on_two_ranks()
 {
-  const ContactProblem whole = make_crystal(3);
+  const ContactProblem whole = make_crystal_of_bodies();
   SerialHost serial;
   const double expected = largest_eigenvalue(whole, serial);
-  const Division division = divide(whole, [](int i) { return i % 2; });
+  Division division = divide(whole, [](int i) {
+    return i % 2;
+  });
+  complete(whole.bodies, division.shares);
   Ranks ranks(division.shares, whole.particles);
   std::array<double, 2> found{};
   std::vector<std::thread> threads;
@@ -1097,10 +1363,13 @@ int main()
   test_resize_keeps_the_dummy_particle_still();
   test_residual();
   test_gap_operator();
+  test_rigid_bodies();
+  test_mobility();
   test_sphere_falling_on_the_floor();
   test_frozen_particle();
   test_column();
-  test_crystal();
+  test_crystal(make_crystal(4));
+  test_crystal(make_crystal_of_bodies());
   test_iteration_limit();
   test_solver_is_used_again();
   test_first_guess();
@@ -1112,8 +1381,10 @@ int main()
   test_iterations_of_all_rounds_are_limited();
   test_concave_wall_is_linearised_again();
   test_two_ranks();
+  test_bodies_on_two_ranks();
   test_two_ranks_with_nothing();
-  test_periodic_images();
+  test_periodic_images(false);
+  test_periodic_images(true);
   test_largest_eigenvalue_on_two_ranks();
   test_philox_known_answers();
   test_uniform_vector();

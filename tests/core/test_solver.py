@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import isotonic_regression
 
-from contact_problems import UP, WALL, assert_within, column, problem, residual_left, row
+from contact_problems import (
+    UP,
+    WALL,
+    Problem,
+    assert_within,
+    column,
+    in_bodies,
+    problem,
+    residual_left,
+    row,
+)
 
 # [diameters] 1e-9 of one step's motion, far above the rounding of gaps near 0.01.
 TOLERANCE = 1e-11
@@ -236,3 +246,193 @@ def test_uzawa_with_one_stiff_contact_among_many():
     projection = problem(velocity, mass, contacts).project(TOLERANCE, solver="uzawa")
     # The step may be wrong by as much as the eigenvalue's documented accuracy, about 1e-3.
     assert_within(projection.velocity[-1], (0, 0, 0), 2e-3)
+
+
+def rod(count, contacts, *, velocity=(0, 0, -1), radius=0.0) -> Problem:
+    """Unit masses on the x axis, one apart and joined, that move like one."""
+    position = [(k, 0, 0) for k in range(count)]
+    given = problem([velocity] * count, [1] * count, contacts)
+    return in_bodies(given, position, [range(count)], radius)
+
+
+def test_dimer_hit_at_one_end(solve):
+    # m / 2 moves and m d^2 / 2 turns as if the other end were not there.
+    projection, accuracy = solve(rod(2, [(1, WALL, UP, 0)]))
+    assert_within(projection.velocity, [(0, 0, -1), (0, 0, 0)], accuracy)
+    assert_within(projection.impulse, [1], accuracy)
+
+
+def test_solid_dimer_hit_at_one_end(solve):
+    # Inertia 14/5 m r^2: mobility (1/2 + 5/14) / m at this end, (1/2 - 5/14) / m at the other.
+    projection, accuracy = solve(rod(2, [(1, WALL, UP, 0)], radius=0.5))
+    assert_within(projection.velocity, [(0, 0, -5 / 6), (0, 0, 0)], accuracy)
+    assert_within(projection.impulse, [7 / 6], 2 * accuracy)
+
+
+@pytest.mark.parametrize("radius", [0, 0.5])
+def test_dimer_hit_along_its_axis(solve, radius):
+    # Both stop, and what they do across goes on.
+    given = rod(2, [(1, WALL, (-1, 0, 0), 0)], velocity=(1, 0.5, 0), radius=radius)
+    projection, accuracy = solve(given)
+    assert_within(projection.velocity, [(0, 0.5, 0)] * 2, accuracy)
+    assert_within(projection.impulse, [2], 2 * accuracy)
+
+
+@pytest.mark.parametrize("radius", [0, 0.5])
+def test_rod_hit_at_its_centre(solve, radius):
+    projection, accuracy = solve(rod(3, [(1, WALL, UP, 0)], radius=radius))
+    assert_within(projection.velocity, np.zeros((3, 3)), accuracy)
+    assert_within(projection.impulse, [3], 3 * accuracy)
+
+
+def test_rod_of_five_hit_at_one_end(solve):
+    # Inertia 10 m a^2, arm 2 a: mobility (1/5 + 4/10) / m; the speeds left are linear along it.
+    projection, accuracy = solve(rod(5, [(4, WALL, UP, 0)]))
+    expected = [(0, 0, -4 / 3), (0, 0, -1), (0, 0, -2 / 3), (0, 0, -1 / 3), (0, 0, 0)]
+    assert_within(projection.velocity, expected, accuracy)
+    assert_within(projection.impulse, [5 / 3], 5 / 3 * accuracy)
+
+
+@pytest.mark.parametrize("radius", [0, 0.5])
+def test_rod_of_five_lands_flat(solve, radius):
+    # On five floors, of which two are enough: only the sum and the moment of the impulses are known
+    # (but not with what error of the speeds, hence the factors of 5).
+    projection, accuracy = solve(rod(5, [(k, WALL, UP, 0) for k in range(5)], radius=radius))
+    assert_within(projection.velocity, np.zeros((5, 3)), 5 * accuracy)
+    assert_within(projection.impulse.sum(), 5, 25 * accuracy)
+    assert_within(projection.impulse @ np.arange(-2, 3), 0, 25 * accuracy)
+
+
+@pytest.mark.parametrize("slope", [20, 45, 80])
+def test_dimer_leans_on_a_wall_and_slides(solve, slope):
+    """A ladder that falls at speed 1, its foot on a smooth floor and its top at a smooth wall.
+
+    Foot and top can only go at s sin(slope) and -s cos(slope); s = cos(slope) is nearest to (0, -1)
+    for both. The impulses are what momentum is left for floor and wall.
+    """
+    sine, cosine = np.sin(np.deg2rad(slope)), np.cos(np.deg2rad(slope))
+    ladder = problem([(0, 0, -1)] * 2, [1, 1], [(0, WALL, UP, 0), (1, WALL, (1, 0, 0), 0)])
+    given = in_bodies(ladder, [(cosine, 0, 0), (0, 0, sine)], [(0, 1)])
+    projection, accuracy = solve(given)
+    # Errors of two relative velocities, through the inverse of the matrix between the impulses.
+    masses = np.linalg.norm(np.linalg.inv(given.delassus() / given.timestep), np.inf)
+    expected = [(sine * cosine, 0, 0), (0, 0, -(cosine**2))]
+    assert_within(projection.velocity, expected, 2 * masses * accuracy)
+    assert_within(projection.impulse, [1 + sine**2, sine * cosine], masses * accuracy)
+
+
+def test_crossed_dimers_touch_at_their_ends(solve):
+    # The first falls on the second, at right angles: both ends that touch act like free spheres.
+    position = [(0, 0, 1), (1, 0, 1), (0, 0, 0), (0, 1, 0)]
+    falling = [(0, 0, -1)] * 2 + [(0, 0, 0)] * 2
+    pair = problem(falling, [1] * 4, [(0, 2, UP, 0)])
+    projection, accuracy = solve(in_bodies(pair, position, [(0, 1), (2, 3)]))
+    expected = [(0, 0, -0.5), (0, 0, -1), (0, 0, -0.5), (0, 0, 0)]
+    assert_within(projection.velocity, expected, accuracy)
+    assert_within(projection.impulse, [0.5], accuracy)
+
+
+# Regular: inertia 8 m about every axis for unit masses, their squared distance 3 from the centre.
+TETRAHEDRON = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
+
+
+def tetrahedron(contacts, velocity) -> Problem:
+    return in_bodies(problem([velocity] * 4, [1] * 4, contacts), TETRAHEDRON, [range(4)])
+
+
+def test_tetrahedron_lands_on_a_corner(solve):
+    outwards = TETRAHEDRON[0] / np.sqrt(3)
+    projection, accuracy = solve(tetrahedron([(0, WALL, -outwards, 0)], outwards))
+    assert_within(projection.velocity, np.zeros((4, 3)), accuracy)
+    assert_within(projection.impulse, [4], 4 * accuracy)
+
+
+def test_tetrahedron_is_hit_sideways_at_a_corner(solve):
+    # Mobility 1/4 + 3/8. It turns at 1/8 of the moment, which is along the first arm x sideways.
+    sideways = np.array([1, -1, 0]) / np.sqrt(2)
+    projection, accuracy = solve(tetrahedron([(0, WALL, -sideways, 0)], sideways))
+    turn = np.cross(TETRAHEDRON[0], -1.6 * sideways) / 8
+    assert_within(projection.impulse, [1.6], 1.6 * accuracy)
+    expected = sideways * (1 - 0.4) + np.cross(turn, TETRAHEDRON)
+    assert_within(projection.velocity, expected, 2 * accuracy)  # corners 2 sqrt(2) from each other
+
+
+def test_tetrahedron_lands_on_a_face(solve):
+    down = TETRAHEDRON[0] / np.sqrt(3)  # the face opposite to corner 0 is across this
+    contacts = [(k, WALL, down, 0) for k in (1, 2, 3)]
+    projection, accuracy = solve(tetrahedron(contacts, -down))
+    # Three relative velocities make a plane; corner 0 is over its middle.
+    assert_within(projection.velocity, np.zeros((4, 3)), 3 * accuracy)
+    assert_within(projection.impulse, [4 / 3] * 3, 3 * 4 * accuracy)
+
+
+@pytest.mark.parametrize("inertia", [0.1, np.inf])
+def test_body_of_one_sphere_is_a_free_sphere(solve, inertia):
+    given = column([1, 3, 2, 1], [-1, -2, 0.5, -3])
+    spheres = in_bodies(given, np.zeros((4, 3)), [(2,), (0,)])
+    spheres.bodies.inverse_inertia[:] = np.eye(3) / inertia
+    free, _ = solve(given)
+    joined, _ = solve(spheres)
+    assert np.array_equal(joined.velocity, free.velocity)
+    assert np.array_equal(joined.impulse, free.impulse)
+    assert joined.iterations == free.iterations
+
+
+def test_body_that_cannot_move_acts_like_a_wall(solve):
+    free = problem([(0.2, 0.1, -3)], [2], [(0, WALL, UP, 0.01)])
+    on_wall, _ = solve(free)
+    given = problem([(0.2, 0.1, -3), (0, 0, 0), (0, 0, 0)], [2, 1, 1], [(0, 1, UP, 0.01)])
+    given = in_bodies(given, [(0, 0, 1), (0, 0, 0), (1, 0, 0)], [(1, 2)])
+    given.bodies.inverse_mass[:] = 0
+    given.bodies.inverse_inertia[:] = 0
+    on_body, _ = solve(given)
+    assert np.array_equal(on_body.velocity[0], on_wall.velocity[0])
+    assert np.array_equal(on_body.velocity[1:], np.zeros((2, 3)))
+    assert np.array_equal(on_body.impulse, on_wall.impulse)
+
+
+def test_seesaw_hands_the_motion_on(solve):
+    # A hinged beam without weight of its own: what lands on one arm throws up what lies on the
+    # other, at twice the speed because that arm is twice as long.
+    heavy, light = 4, 0.5
+    contacts = [(0, 1, UP, 0), (3, 2, UP, 0)]
+    given = problem([(0, 0, -1), *[(0, 0, 0)] * 3], [heavy, 1, 1, light], contacts)
+    given = in_bodies(given, [(-1, 0, 1), (-1, 0, 0), (2, 0, 0), (2, 0, 1)], [(1, 2)])
+    given.bodies.arm[1:3] = [(-1, 0, 0), (2, 0, 0)]
+    inertia = 5
+    given.bodies.inverse_mass[:] = 0
+    given.bodies.inverse_inertia[:] = np.diag([0, 1 / inertia, 0])
+    projection, accuracy = solve(given)
+    # Angular momentum about the hinge, shared by all.
+    turn = heavy / (heavy + inertia + light * 2**2)
+    expected = [(0, 0, -turn), (0, 0, -turn), (0, 0, 2 * turn), (0, 0, 2 * turn)]
+    accuracy *= heavy / light  # at most, of the errors of two relative velocities
+    assert_within(projection.velocity, expected, accuracy)
+    assert_within(projection.impulse, [heavy * (1 - turn), light * 2 * turn], heavy * accuracy)
+
+
+SINGLE_CONTACTS = {
+    "dimer's end": rod(2, [(1, WALL, UP, 0)]),
+    "dimer's end, along it": rod(2, [(1, WALL, (-1, 0, 0), 0)], velocity=(1, 0, 0)),
+    "solid dimer": rod(2, [(1, WALL, UP, 0)], radius=0.5),
+    "rod of 30": rod(30, [(29, WALL, UP, 0)]),
+    "tetrahedron": tetrahedron([(0, WALL, UP, 0)], (0, 0, -1)),
+    "light end of a dimer": in_bodies(
+        problem([(0, 0, -1)] * 2, [1, 1e-6], [(1, WALL, UP, 0)]),
+        [(0, 0, 0), (1, 0, 0)],
+        [(0, 1)],
+    ),
+    "two dimers": in_bodies(
+        problem([(0, 0, -1)] * 2 + [(0, 0, 0)] * 2, [1, 1e-3, 10, 1], [(1, 2, UP, 0)]),
+        [(0, 0, 0), (1, 0, 1), (1, 0, 0), (0, 1, 0.5)],
+        [(0, 1), (2, 3)],
+    ),
+}
+
+
+@pytest.mark.parametrize("given", SINGLE_CONTACTS.values(), ids=SINGLE_CONTACTS)
+def test_single_contact_takes_as_long_whatever_the_shape(given):
+    # Divided by the mobility of its particles it is always the same problem, except for rounding
+    # where an iteration ends at the tolerance.
+    free = problem([(0, 0, -1)], [1], [(0, WALL, UP, 0)]).project(TOLERANCE)
+    assert abs(given.project(TOLERANCE).iterations - free.iterations) <= 1

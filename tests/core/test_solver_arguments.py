@@ -232,3 +232,171 @@ def test_first_guess_is_not_changed():
     guess = np.array([1.0, 1.0])
     project(impulse=guess)
     assert np.array_equal(guess, [1.0, 1.0])
+
+
+def bodies(**changes) -> dict:
+    """Return arguments about bodies, with some changed, that go with a third particle.
+
+    A hinge and a ball, on particles 2 and 1: the inverse inertia of neither is regular.
+    """
+    return {
+        "body": np.array([-1, 1, 0]),
+        "arm": np.array([[np.nan] * 3, [0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]),
+        "body_inverse_mass": np.array([0.0, 0.5]),
+        "body_inverse_inertia": np.array([np.diag([0.0, 2.0, 0.0]), np.zeros((3, 3))]),
+        "predicted_velocity": np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]),
+        "inverse_mass": np.array([1.0, np.nan, -1.0]),
+        **changes,
+    }
+
+
+BODIES = ["body", "arm", "body_inverse_mass", "body_inverse_inertia"]
+
+
+def test_these_bodies_are_fine():
+    # What is not read is neither finite nor positive.
+    assert project(**bodies()).converged
+    assert residual(**bodies()) == (pytest.approx(0.02, abs=1e-15), 0)  # both approach at 1: 2 h
+    assert largest_eigenvalue(**bodies()) > 0
+
+
+@ALL
+@pytest.mark.parametrize("names", [BODIES[:1], BODIES[1:], BODIES[:3], BODIES[2:3]])
+def test_only_some_of_the_arguments_about_bodies(function, names):
+    given = bodies(inverse_mass=np.array([1.0, 0.5, 0.0]))
+    for name in names:
+        del given[name]
+    with pytest.raises(ValueError, match="body, arm, body_inverse_mass and body_inverse_inertia"):
+        function(**given)
+
+
+@ALL
+@pytest.mark.parametrize("name", ["body", "arm", "body_inverse_inertia"])
+@pytest.mark.parametrize("change", [-1, 1])
+def test_wrong_length_of_an_argument_about_bodies(function, name, change):
+    good = bodies()[name]
+    wrong = good[:-1] if change < 0 else np.concatenate([good, good[:1]])
+    message = f"{name} must have length {len(good)}, not {len(good) + change}"
+    with pytest.raises(ValueError, match=message):
+        function(**bodies(**{name: wrong}))
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("body", (3, 1)),
+        ("arm", (3, 2)),
+        ("arm", (9,)),
+        ("body_inverse_mass", (2, 1)),
+        ("body_inverse_inertia", (2, 6)),
+        ("body_inverse_inertia", (2, 3, 2)),
+    ],
+)
+def test_wrong_shape_of_an_argument_about_bodies(name, shape):
+    wrong = np.zeros(shape, np.int64 if name == "body" else float)
+    # As in test_wrong_shape.
+    with pytest.raises((ValueError, TypeError), match="shape"):
+        project(**bodies(**{name: wrong}))
+
+
+@ALL
+@pytest.mark.parametrize("value", NOT_FINITE)
+@pytest.mark.parametrize("name", BODIES[1:])
+def test_not_finite_in_an_argument_about_bodies(function, name, value):
+    wrong = bodies()[name].copy()
+    wrong.flat[-1] = value
+    with pytest.raises(ValueError, match=f"^{name} holds a number that is not finite"):
+        function(**bodies(**{name: wrong}))
+
+
+@ALL
+@pytest.mark.parametrize("value", [np.nan, -1.0])
+def test_inverse_mass_of_a_free_particle_among_bodies(function, value):
+    with pytest.raises(ValueError, match=r"^inverse_mass"):
+        function(**bodies(inverse_mass=np.array([value, 1.0, 1.0])))
+
+
+@ALL
+@pytest.mark.parametrize("value", [-2, 2, 2**40])
+def test_body_out_of_range(function, value):
+    with pytest.raises(ValueError, match=r"particle 1 is in a body outside -1 \.\.\. 1"):
+        function(**bodies(body=np.array([-1, value, 0])))
+
+
+@ALL
+def test_body_without_particles(function):
+    with pytest.raises(ValueError, match="body 1 has no particle"):
+        function(**bodies(body=np.array([-1, -1, 0]), inverse_mass=np.ones(3)))
+
+
+@ALL
+def test_negative_mass_of_a_body(function):
+    with pytest.raises(ValueError, match="body_inverse_mass must not be negative"):
+        function(**bodies(body_inverse_mass=np.array([-0.1, 1.0])))
+
+
+NOT_POSITIVE = {
+    "negative": np.diag([1.0, 1.0, -1e-3]),
+    "negative first": np.diag([-1e-3, 1.0, 1.0]),
+    "negative between two axes": np.array([[1.0, 0, 1.01], [0, 1, 0], [1.01, 0, 1]]),
+    "no diagonal": np.array([[0.0, 0, 1], [0, 0, 0], [1, 0, 0]]),
+    "negative along the diagonal": np.eye(3) - 0.4,
+    "not symmetric": np.array([[1.0, 0, 0], [0, 1, 1e-3], [0, 0, 1]]),
+}
+
+
+@ALL
+@pytest.mark.parametrize("inertia", NOT_POSITIVE.values(), ids=NOT_POSITIVE)
+@pytest.mark.parametrize("scale", [1e-200, 1.0, 1e100])
+def test_inverse_inertia_that_no_body_has(function, inertia, scale):
+    wrong = np.array([np.zeros((3, 3)), scale * inertia])
+    message = "body_inverse_inertia of body 1 is not symmetric and positive semi-definite"
+    with pytest.raises(ValueError, match=message):
+        function(**bodies(body_inverse_inertia=wrong))
+
+
+@pytest.mark.parametrize("rank", [0, 1, 2, 3])
+@pytest.mark.parametrize("seed", range(5))
+def test_inverse_inertia_may_have_any_rank_and_rounding(seed, rank):
+    generator = np.random.default_rng(seed)
+    axes = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+    inertia = axes @ np.diag(generator.uniform(0.1, 10, 3) * (np.arange(3) < rank)) @ axes.T
+    inertia += 1e-15 * generator.uniform(-10, 10, (3, 3)) * (rank > 0)
+    given = bodies(body_inverse_inertia=np.array([np.zeros((3, 3)), inertia]))
+    assert project(**given).converged
+
+
+@ALL
+def test_contact_within_a_body(function):
+    one = bodies(
+        body=np.array([0, 0, -1]),
+        arm=np.zeros((3, 3)),
+        body_inverse_mass=np.ones(1),
+        body_inverse_inertia=np.zeros((1, 3, 3)),
+        inverse_mass=np.ones(3),
+    )
+    with pytest.raises(ValueError, match="contact 0 is between two particles of one body"):
+        function(**one)
+
+
+@ALL
+def test_contact_of_bodies_that_cannot_move(function):
+    # A hinge moves no particle along its arm, and a body of no mobility none at all.
+    hinged = {"first": np.array([0, 2]), "second": np.array([1, -1])}
+    along = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    with pytest.raises(ValueError, match="contact 1 is between particles that cannot move"):
+        function(**bodies(**hinged, normal=along))
+    function(**bodies(**hinged))  # across its arm it moves
+    with pytest.raises(ValueError, match="contact 1 is between particles that cannot move"):
+        function(**bodies(body_inverse_mass=np.zeros(2)))
+
+
+def test_arguments_about_bodies_may_be_strided_and_are_not_changed():
+    expected = project(**bodies())
+    strided = {name: np.repeat(value, 2, axis=0)[::2] for name, value in bodies().items()}
+    for value in strided.values():
+        value.setflags(write=False)
+    projection = project(**strided)
+    assert np.array_equal(projection.velocity, expected.velocity)
+    for name, value in bodies().items():
+        assert np.array_equal(strided[name], value, equal_nan=True)

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
-from contact_problems import WALL, Problem, assert_within, cubic_crystal, dense_crystal, heap
+from contact_problems import (
+    WALL,
+    Problem,
+    assert_within,
+    bricks,
+    cubic_crystal,
+    dense_crystal,
+    heap,
+    no_bodies,
+)
 from lammps_inelastic import core
 
 # [diameters] One step's motion is 0.01.
@@ -15,7 +25,7 @@ TOLERANCE = 1e-10
 # Velocities and impulses near 1 (up to 200 for large mass ratios), after sums of about 100 terms.
 ROUNDING = 1e-12
 
-PROBLEMS = {
+WITHOUT_BODIES = {
     "heap": heap(1),
     "heap without a floor": heap(2, floor=False),
     "overlapping": heap(3, overlap=0.01),
@@ -27,7 +37,18 @@ PROBLEMS = {
     "crystal in a box": cubic_crystal(4, 9, walls=6),
     "dense crystal": dense_crystal(5, 10),
 }
-IN_FREE_SPACE = ["heap without a floor", "overlapping without a floor"]
+MIXED = [2] * 8 + [3] * 8 + [4] * 8  # and 28 single spheres
+WITH_BODIES = {
+    "dimers": heap(11, bodies=[2] * 30),
+    "solid dimers, overlapping": heap(12, bodies=[2] * 25, radius=0.5, overlap=0.002),
+    "mixed": heap(13, particles=100, bodies=MIXED, frozen=8),
+    "mixed without a floor": heap(14, particles=100, bodies=MIXED, radius=0.5, floor=False),
+    "bodies, mass ratio 100": heap(15, particles=100, bodies=MIXED, mass_ratio=100.0),
+    "bricks": bricks(4, 16, length=2),
+    "rods in a box": bricks(6, 17, length=3, radius=0.5, walls=6),
+}
+PROBLEMS = WITHOUT_BODIES | WITH_BODIES
+IN_FREE_SPACE = [name for name in PROBLEMS if "without a floor" in name]
 
 
 @pytest.fixture(params=PROBLEMS.values(), ids=PROBLEMS.keys())
@@ -55,7 +76,10 @@ def test_residuals_by_independent_formulas(given, solver):
         # Gaps are sums of numbers near h V = 0.01.
         assert_within(reported, given.residual(projection.impulse), 1e-15)
         assert reported == core.residual(
-            *given.arguments, projection.impulse, timestep=given.timestep
+            *given.arguments,
+            projection.impulse,
+            timestep=given.timestep,
+            **given.body_arguments,
         )
 
 
@@ -79,6 +103,55 @@ def test_max_iterations(given, solver):
     exactly = given.project(TOLERANCE, solver=solver, max_iterations=needed)
     assert exactly.converged
     assert exactly.iterations == needed
+
+
+@pytest.mark.parametrize("given", WITHOUT_BODIES.values(), ids=WITHOUT_BODIES)
+def test_no_bodies_change_no_bit(given, solver):
+    nobody = no_bodies(given.inverse_mass.size)
+    nothing = {
+        "body": nobody.body,
+        "arm": nobody.arm,
+        "body_inverse_mass": nobody.inverse_mass,
+        "body_inverse_inertia": nobody.inverse_inertia,
+    }
+    usual = given.project(TOLERANCE, solver=solver)
+    same = given.project(TOLERANCE, solver=solver, **nothing)
+    assert same.iterations == usual.iterations
+    assert np.array_equal(same.velocity, usual.velocity)
+    assert np.array_equal(same.impulse, usual.impulse)
+    rest = {"timestep": given.timestep}
+    assert core.residual(*given.arguments, usual.impulse, **rest, **nothing) == core.residual(
+        *given.arguments, usual.impulse, **rest
+    )
+    contacts = given.arguments[1:5]
+    assert core.largest_eigenvalue(*contacts, **rest, **nothing) == core.largest_eigenvalue(
+        *contacts, **rest
+    )
+
+
+@pytest.mark.parametrize("given", WITH_BODIES.values(), ids=WITH_BODIES)
+def test_bodies_move_by_momentum_and_angular_momentum(given, solver):
+    """Each by one velocity and one angular velocity, from the impulses on its particles."""
+    projection = given.project(TOLERANCE, solver=solver, max_iterations=10)
+    change = projection.velocity - given.predicted_velocity
+    impulse = (given.jacobian().T @ projection.impulse).reshape(-1, 3)
+    pushed = 0
+    for b, members in enumerate(given.bodies.members):
+        arm, moved, push = given.bodies.arm[members], change[members], impulse[members]
+        accuracy = 1e-13 * np.abs(push).sum()  # relative; masses and arms are near 1 or below
+        speed = 1e-12 * np.abs(projection.velocity).max()  # masses down to 0.1
+        for k, other in combinations(range(members.size), 2):
+            assert_within((moved[k] - moved[other]) @ (arm[k] - arm[other]), 0, speed)
+
+        mass = given.mass[members]
+        assert_within(mass @ moved, push.sum(axis=0), accuracy)
+        # Nothing says how particles on a line turn about it, and no moment makes them.
+        cross = np.vstack([np.cross(np.eye(3), r).T for r in arm])
+        turn = np.linalg.lstsq(cross, (moved - mass @ moved / mass.sum()).ravel(), rcond=1e-9)[0]
+        inertia = np.linalg.pinv(given.bodies.inverse_inertia[b], rtol=1e-9, hermitian=True)
+        assert_within(inertia @ turn, np.cross(arm, push).sum(axis=0), accuracy)
+        pushed += push.any()
+    assert pushed > given.bodies.inverse_mass.size / 2
 
 
 @pytest.mark.parametrize("name", IN_FREE_SPACE)
@@ -113,8 +186,9 @@ def test_kinetic_energy_does_not_rise(given, solver):
     assert_within(after, before + work - lost, rounding)
 
 
-def test_kinetic_energy_falls_without_overlaps(solver):
-    given = PROBLEMS["heap"]
+@pytest.mark.parametrize("name", ["heap", "mixed"])
+def test_kinetic_energy_falls_without_overlaps(name, solver):
+    given = PROBLEMS[name]
     projection = given.project(TOLERANCE, solver=solver)
     before = given.kinetic_energy(given.predicted_velocity)
     # Not by next to nothing either: most particles of a heap meet somebody.
@@ -146,6 +220,7 @@ def test_names_of_particles_do_not_matter(given, seed):
     order = np.random.default_rng(seed).permutation(given.inverse_mass.size)
     new_name = np.argsort(order)
     usual = after_some_iterations(given)
+    bodies = given.bodies
     renamed = after_some_iterations(
         replace(
             given,
@@ -153,10 +228,32 @@ def test_names_of_particles_do_not_matter(given, seed):
             inverse_mass=given.inverse_mass[order],
             first=new_name[given.first],
             second=np.where(given.second == WALL, WALL, new_name[given.second]),
+            bodies=replace(bodies, body=bodies.body[order], arm=bodies.arm[order]),
         )
     )
     assert_within(renamed.velocity, usual.velocity[order], ROUNDING)
     assert_within(renamed.impulse, usual.impulse, ROUNDING)
+
+
+@pytest.mark.parametrize("given", WITH_BODIES.values(), ids=WITH_BODIES)
+def test_names_of_bodies_do_not_matter(given):
+    bodies = given.bodies
+    order = np.random.default_rng(0).permutation(bodies.inverse_mass.size)
+    usual = after_some_iterations(given)
+    renamed = after_some_iterations(
+        replace(
+            given,
+            bodies=replace(
+                bodies,
+                body=np.where(bodies.body < 0, -1, np.argsort(order)[bodies.body]),
+                inverse_mass=bodies.inverse_mass[order],
+                inverse_inertia=bodies.inverse_inertia[order],
+            ),
+        )
+    )
+    # Not even the order of the sums is another.
+    assert np.array_equal(renamed.velocity, usual.velocity)
+    assert np.array_equal(renamed.impulse, usual.impulse)
 
 
 def test_sides_of_a_contact_do_not_matter(given):
@@ -192,6 +289,28 @@ def test_galilean_invariance(given, solver):
     assert_within(moving.impulse, usual.impulse, ROUNDING)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_direction_of_axes_does_not_matter(given, seed):
+    # Orthogonal: a rotation, or one with a reflection.
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    bodies = given.bodies
+    usual = after_some_iterations(given)
+    turned = after_some_iterations(
+        replace(
+            given,
+            predicted_velocity=given.predicted_velocity @ turn.T,
+            normal=given.normal @ turn.T,
+            bodies=replace(
+                bodies,
+                arm=bodies.arm @ turn.T,
+                inverse_inertia=turn @ bodies.inverse_inertia @ turn.T,
+            ),
+        )
+    )
+    assert_within(turned.velocity, usual.velocity @ turn.T, ROUNDING)
+    assert_within(turned.impulse, usual.impulse, ROUNDING)
+
+
 def test_units_of_powers_of_two_change_no_bit(given, solver):
     length, time, mass = 2.0**-20, 2.0**9, 2.0**31
     speed = length / time
@@ -202,6 +321,12 @@ def test_units_of_powers_of_two_change_no_bit(given, solver):
         inverse_mass=given.inverse_mass / mass,
         gap=given.gap * length,
         timestep=given.timestep * time,
+        bodies=replace(
+            given.bodies,
+            arm=given.bodies.arm * length,
+            inverse_mass=given.bodies.inverse_mass / mass,
+            inverse_inertia=given.bodies.inverse_inertia / (mass * length**2),
+        ),
     ).project(TOLERANCE * length, solver=solver)
     assert scaled.iterations == usual.iterations
     assert np.array_equal(scaled.velocity, usual.velocity * speed)
