@@ -678,14 +678,17 @@ long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
   return static_cast<long>(problem_.contacts.size() - before);
 }
 
-// The distance between turning bodies is not convex: where two spheres end up overlapping, their
-// constraint is replaced by one about that end, n and gap such that it is exact for this velocity.
+// The distance between turning bodies is not convex: where two spheres end up overlapping, the gap
+// of their constraint is set to make it exact for this velocity. The normal stays that of the
+// positions from which the force acts: along any other, two opposite forces would be a couple, and
+// angular momentum would not be kept. What the end lacks is made up along it, hence the division.
 long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
 {
   const double *const *const x = atom->x;
   const double *const radius = atom->radius;
   const double h = problem_.timestep;
   const std::vector<double> &moved = rigid_->motion();
+  constexpr double LEAST_ALONG = 0.5;    // the line between the spheres turns by 60 degrees
   inelastic::ContactSet &contacts = problem_.contacts;
   long changed = 0;
   double away[3];
@@ -695,14 +698,13 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
     return norm(away) - radius[i] - radius[j];
   };
   auto relinearise = [&](std::size_t c, double gap) {
-    const double distance = norm(away);
+    const double *const n = &contacts.normal[3 * c];
     double opening = 0.0;
-    for (int d = 0; d < 3; ++d) {
-      const double n = away[d] / distance;
-      opening += n * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
-      contacts.normal[3 * c + d] = n;
-    }
-    contacts.gap[c] = gap - h * opening;
+    for (int d = 0; d < 3; ++d)
+      opening +=
+          n[d] * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
+    const double along = std::max(LEAST_ALONG, dot(n, away) / norm(away));
+    contacts.gap[c] = gap / along - h * opening;
     ++changed;
   };
 
@@ -740,28 +742,39 @@ bool FixInelastic::same_plane(std::size_t c, const double *normal) const
 long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
 {
   long changed = 0;
+  const double h = problem_.timestep;
+  // What starts deep in a wall is pushed out slowly, wherever the step ends.
+  auto starts_deep = [&](const RegionWalls::Look &look, const WallView &view) {
+    const auto existing = wall_constraint_.find(wall_key(look.atom, view.wall));
+    return existing != wall_constraint_.end() && is_bad(origin_[existing->second].gap_now);
+  };
   auto add_plane = [&](const RegionWalls::Look &look, const WallView &view) {
     if (relinearisations_ > MAX_RELINEARISATIONS) return;
     const int i = look.atom;
     const auto existing = wall_constraint_.find(wall_key(i, view.wall));
     const bool known = existing != wall_constraint_.end();
-    if (known && is_bad(origin_[existing->second].gap_now)) return;
     ++changed;
+    const double *const n = view.normal;
+    const double *const x = atom->x[i];
+    const double from_here[3] = {look.where[0] - x[0], look.where[1] - x[1], look.where[2] - x[2]};
     const double gap_there = view.distance - atom->radius[i];
-    const double gap_here = gap_there - problem_.timestep * dot(view.normal, &velocity[3 * i]);
-    const double motion = view.distance_now - view.distance;
-    const double gap_now = known ? origin_[existing->second].gap_now : gap_here + motion;
+    const double gap_here = gap_there - dot(n, from_here);
+    const double wall_motion = view.distance_now - view.distance;
+    const double gap_now = known ? origin_[existing->second].gap_now : gap_here + wall_motion;
     // A region can show a wall late: from inside one part of a union the others are not seen.
     note_overlap(gap_now);
-    const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - motion
-                                       : gap_here;
+    // Exact for this motion, also where a body turns.
+    const double turning = is_member(i) ? h * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]))
+                                        : 0.0;
+    const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - wall_motion
+                                       : gap_here + turning;
     if (known && same_plane(existing->second, view.normal)) {
       problem_.contacts.gap[existing->second] = gap;
       return;
     }
     wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
     problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
-    origin_.push_back({view.wall, gap_now, atom->radius[i], motion});
+    origin_.push_back({view.wall, gap_now, atom->radius[i], wall_motion});
   };
 
   const std::vector<RegionWalls::Look> ends = looks_at_end(velocity);
@@ -770,6 +783,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
   walls_->view(
       ends, inexact_only,
       [&](const RegionWalls::Look &look, const WallView &view) {
+        if (starts_deep(look, view)) return;
         const double overlap = atom->radius[look.atom] - view.distance;
         output_[EXCESS] = std::max(output_[EXCESS], overlap - 2.0 * tolerance_);
         if (overlap > RELINEARISE_BEYOND * tolerance_) add_plane(look, view);
@@ -786,7 +800,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     walls_->view(
         last_inside(beyond), inexact_only,
         [&](const RegionWalls::Look &look, const WallView &view) {
-          add_plane(look, view);
+          if (!starts_deep(look, view)) add_plane(look, view);
         },
         [](const RegionWalls::Look &, const std::string &) {
         });
