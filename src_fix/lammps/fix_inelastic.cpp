@@ -474,7 +474,7 @@ bool FixInelastic::is_bad(double gap) const
 double FixInelastic::effective_gap(double gap_now, double size) const
 {
   if (!is_bad(gap_now)) return gap_now;
-  if (phase_ == Phase::CONTACT) return -tolerance_;
+  if (phase_ == Phase::CONTACT) return 0.0;
   const double limit = PUSH_LIMIT * size * problem_.timestep / regular_timestep_;
   return std::max(gap_now, -std::max(limit, REGULAR_OVERLAP * tolerance_));
 }
@@ -547,6 +547,12 @@ void FixInelastic::take_pair(std::size_t slot, int i, int j)
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
   const double gap = distance - size;
   note_overlap(gap);
+  if (rigid_ && (rigid_->is_incomplete(i) || rigid_->is_incomplete(j))) {
+    message_ = fmt::format("atoms {} and {} meet where a rank does not see all of their bodies: "
+                           "raise comm_modify cutoff",
+                           atom->tag[i], atom->tag[j]);
+    return;
+  }
   if (atom->tag[i] == atom->tag[j]) {
     if (is_bad(gap))
       message_ = fmt::format("atom {} overlaps its own periodic image: the box is too small",
@@ -656,7 +662,8 @@ long FixInelastic::add_violated_pairs(const std::vector<double> &velocity)
     const double opening[3] = {velocity[3 * i] - velocity[3 * j],
                                velocity[3 * i + 1] - velocity[3 * j + 1],
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
-    if (distance - radius[i] - radius[j] + h * dot(away, opening) / distance < -tolerance_)
+    if (distance - radius[i] - radius[j] + h * dot(away, opening) / distance < -tolerance_ &&
+        !is_entangled(i, j))
       take_pair(slot, i, j);
   });
   return static_cast<long>(problem_.contacts.size() - before);
@@ -712,7 +719,7 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const int i = contacts.first[c], j = contacts.second[c];
     if (origin_[c].wall != 0 || !(is_member(i) || is_member(j))) continue;
-    if (is_bad(origin_[c].gap_now)) continue;
+    if (is_bad(origin_[c].gap_now) || is_entangled(i, j)) continue;
     const double gap = gap_at_end(i, j);
     output_[EXCESS] = std::max(output_[EXCESS], -gap - REGULAR_OVERLAP * tolerance_);
     if (may_change && gap < -RELINEARISE_BEYOND * tolerance_) relinearise(c, gap);
@@ -720,7 +727,7 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
   for_each_listed_pair([&](std::size_t slot, int i, int j) {
     if (listed_pair_taken_[slot] || !(is_member(i) || is_member(j))) return;
     const double gap = gap_at_end(i, j);
-    if (!(gap < -RELINEARISE_BEYOND * tolerance_)) return;
+    if (!(gap < -RELINEARISE_BEYOND * tolerance_) || is_entangled(i, j)) return;
     output_[EXCESS] = std::max(output_[EXCESS], -gap - REGULAR_OVERLAP * tolerance_);
     if (!may_change) return;
     const std::size_t before = contacts.size();
@@ -848,11 +855,13 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
   std::copy_n(velocity_.begin(), 3 * static_cast<std::size_t>(problem_.particles),
               problem_.predicted_velocity.begin());
   phase_ = Phase::PUSH;
+  if (rigid_) find_entangled();
   for (std::size_t c = 0; c < problem_.contacts.size(); ++c) {
     const Origin &origin = origin_[c];
     if (is_bad(origin.gap_now))
       problem_.contacts.gap[c] = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
     problem_.contacts.impulse[c] = 0.0;
+    if (origin.wall == 0) disentangle(c);
   }
   const inelastic::ProjectionResult pushed = inelastic::project(
       problem_, *this, *solver_, {tolerance_, std::max(0L, max_iterations_ - result.iterations)},
@@ -867,6 +876,54 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
   problem_.contacts = contacts;
   origin_.resize(contacts.size());
   if (rigid_) rigid_->note_push(problem_, velocity_);
+}
+
+// Two bodies that are deep in one another overlap at several places, whose normals may ask for
+// opposite motions. Such bodies are pushed along the line between their centres instead, which takes
+// them apart whatever their shapes; what else is between them waits until they are less entangled.
+void FixInelastic::find_entangled()
+{
+  entangled_.clear();
+  const inelastic::ContactSet &contacts = problem_.contacts;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const int i = contacts.first[c], j = contacts.second[c];
+    if (origin_[c].wall == 0 && (is_member(i) || is_member(j)) &&
+        origin_[c].gap_now < -PUSH_LIMIT * origin_[c].size)
+      entangled_.insert(pair_of_bodies(i, j));
+  }
+}
+
+bool FixInelastic::is_entangled(int i, int j) const
+{ return phase_ == Phase::PUSH && !entangled_.empty() && entangled_.count(pair_of_bodies(i, j)); }
+
+void FixInelastic::disentangle(std::size_t c)
+{
+  constexpr double NEVER = 1.0e3;    // of the sum of radii, a gap that no step closes
+  inelastic::ContactSet &contacts = problem_.contacts;
+  const int i = contacts.first[c], j = contacts.second[c];
+  if (!is_entangled(i, j)) return;
+  if (!is_bad(origin_[c].gap_now)) {
+    contacts.gap[c] = NEVER * origin_[c].size;
+    return;
+  }
+  double apart[3];
+  for (int d = 0; d < 3; ++d)
+    apart[d] =
+        atom->x[i][d] - rigid_->arm(problem_, i)[d] - atom->x[j][d] + rigid_->arm(problem_, j)[d];
+  const double distance = norm(apart);
+  if (distance > COINCIDENT * origin_[c].size)
+    for (int d = 0; d < 3; ++d) contacts.normal[3 * c + d] = apart[d] / distance;
+}
+
+// The same for all pairs of spheres of two bodies (or of a body and a free sphere).
+std::uint64_t FixInelastic::pair_of_bodies(int i, int j) const
+{
+  auto number = [this](int k) {
+    const int body = problem_.bodies.body[k];
+    return static_cast<std::uint32_t>(body < 0 ? problem_.bodies.size() + k : body);
+  };
+  const std::uint64_t a = number(i), b = number(j);
+  return std::min(a, b) << 32 | std::max(a, b);
 }
 
 void FixInelastic::apply_forces(double kick_steps)

@@ -27,6 +27,7 @@ FixStyle(inelastic,FixInelastic);
 #include <memory>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -101,6 +102,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   enum class Phase { CONTACT, PUSH };
   Phase phase_;
   bool bad_overlap_;
+  std::unordered_set<std::uint64_t> entangled_;    // pairs of bodies, deep in one another
 
   // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the
   // last move (NEXT) and at whole steps (HELD).
@@ -176,6 +178,10 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void predict(double kick_steps);
   void collect();
   void push_apart(inelastic::ProjectionResult &);
+  void find_entangled();
+  bool is_entangled(int i, int j) const;
+  void disentangle(std::size_t c);
+  std::uint64_t pair_of_bodies(int i, int j) const;
   void apply_forces(double kick_steps);
   void update_outputs(const inelastic::ProjectionResult &);
   void remember_contacts();

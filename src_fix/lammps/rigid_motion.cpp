@@ -55,14 +55,14 @@ double trace_of_square(const double *a)
 }
 
 // Of an inertia; its pseudo-inverse where the masses lie on a line (two equal moments t and a third
-// of zero: A A = t A) or in one point.
-void invert_inertia(const double *a, double *inverse)
+// of zero: A A = t A) or in one point; then the result is true.
+bool invert_inertia(const double *a, double *inverse)
 {
   const double t = 0.5 * trace(a);
   const double det = determinant(a);
   if (det <= COLLINEAR * t * t * t) {
     for (int k = 0; k < 6; ++k) inverse[k] = t > 0.0 ? a[k] / (t * t) : 0.0;
-    return;
+    return true;
   }
   inverse[0] = (a[1] * a[2] - a[5] * a[5]) / det;
   inverse[1] = (a[0] * a[2] - a[4] * a[4]) / det;
@@ -70,6 +70,7 @@ void invert_inertia(const double *a, double *inverse)
   inverse[3] = (a[4] * a[5] - a[3] * a[2]) / det;
   inverse[4] = (a[3] * a[5] - a[4] * a[1]) / det;
   inverse[5] = (a[3] * a[4] - a[0] * a[5]) / det;
+  return false;
 }
 
 // Quaternions are w x y z.
@@ -186,6 +187,20 @@ void RigidMotion::count_spheres(int groupbit, int frozen_bit)
   }
   all.resize(molecules);
   spheres_in_ = all;
+
+  // Free spheres have no molecule of their own: LAMMPS takes all of them for one.
+  int unseen = 0, any_unseen = 0;
+  for (int k = 0; k < neighbor->nex_mol; ++k)
+    for (int i = 0; i < atom->nlocal; ++i)
+      if (body[i] < 0 && neighbor->ex_mol_intra[k] && (mask[i] & groupbit) &&
+          (mask[i] & neighbor->ex_mol_bit[k]))
+        unseen = 1;
+  MPI_Allreduce(&unseen, &any_unseen, 1, MPI_INT, MPI_MAX, world);
+  if (any_unseen)
+    error->all(
+        FLERR,
+        "Fix inelastic rigid: neigh_modify exclude molecule/intra hides free spheres from one "
+        "another, because they share a molecule ID: give it a group of bodies only");
 }
 
 void RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelastic::Host &host,
@@ -329,7 +344,7 @@ void RigidMotion::measure(inelastic::ContactProblem &problem)
     }
     for (int k = last_original; k < end; ++k)
       std::copy_n(arm + 3 * (begin + copy_of_[k]), 3, arm + 3 * k);
-    invert_inertia(point, body.point_inverse);
+    body.collinear = invert_inertia(point, body.point_inverse);
     std::copy_n(point, 6, body.inertia);
     if (inertia_ == Inertia::SOLID)
       for (int d = 0; d < 3; ++d) body.inertia[d] += balls;
@@ -356,8 +371,13 @@ void RigidMotion::predict(inelastic::ContactProblem &problem, inelastic::Host &h
     for (int d = 0; d < 3; ++d) {
       const double forced = kick * atom->f[i][d];
       linear_[3 * i + d] = m * (atom->v[i][d] - push.velocity[d]) + forced;
-      // What is carried along is set right by the round-off that v shows.
-      change_[3 * i + d] = m * (atom->v[i][d] - (carried ? expected[i][column + d] : 0.0)) + forced;
+      // On a line v shows L: it sets right the round-off of short arms in what is carried along.
+      // Otherwise this would be off by a change of I, and no correction but unstable.
+      change_[3 * i + d] = forced;
+      if (!carried)
+        change_[3 * i + d] += m * atom->v[i][d];
+      else if (body.collinear)
+        change_[3 * i + d] += m * (atom->v[i][d] - expected[i][column + d]);
     }
     double *const part = &carried_part_[3 * i];
     if (bodies.place[i] == bodies.start[b]) {

@@ -53,6 +53,13 @@ class RigidMotion : protected Pointers {
   { return problem.bodies.body[i] >= 0; }
   bool is_incomplete(int i) const { return incomplete_[i]; }
 
+  // From the centre of mass of its body to a particle; nothing for a free one.
+  const double *arm(const inelastic::ContactProblem &problem, int i) const
+  {
+    static constexpr double NONE[3] = {};
+    return is_member(problem, i) ? &problem.bodies.arm[3 * problem.bodies.place[i]] : NONE;
+  }
+
   // Sets the members' predicted velocities, copies included. `kick` is time per mass that turns
   // a force into a velocity. At the start of a run (`carried` false) momenta are the atoms'.
   // `expected` holds, from the column given, the velocity that each atom was predicted to have.
@@ -109,6 +116,7 @@ class RigidMotion : protected Pointers {
     double inertia[6];          // xx yy zz xy xz yz, about the centre of mass
     double point_inertia[6];    // as if the spheres were point masses ...
     double point_inverse[6];    // ... and its inverse, or pseudo-inverse
+    bool collinear;             // the centres of all spheres lie on a line
     double velocity[3];         // predicted
     double angular_momentum[3];
     double turned[4];          // by the step, a quaternion
