@@ -1,4 +1,4 @@
-"""Runs inputs/spheres.in for the benchmark, the validation tests and the tables."""
+"""Runs the decks of inputs/ for the benchmark, the validation tests and the tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import (
+    ContactCounts,
     CoordinationNumber,
+    Orientation,
     PackingFraction,
     contact_counts,
     coordination_number,
+    dimer_orientation,
     iterate_contact_frames,
     packing_fraction,
     particles_inside,
@@ -28,9 +31,23 @@ from lammps_inelastic.analysis import (
 BULK = np.array([[0.25, 0.75]] * 3)  # the paper's box
 
 
+def _deck(name: str) -> str:
+    return (files("lammps_inelastic.inputs") / name).read_text()
+
+
 def spheres_deck() -> str:
     """Text of the installed inputs/spheres.in."""
-    return (files("lammps_inelastic.inputs") / "spheres.in").read_text()
+    return _deck("spheres.in")
+
+
+def dimers_deck() -> str:
+    """Text of the installed inputs/dimers.in."""
+    return _deck("dimers.in")
+
+
+def clusters_deck() -> str:
+    """Text of the installed inputs/clusters.in."""
+    return _deck("clusters.in")
 
 
 def run_deck(folder: Path, deck: str, variables: Mapping[str, object]) -> str:
@@ -76,23 +93,29 @@ def projections(log: str) -> list[Projections]:
 
 @dataclass(frozen=True)
 class Packing:
-    """The paper's two numbers for one run."""
+    """The paper's numbers for one run; a particle is a body or a free sphere."""
 
     packing_fraction: PackingFraction
     coordination_number: CoordinationNumber
+    neighbours: CoordinationNumber
+    orientation: Orientation | None  # of dimers
 
 
-def measure(folder: Path) -> Packing:
-    """Packing fraction and coordination number in the paper's box."""
+def measure(folder: Path, contact_dump: str = "contacts.lammpsdump") -> Packing:
+    """Packing fraction, contacts, neighbours and orientation in the paper's box."""
     frame = read_particle_frame(folder / "particles.lammpsdump")
-    chosen = particles_inside(frame.positions, BULK)
-    counts = (
-        contact_counts(contacts.ids, frame.ids).particles
-        for contacts in iterate_contact_frames(folder / "contacts.lammpsdump")
-    )
+    particles = frame.particles
+    chosen = particles_inside(particles.centres(frame.positions), BULK)
+    counts: list[ContactCounts] = [
+        contact_counts(contacts.ids, frame.ids, particles)
+        for contacts in iterate_contact_frames(folder / contact_dump)
+    ]
+    dimers = particles.composite and set(particles.sizes.tolist()) == {2}
     return Packing(
         packing_fraction(frame.positions, frame.radii, BULK),
-        coordination_number(counts, chosen),
+        coordination_number((frame_counts.particles for frame_counts in counts), chosen),
+        coordination_number((frame_counts.neighbours for frame_counts in counts), chosen),
+        dimer_orientation(frame.positions, particles, BULK) if dimers else None,
     )
 
 
@@ -133,3 +156,21 @@ def recording(deck: str, every: int) -> str:
     before, line, after = deck.rpartition("fix             contact all inelastic")
     command, newline, rest = after.partition("\n")
     return f"{before}{line}{command} record problem.*.npz every {every}{newline}{rest}"
+
+
+def measuring_at(deck: str, tolerances: Sequence[float]) -> str:
+    """Let the deck count the contacts at several tolerances [radii], one after the other.
+
+    The contact dumps are contacts.0.lammpsdump and so on.
+    """
+    before, _, measuring = deck.partition("# Measure\n")
+    counting, _, end = measuring.partition("undump          particles\n")
+    counts = [
+        f"variable eps_now equal {tolerance:.17g}*v_radius\n"
+        + counting.replace("${eps_last}", "${eps_now}").replace(
+            "contacts.lammpsdump", f"contacts.{number}.lammpsdump"
+        )
+        + "undump          contacts\n"
+        for number, tolerance in enumerate(tolerances)
+    ]
+    return before + "".join(counts) + "undump          particles\n" + end

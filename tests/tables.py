@@ -1,7 +1,10 @@
 """Prints the measured tables of the README and of the fix's page: `make tables`.
 
-`tables.py agitation` shows the packing fraction against the random force, `tables.py contacts` the
-coordination number against time step, tolerance and solver, `tables.py size` against the number of
+Spheres: `tables.py agitation` shows the packing fraction against the random force, `tables.py
+contacts` the coordination number against time step, tolerance and solver, `tables.py size` against
+the number of spheres. Dimers: `tables.py aspect` shows everything against the aspect ratio,
+`tables.py near` the coordination number of dimers that are almost spheres against the tolerance,
+`tables.py start` a regular start beside a random one, `tables.py inertia` point masses beside solid
 spheres. Every row is nine seeds unless --seeds says otherwise.
 """
 
@@ -14,13 +17,23 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from pouring import Packing, measure, run_deck, spheres_deck
+from pouring import (
+    Packing,
+    dimers_deck,
+    measure,
+    measuring_at,
+    projections,
+    run_deck,
+    spheres_deck,
+)
 
 GRAVITY, RADIUS = 9.81, 0.055
+# So that every bed of dimers covers the paper's box
+DIMERS: dict[str, object] = {"particles": 2000, "diameter": 0.085}
 
 
 def pour(variables: Mapping[str, object], seeds: int, deck: str | None = None) -> list[Packing]:
-    """Pour the spheres once for every seed."""
+    """Pour the deck's particles (the spheres') once for every seed."""
     packings = []
     for seed in range(1, seeds + 1):
         with tempfile.TemporaryDirectory() as folder:
@@ -93,7 +106,91 @@ def size(seeds: int) -> Iterator[str]:
         yield f"| {particles} | {diameter} | {row(packings)} |"
 
 
-TABLES = {"agitation": agitation, "contacts": contacts, "size": size}
+def dimer_row(packings: list[Packing], distance: float) -> str:
+    """Give a_x, a_y, a_z in units of what an isotropic packing has."""
+    neighbours = [packing.neighbours.mean for packing in packings]
+    orientations = [packing.orientation for packing in packings if packing.orientation]
+    components = [
+        spread([float(o.components[axis]) / distance * 3**0.5 for o in orientations], 3)
+        for axis in range(3)
+    ]
+    return " | ".join([row(packings), spread(neighbours, 3), *components])
+
+
+DIMER_COLUMNS = "packing fraction % | contacts | neighbours | a_x | a_y | a_z |"
+
+
+def distance(aspect_ratio: float) -> float:
+    return (aspect_ratio - 1) * float(str(DIMERS["diameter"]))
+
+
+def aspect(seeds: int) -> Iterator[str]:
+    yield f"| L/d | {DIMER_COLUMNS}"
+    yield "|---|" + "---|" * 6
+    for ratio in (1.01, 1.05, 1.1, 1.3, 1.5, 1.8, 1.95, 2.0):
+        packings = pour(DIMERS | {"aspect_ratio": ratio}, seeds, dimers_deck())
+        yield f"| {ratio} | {dimer_row(packings, distance(ratio))} |"
+
+
+def near(seeds: int) -> Iterator[str]:
+    yield "| L/d | eps / r | eps / arm | contacts | neighbours |"
+    yield "|---|---|---|---|---|"
+    tolerances = (5e-4, 5e-5, 2e-5, 5e-6, 5e-7)
+    for ratio in (1.01, 1.001, 1.0001):
+        found: dict[float, list[Packing]] = {tolerance: [] for tolerance in tolerances}
+        for seed in range(1, seeds + 1):
+            with tempfile.TemporaryDirectory() as name:
+                folder = Path(name)
+                deck = measuring_at(dimers_deck(), tolerances)
+                variables = {"aspect_ratio": ratio, "seed": seed, "dump_every": 100000}
+                run_deck(folder, deck, DIMERS | variables)
+                for number, tolerance in enumerate(tolerances):
+                    found[tolerance].append(measure(folder, f"contacts.{number}.lammpsdump"))
+        for tolerance, packings in found.items():
+            z = [packing.coordination_number.mean for packing in packings]
+            neighbours = [packing.neighbours.mean for packing in packings]
+            yield (
+                f"| {ratio} | {tolerance:g} | {tolerance / (ratio - 1):.2g} | "
+                f"{spread(z, 3)} | {spread(neighbours, 3)} |"
+            )
+
+
+def start(seeds: int) -> Iterator[str]:
+    yield f"| L/d | start | {DIMER_COLUMNS}"
+    yield "|---|---|" + "---|" * 6
+    for ratio in (1.5, 1.8):
+        for arrangement in ("random", "regular"):
+            variables = DIMERS | {"aspect_ratio": ratio, "start": arrangement}
+            packings = pour(variables, seeds, dimers_deck())
+            yield f"| {ratio} | {arrangement} | {dimer_row(packings, distance(ratio))} |"
+
+
+def inertia(seeds: int) -> Iterator[str]:
+    yield "| L/d | inertia | packing fraction % | contacts | iterations |"
+    yield "|---|---|---|---|---|"
+    for ratio in (1.01, 1.1, 1.5):
+        for kind in ("point", "solid"):
+            packings, iterations = [], []
+            for seed in range(1, seeds + 1):
+                with tempfile.TemporaryDirectory() as folder:
+                    variables = {"aspect_ratio": ratio, "inertia": kind, "seed": seed}
+                    log = run_deck(
+                        Path(folder), dimers_deck(), DIMERS | variables | {"dump_every": 100000}
+                    )
+                    packings.append(measure(Path(folder)))
+                    iterations.append(float(sum(run.iterations for run in projections(log))))
+            yield f"| {ratio} | {kind} | {row(packings)} | {spread(iterations, 0)} |"
+
+
+TABLES = {
+    "agitation": agitation,
+    "contacts": contacts,
+    "size": size,
+    "aspect": aspect,
+    "near": near,
+    "start": start,
+    "inertia": inertia,
+}
 
 
 def main() -> int:

@@ -33,6 +33,7 @@ constexpr double REGULAR_OVERLAP = 2.0;     // in eps; more is a bad start
 constexpr double PUSH_LIMIT =
     0.05;    // of the sum of radii, per regular step, out of a bad overlap
 constexpr double RELINEARISE_BEYOND = 1.1;    // in eps, overlap at the end of the step
+constexpr double SHORTEST_STEP = 1.0e-6;      // of the regular one: below, something else is wrong
 constexpr double COINCIDENT = 1.0e-10;        // of the sum of radii: no normal can be computed
 constexpr double EXPECTED_IN_EPS = 1.0e-7;    // how well the predicted motion must be met ...
 constexpr double EXPECTED_RELATIVE =
@@ -74,12 +75,13 @@ double norm(const double *a)
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), first_list_of_run_(false),
-    list_(nullptr), margin_(-1.0), came_back_(false), relinearisations_(0), phase_(Phase::CONTACT),
-    bad_overlap_(false), state_(nullptr), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
-    spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false),
-    expecting_(false), kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
-    run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
-    run_unconverged_(0), run_shortened_(0), exchanged_(nullptr), exchanging_memory_(false)
+    list_(nullptr), margin_(-1.0), came_back_(false), relinearised_(false), relinearisations_(0),
+    phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr), largest_radius_(0.0),
+    one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
+    regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
+    wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
+    run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0),
+    run_shortened_(0), exchanged_(nullptr), exchanging_memory_(false)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -382,7 +384,14 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (record_every_ > 0 && kick_steps == 1.0 && update->ntimestep % record_every_ == 0)
       record_problem(result);
     if (bad_overlap_) push_apart(result);
-    if (!result.converged || !result.complete) unconverged(result);
+    if (!result.converged || !result.complete) {
+      // Where the gaps at the end of the step were not to be had, those of a shorter one may be.
+      if (shorten_ && relinearised_ && update->dt > SHORTEST_STEP * regular_timestep_) {
+        shorten_step(0.5);
+        continue;
+      }
+      unconverged(result);
+    }
     if (!list_reaches(motion())) {
       if (!shorten_ || spread_at_start_ >= list_reach_) {
         const double needed = spread_at_start_ + problem_.timestep * spread(motion().data());
@@ -459,7 +468,7 @@ void FixInelastic::collect()
   bad_overlap_ = false;
   output_[OVERLAP] = output_[EXCESS] = 0.0;
   relinearisations_ = 0;
-  came_back_ = false;
+  came_back_ = relinearised_ = false;
   collect_pairs();
   if (!walls_->empty()) collect_walls();
 
@@ -632,21 +641,22 @@ long FixInelastic::refine(const std::vector<double> &velocity, inelastic::Contac
 {
   message_.clear();
   if (rigid_) rigid_->turn(problem_, velocity);
-  long changed = add_violated_pairs(velocity);
-  if (!walls_->empty()) changed += add_violated_walls(velocity);
-  double added = static_cast<double>(changed);
-  reduce(&added, 1, nullptr, 0);
-  if (added > 0.0) came_back_ = true;
-  const bool walls_turn = !walls_->empty() && (rigid_ || !walls_->exact());
-  if (rigid_ || walls_turn) {
+  long added = add_violated_pairs(velocity);
+  if (!walls_->empty()) added += add_violated_walls(velocity);
+  long relinearised = 0;
+  const bool walls_curve = !walls_->empty() && (rigid_ || !walls_->exact());
+  output_[EXCESS] = 0.0;
+  if (rigid_ || walls_curve) {
     ++relinearisations_;
-    output_[EXCESS] = 0.0;
-    if (rigid_) changed += relinearise_pairs(velocity);
-    if (walls_turn) changed += relinearise_walls(velocity);
-    reduce(nullptr, 0, &output_[EXCESS], 1);
+    if (rigid_) relinearised += relinearise_pairs(velocity);
+    if (walls_curve) relinearised += relinearise_walls(velocity);
   }
+  double sums[2] = {static_cast<double>(added), static_cast<double>(relinearised)};
+  reduce(sums, 2, &output_[EXCESS], 1);
+  came_back_ = came_back_ || sums[0] > 0.0;
+  relinearised_ = relinearised_ || sums[1] > 0.0;
   fail_together(message_);
-  return changed;
+  return added + relinearised;
 }
 
 long FixInelastic::add_violated_pairs(const std::vector<double> &velocity)
@@ -711,7 +721,7 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
       opening +=
           n[d] * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
     const double along = std::max(LEAST_ALONG, dot(n, away) / norm(away));
-    contacts.gap[c] = gap / along - h * opening;
+    contacts.gap[c] = (gap - wanted_gap(origin_[c].gap_now, origin_[c].size)) / along - h * opening;
     ++changed;
   };
 
@@ -719,23 +729,33 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const int i = contacts.first[c], j = contacts.second[c];
     if (origin_[c].wall != 0 || !(is_member(i) || is_member(j))) continue;
-    if (is_bad(origin_[c].gap_now) || is_entangled(i, j)) continue;
+    if (is_entangled(i, j)) continue;
     const double gap = gap_at_end(i, j);
-    output_[EXCESS] = std::max(output_[EXCESS], -gap - REGULAR_OVERLAP * tolerance_);
-    if (may_change && gap < -RELINEARISE_BEYOND * tolerance_) relinearise(c, gap);
+    if (ends_too_deep(origin_[c].gap_now, gap) && may_change) relinearise(c, gap);
   }
   for_each_listed_pair([&](std::size_t slot, int i, int j) {
     if (listed_pair_taken_[slot] || !(is_member(i) || is_member(j))) return;
+    if (is_entangled(i, j)) return;
     const double gap = gap_at_end(i, j);
-    if (!(gap < -RELINEARISE_BEYOND * tolerance_) || is_entangled(i, j)) return;
-    output_[EXCESS] = std::max(output_[EXCESS], -gap - REGULAR_OVERLAP * tolerance_);
-    if (!may_change) return;
+    if (!ends_too_deep(0.0, gap) || !may_change) return;
     const std::size_t before = contacts.size();
     take_pair(slot, i, j);
     if (contacts.size() > before) relinearise(before, gap);
   });
   return changed;
 }
+
+// Notes the excess as well. What starts with a bad overlap may keep it, but not get deeper.
+bool FixInelastic::ends_too_deep(double gap_now, double gap_at_end)
+{
+  const double deeper = (is_bad(gap_now) ? gap_now : 0.0) - gap_at_end;
+  output_[EXCESS] = std::max(output_[EXCESS], deeper - REGULAR_OVERLAP * tolerance_);
+  return deeper > RELINEARISE_BEYOND * tolerance_;
+}
+
+// Gap at the end of the step for which the constraint is just met.
+double FixInelastic::wanted_gap(double gap_now, double size) const
+{ return is_bad(gap_now) ? gap_now - effective_gap(gap_now, size) : 0.0; }
 
 bool FixInelastic::same_plane(std::size_t c, const double *normal) const
 {
@@ -750,11 +770,6 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
 {
   long changed = 0;
   const double h = problem_.timestep;
-  // What starts deep in a wall is pushed out slowly, wherever the step ends.
-  auto starts_deep = [&](const RegionWalls::Look &look, const WallView &view) {
-    const auto existing = wall_constraint_.find(wall_key(look.atom, view.wall));
-    return existing != wall_constraint_.end() && is_bad(origin_[existing->second].gap_now);
-  };
   auto add_plane = [&](const RegionWalls::Look &look, const WallView &view) {
     if (relinearisations_ > MAX_RELINEARISATIONS) return;
     const int i = look.atom;
@@ -773,8 +788,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     // Exact for this motion, also where a body turns.
     const double turning = is_member(i) ? h * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]))
                                         : 0.0;
-    const double gap = is_bad(gap_now) ? effective_gap(gap_now, atom->radius[i]) - wall_motion
-                                       : gap_here + turning;
+    const double gap = gap_here + turning - wanted_gap(gap_now, atom->radius[i]);
     if (known && same_plane(existing->second, view.normal)) {
       problem_.contacts.gap[existing->second] = gap;
       return;
@@ -790,10 +804,10 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
   walls_->view(
       ends, inexact_only,
       [&](const RegionWalls::Look &look, const WallView &view) {
-        if (starts_deep(look, view)) return;
-        const double overlap = atom->radius[look.atom] - view.distance;
-        output_[EXCESS] = std::max(output_[EXCESS], overlap - 2.0 * tolerance_);
-        if (overlap > RELINEARISE_BEYOND * tolerance_) add_plane(look, view);
+        const auto existing = wall_constraint_.find(wall_key(look.atom, view.wall));
+        const double gap_now =
+            existing == wall_constraint_.end() ? 0.0 : origin_[existing->second].gap_now;
+        if (ends_too_deep(gap_now, view.distance - atom->radius[look.atom])) add_plane(look, view);
       },
       [&](const RegionWalls::Look &look, const std::string &) {
         beyond.push_back(look);
@@ -807,7 +821,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     walls_->view(
         last_inside(beyond), inexact_only,
         [&](const RegionWalls::Look &look, const WallView &view) {
-          if (!starts_deep(look, view)) add_plane(look, view);
+          add_plane(look, view);
         },
         [](const RegionWalls::Look &, const std::string &) {
         });
@@ -1026,8 +1040,8 @@ void FixInelastic::check_expected()
    the neighbour list's reach
 ------------------------------------------------------------------------- */
 
-// The largest difference between two of the vectors (3 doubles each) of this fix's atoms: the
-// diagonal of their bounding box.
+// The largest difference between two of the vectors (3 doubles each) of this fix's atoms, from above:
+// the diagonal of their bounding box, or the diameter of a ball about its centre.
 double FixInelastic::spread(const double *values)
 {
   double maxima[6];
@@ -1041,7 +1055,17 @@ double FixInelastic::spread(const double *values)
   }
   reduce(nullptr, 0, maxima, 6);
   const double extent[3] = {maxima[0] + maxima[3], maxima[1] + maxima[4], maxima[2] + maxima[5]};
-  return extent[0] < 0.0 ? 0.0 : norm(extent);
+  if (extent[0] < 0.0) return 0.0;
+  double farthest = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    double from_centre[3];
+    for (int d = 0; d < 3; ++d)
+      from_centre[d] = values[3 * i + d] - 0.5 * (maxima[d] - maxima[3 + d]);
+    farthest = std::max(farthest, dot(from_centre, from_centre));
+  }
+  reduce(nullptr, 0, &farthest, 1);
+  return std::min(norm(extent), 2.0 * std::sqrt(farthest));
 }
 
 // Pairs that are not listed were at least list_reach_ apart when the list was built.
@@ -1091,9 +1115,8 @@ void FixInelastic::set_timestep(double timestep)
 
 void FixInelastic::shorten_step(double factor)
 {
-  constexpr double SHORTEST = 1.0e-6;    // of the regular time step: something else is wrong then
   const double timestep = factor * update->dt;
-  if (timestep < SHORTEST * regular_timestep_)
+  if (timestep < SHORTEST_STEP * regular_timestep_)
     error->all(FLERR, "Fix inelastic: step {}: no time step above {:.3g} keeps the spheres apart",
                update->ntimestep, timestep);
   if (update->dt == regular_timestep_) {

@@ -95,6 +95,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::unordered_map<std::uint64_t, std::size_t> wall_constraint_;    // atom and wall -> constraint
   double margin_;           // what comes closer than this is in the problem from the start
   bool came_back_;          // for constraints that were not in the problem from the start
+  bool relinearised_;       // about the end of the step, any of them
   int relinearisations_;    // in this step
   std::string message_;     // what went wrong on this rank while collecting
 
@@ -205,6 +206,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::vector<RegionWalls::Look> looks_at_end(const std::vector<double> &velocity) const;
   bool same_plane(std::size_t c, const double *normal) const;
   double effective_gap(double gap_now, double size) const;
+  double wanted_gap(double gap_now, double size) const;
+  bool ends_too_deep(double gap_now, double gap_at_end);
   bool is_bad(double gap) const;
   void note_overlap(double gap);
   std::uint64_t wall_key(int i, int wall) const

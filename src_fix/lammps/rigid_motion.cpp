@@ -371,12 +371,12 @@ void RigidMotion::predict(inelastic::ContactProblem &problem, inelastic::Host &h
     for (int d = 0; d < 3; ++d) {
       const double forced = kick * atom->f[i][d];
       linear_[3 * i + d] = m * (atom->v[i][d] - push.velocity[d]) + forced;
-      // On a line v shows L: it sets right the round-off of short arms in what is carried along.
-      // Otherwise this would be off by a change of I, and no correction but unstable.
+      // Point masses on a line show L by v: it sets right the round-off of short arms in what is
+      // carried along. Otherwise this would be off by a change of I, and unstable.
       change_[3 * i + d] = forced;
       if (!carried)
         change_[3 * i + d] += m * atom->v[i][d];
-      else if (body.collinear)
+      else if (body.collinear && inertia_ == Inertia::POINT)
         change_[3 * i + d] += m * (atom->v[i][d] - expected[i][column + d]);
     }
     double *const part = &carried_part_[3 * i];
