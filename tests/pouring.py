@@ -135,6 +135,36 @@ class Recorded:
     def tolerance(self) -> float:
         return float(self.arrays["tolerance"])
 
+    @property
+    def spheres(self) -> list[NDArray]:
+        """The arguments of `core.project` for the spheres as if all were free."""
+        a = self.arrays
+        return [
+            a["predicted_velocity"],
+            a["inverse_mass"],
+            self.first,
+            self.second,
+            a["normal"],
+            a["gap"],
+        ]
+
+    @property
+    def bodies(self) -> dict[str, NDArray]:
+        """The arguments of `core.project` for the bodies; none in a scene of free spheres."""
+        a = self.arrays
+        if "molecule" not in a:
+            return {}
+        order = np.argsort(a["body_molecule"])
+        place = np.searchsorted(a["body_molecule"][order], a["molecule"])
+        xx, yy, zz, xy, xz, yz = a["body_inverse_inertia"][order].T
+        rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        return {
+            "body": np.where(a["molecule"] > 0, place, -1).astype(np.int64),
+            "arm": a["arm"],
+            "body_inverse_mass": a["body_inverse_mass"][order],
+            "body_inverse_inertia": np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0)),
+        }
+
 
 def read_record(path: Path) -> Recorded:
     """Read one recorded problem."""

@@ -228,6 +228,20 @@ void FixInelastic::init()
 {
   if (modify->get_fix_by_style("^inelastic$").size() > 1)
     error->all(FLERR, "More than one fix inelastic: one fix must hold all contacts");
+  if (!rigid_) {
+    for (Fix *fix : modify->get_fix_list()) {
+      int moves = 0, any = 0;
+      for (int i = 0; i < atom->nlocal; ++i)
+        if (fix->rigid_flag && (atom->mask[i] & fix->groupbit) && (atom->mask[i] & groupbit))
+          moves = 1;
+      MPI_Allreduce(&moves, &any, 1, MPI_INT, MPI_MAX, world);
+      if (any)
+        error->all(FLERR,
+                   "Fix inelastic: fix {} ({}) makes rigid bodies of spheres of group {}: add the "
+                   "keyword rigid {} point, or solid",
+                   fix->id, fix->style, group->names[igroup], fix->id);
+    }
+  }
   if (utils::strmatch(update->integrate_style, "^respa"))
     error->all(FLERR, "Fix inelastic does not work with run_style respa: use run_style verlet");
   if (update->whichflag == 2)
@@ -293,7 +307,8 @@ void FixInelastic::post_neighbor()
         "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
         listed, widest, 2.0 * largest_radius_);
   list_reach_ = one_cutoff_ ? listed - 2.0 * largest_radius_ : neighbor->skin;
-  if (rigid_) rigid_->find_bodies(problem_, *this, groupbit, frozen_bit_, first_list_of_run_);
+  if (rigid_)
+    fail_together(rigid_->find_bodies(problem_, *this, groupbit, frozen_bit_, first_list_of_run_));
   first_list_of_run_ = false;
 }
 
@@ -324,7 +339,7 @@ void FixInelastic::post_run()
 {
   if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
   // Restart files and the next run start from the momentum alone.
-  // (Not those of bodies: their momenta are in fix rigid/small, out of reach.)
+  // (Bodies: the last step has done so, because fix rigid/small is out of reach here.)
   for (int i = 0; i < atom->nlocal; ++i)
     for (int d = 0; d < 3; ++d) {
       atom->v[i][d] -= state_[i][PUSH_HELD + d];
@@ -603,7 +618,8 @@ std::vector<RegionWalls::Look> FixInelastic::looks_at_end(const std::vector<doub
     if (problem_.inverse_mass[i] == 0.0 || (walls_->exact() && !is_member(i))) continue;
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
-    looks.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, atom->radius[i]});
+    const double reach = atom->radius[i] + (rigid_ ? margin_ : 0.0);
+    looks.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
   }
   return looks;
 }
@@ -695,10 +711,11 @@ long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
   return static_cast<long>(problem_.contacts.size() - before);
 }
 
-// The distance between turning bodies is not convex: where two spheres end up overlapping, the gap
-// of their constraint is set to make it exact for this velocity. The normal stays that of the
-// positions from which the force acts: along any other, two opposite forces would be a couple, and
-// angular momentum would not be kept. What the end lacks is made up along it, hence the division.
+// The distance between turning bodies is not convex. What the end of the step lacks beside the
+// linearised gap is put into the gap of the constraint, so that it is exact for this velocity; where
+// the end has more, nothing changes. The normal stays that of the positions from which the force
+// acts: along any other, two opposite forces would be a couple, and angular momentum would not be
+// kept. What is lacking is made up along it, hence the division.
 long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
 {
   const double *const *const x = atom->x;
@@ -714,15 +731,15 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
       away[d] = x[i][d] - x[j][d] + h * (moved[3 * i + d] - moved[3 * j + d]);
     return norm(away) - radius[i] - radius[j];
   };
-  auto relinearise = [&](std::size_t c, double gap) {
+  auto relinearised_gap = [&](std::size_t c, double gap) {
     const double *const n = &contacts.normal[3 * c];
     double opening = 0.0;
     for (int d = 0; d < 3; ++d)
       opening +=
           n[d] * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
     const double along = std::max(LEAST_ALONG, dot(n, away) / norm(away));
-    contacts.gap[c] = (gap - wanted_gap(origin_[c].gap_now, origin_[c].size)) / along - h * opening;
-    ++changed;
+    const double lacking = gap - wanted_gap(origin_[c].gap_now, origin_[c].size);
+    return (lacking < 0.0 ? lacking / along : lacking) - h * opening;
   };
 
   const bool may_change = relinearisations_ <= MAX_RELINEARISATIONS;
@@ -731,7 +748,9 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
     if (origin_[c].wall != 0 || !(is_member(i) || is_member(j))) continue;
     if (is_entangled(i, j)) continue;
     const double gap = gap_at_end(i, j);
-    if (ends_too_deep(origin_[c].gap_now, gap) && may_change) relinearise(c, gap);
+    const bool too_deep = ends_too_deep(origin_[c].gap_now, gap);
+    if ((too_deep || origin_[c].followed) && may_change)
+      changed += follow(c, relinearised_gap(c, gap), too_deep);
   }
   for_each_listed_pair([&](std::size_t slot, int i, int j) {
     if (listed_pair_taken_[slot] || !(is_member(i) || is_member(j))) return;
@@ -740,7 +759,7 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
     if (!ends_too_deep(0.0, gap) || !may_change) return;
     const std::size_t before = contacts.size();
     take_pair(slot, i, j);
-    if (contacts.size() > before) relinearise(before, gap);
+    if (contacts.size() > before) changed += follow(before, relinearised_gap(before, gap), true);
   });
   return changed;
 }
@@ -751,6 +770,32 @@ bool FixInelastic::ends_too_deep(double gap_now, double gap_at_end)
   const double deeper = (is_bad(gap_now) ? gap_now : 0.0) - gap_at_end;
   output_[EXCESS] = std::max(output_[EXCESS], deeper - REGULAR_OVERLAP * tolerance_);
   return deeper > RELINEARISE_BEYOND * tolerance_;
+}
+
+// Sets the gap of a constraint to one that is exact for the present velocity, or to the linearised
+// one if that is smaller. One that was set for an earlier velocity is set again, so that no force
+// keeps apart what has moved on meanwhile. (Not of bodies that spin fast: it would take many rounds,
+// for nothing, because their next step is another matter.) Returns how many constraints changed.
+long FixInelastic::follow(std::size_t c, double exact_gap, bool too_deep)
+{
+  constexpr double SLOW = 0.5;    // turn in a step [radians]
+  inelastic::ContactSet &contacts = problem_.contacts;
+  Origin &origin = origin_[c];
+  const double linear_gap = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
+  const double gap = std::min(exact_gap, linear_gap);
+  if (!too_deep) {
+    const bool is_wall = origin.wall != 0;
+    const bool worth_it = contacts.impulse[c] > 0.0 &&
+        gap - contacts.gap[c] > RELINEARISE_BEYOND * tolerance_ &&
+        relinearisations_ <= MAX_RELINEARISATIONS / 2 &&
+        rigid_->angle(problem_, contacts.first[c]) < SLOW &&
+        (is_wall || rigid_->angle(problem_, contacts.second[c]) < SLOW);
+    if (!worth_it) return 0;
+  }
+  contacts.gap[c] = gap;
+  origin.followed = is_member(contacts.first[c]) ||
+      (origin.wall == 0 && is_member(contacts.second[c]));
+  return 1;
 }
 
 // Gap at the end of the step for which the constraint is just met.
@@ -770,12 +815,11 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
 {
   long changed = 0;
   const double h = problem_.timestep;
-  auto add_plane = [&](const RegionWalls::Look &look, const WallView &view) {
+  auto add_plane = [&](const RegionWalls::Look &look, const WallView &view, bool too_deep) {
     if (relinearisations_ > MAX_RELINEARISATIONS) return;
     const int i = look.atom;
     const auto existing = wall_constraint_.find(wall_key(i, view.wall));
     const bool known = existing != wall_constraint_.end();
-    ++changed;
     const double *const n = view.normal;
     const double *const x = atom->x[i];
     const double from_here[3] = {look.where[0] - x[0], look.where[1] - x[1], look.where[2] - x[2]};
@@ -789,10 +833,12 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     const double turning = is_member(i) ? h * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]))
                                         : 0.0;
     const double gap = gap_here + turning - wanted_gap(gap_now, atom->radius[i]);
-    if (known && same_plane(existing->second, view.normal)) {
-      problem_.contacts.gap[existing->second] = gap;
+    if (known && same_plane(existing->second, n)) {
+      changed += follow(existing->second, gap, too_deep);
       return;
     }
+    if (!too_deep) return;
+    ++changed;
     wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
     problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
     origin_.push_back({view.wall, gap_now, atom->radius[i], wall_motion});
@@ -805,9 +851,12 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
       ends, inexact_only,
       [&](const RegionWalls::Look &look, const WallView &view) {
         const auto existing = wall_constraint_.find(wall_key(look.atom, view.wall));
-        const double gap_now =
-            existing == wall_constraint_.end() ? 0.0 : origin_[existing->second].gap_now;
-        if (ends_too_deep(gap_now, view.distance - atom->radius[look.atom])) add_plane(look, view);
+        const bool known = existing != wall_constraint_.end();
+        const double gap_now = known ? origin_[existing->second].gap_now : 0.0;
+        const double gap = view.distance - atom->radius[look.atom];
+        const bool too_deep = ends_too_deep(gap_now, gap);
+        if (too_deep || (known && origin_[existing->second].followed))
+          add_plane(look, view, too_deep);
       },
       [&](const RegionWalls::Look &look, const std::string &) {
         beyond.push_back(look);
@@ -821,7 +870,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     walls_->view(
         last_inside(beyond), inexact_only,
         [&](const RegionWalls::Look &look, const WallView &view) {
-          add_plane(look, view);
+          add_plane(look, view, true);
         },
         [](const RegionWalls::Look &, const std::string &) {
         });
@@ -952,7 +1001,10 @@ void FixInelastic::apply_forces(double kick_steps)
         atom->f[i][d] += contact_force_[3 * i + d];
         state[EXPECTED_X + d] = atom->x[i][d] + h * motion()[3 * i + d];
       }
-      rigid_->finish(problem_, i, kick_ * force->ftm2v, kick_steps == 1.0, atom->f[i]);
+      const bool whole_kick = kick_steps == 1.0;
+      const bool last = whole_kick && update->ntimestep == update->laststep;
+      rigid_->finish(problem_, i, {kick_ * force->ftm2v, whole_kick, last}, contact_force_.data(),
+                     atom->f[i]);
       rigid_->velocity_after(problem_, i, state + EXPECTED_V);
       continue;
     }

@@ -85,10 +85,11 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   // Beside each constraint of problem_.contacts
   struct Origin {
-    int wall;              // 0 = two particles, otherwise the wall's number
-    double gap_now;        // at the present positions
-    double size;           // sum of the radii; the radius at a wall
-    double wall_motion;    // by how much the wall closes the gap during the step
+    int wall;                 // 0 = two particles, otherwise the wall's number
+    double gap_now;           // at the present positions
+    double size;              // sum of the radii; the radius at a wall
+    double wall_motion;       // by how much the wall closes the gap during the step
+    bool followed = false;    // its gap was set by where a step ends
   };
   std::vector<Origin> origin_;
   std::vector<char> listed_pair_taken_;    // per pair of the neighbour list: is it in the problem?
@@ -208,6 +209,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double effective_gap(double gap_now, double size) const;
   double wanted_gap(double gap_now, double size) const;
   bool ends_too_deep(double gap_now, double gap_at_end);
+  long follow(std::size_t c, double exact_gap, bool too_deep);
   bool is_bad(double gap) const;
   void note_overlap(double gap);
   std::uint64_t wall_key(int i, int wall) const

@@ -203,8 +203,8 @@ void RigidMotion::count_spheres(int groupbit, int frozen_bit)
         "another, because they share a molecule ID: give it a group of bodies only");
 }
 
-void RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelastic::Host &host,
-                              int groupbit, int frozen_bit, bool first_of_run)
+std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelastic::Host &host,
+                                     int groupbit, int frozen_bit, bool first_of_run)
 {
   if (!bodies_of_atoms(fix_))
     error->all(FLERR, "Fix inelastic rigid: fix {} has not set up its bodies", fix_id_);
@@ -264,12 +264,7 @@ void RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelastic::Hos
                        0.0, nothing.data());
   }
   bodies_.resize(problem.bodies.size());
-  double wrong = message.empty() ? 0.0 : 1.0;
-  host.reduce(nullptr, 0, &wrong, 1);
-  if (!message.empty()) error->one(FLERR, "Fix inelastic rigid: {}", message);
-  if (wrong > 0.0) error->all(FLERR, "Fix inelastic rigid: a body is not whole on another rank");
-
-  if (!first_of_run) return;
+  if (!first_of_run) return message;
   measure(problem);
   double extent = 0.0;
   const std::vector<double> &arm = problem.bodies.arm;
@@ -277,6 +272,7 @@ void RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelastic::Hos
     extent = std::max(extent, 2.0 * std::sqrt(dot(&arm[3 * k], &arm[3 * k])));
   host.reduce(nullptr, 0, &extent, 1);
   check_reach(extent);
+  return message;
 }
 
 // A sphere of another rank that touches one of this rank's brings its whole body with it.
@@ -488,6 +484,13 @@ void RigidMotion::turn(const inelastic::ContactProblem &problem,
   }
 }
 
+double RigidMotion::angle(const inelastic::ContactProblem &problem, int i) const
+{
+  if (!is_member(problem, i)) return 0.0;
+  const double *const q = bodies_[problem.bodies.body[i]].turned;
+  return 2.0 * std::atan2(std::sqrt(dot(q + 1, q + 1)), std::abs(q[0]));
+}
+
 void RigidMotion::velocity_after(const inelastic::ContactProblem &problem, int i,
                                  double *velocity) const
 {
@@ -507,32 +510,46 @@ void RigidMotion::note_push(const inelastic::ContactProblem &problem,
                bodies_[b].push);
 }
 
-void RigidMotion::finish(const inelastic::ContactProblem &problem, int i, double kick,
-                         bool whole_kick, double *force)
+void RigidMotion::finish(const inelastic::ContactProblem &problem, int i, const Kick &kick,
+                         const double *contact_force, double *force)
 {
   const inelastic::RigidBodies &bodies = problem.bodies;
-  const Body &body = bodies_[bodies.body[i]];
+  const int b = bodies.body[i];
+  const Body &body = bodies_[b];
   Carried &of_body = carried_[i];
-  const Push push = pushing_ ? body.push : Push{};
-  const Push &before = whole_kick ? of_body.next : of_body.held;
+  Push push = pushing_ ? body.push : Push{};
+  // Whole-step velocities hold the mean of two pushes: this makes it vanish.
+  if (kick.last)
+    for (int d = 0; d < 3; ++d) {
+      push.velocity[d] = -of_body.next.velocity[d];
+      push.angular_momentum[d] = -of_body.next.angular_momentum[d];
+    }
+  const Push &before = kick.whole ? of_body.next : of_body.held;
   // Forces m (a + alpha x r) with the right sum and the right moment.
   double change[3], spin[3], around[3];
   for (int d = 0; d < 3; ++d) change[d] = push.angular_momentum[d] - before.angular_momentum[d];
   multiply(body.point_inverse, change, spin);
   cross(spin, &bodies.arm[3 * bodies.place[i]], around);
   for (int d = 0; d < 3; ++d)
-    force[d] += mass(i) * (push.velocity[d] - before.velocity[d] + around[d]) / kick;
+    force[d] += mass(i) * (push.velocity[d] - before.velocity[d] + around[d]) / kick.strength;
 
-  if (whole_kick)
+  if (kick.whole)
     for (int d = 0; d < 3; ++d) {
       of_body.held.velocity[d] = 0.5 * (of_body.next.velocity[d] + push.velocity[d]);
       of_body.held.angular_momentum[d] =
           0.5 * (of_body.next.angular_momentum[d] + push.angular_momentum[d]);
     }
   of_body.next = push;
+  double moments = 0.0;    // their size; they may cancel
+  for (int k = bodies.start[b]; k < bodies.start[b] + bodies.originals[b]; ++k) {
+    const double *const r = &bodies.arm[3 * k];
+    const double *const f = contact_force + 3 * static_cast<std::size_t>(bodies.member[k]);
+    moments += std::sqrt(dot(r, r) * dot(f, f));
+  }
+  of_body.angle = problem.timestep *
+      (std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end)) +
+       kick.strength * moments * trace(&bodies.inverse_inertia[6 * b]));
   std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
-  of_body.angle =
-      problem.timestep * std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end));
 }
 
 int RigidMotion::pack(int i, double *buffer) const

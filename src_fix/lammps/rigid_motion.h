@@ -37,10 +37,11 @@ class RigidMotion : protected Pointers {
   Fix *fix() const { return fix_; }
 
   // Puts the bodies into the problem, all particles of the fix's group: to be called when atoms or
-  // copies have changed. Collective. Errors: a body that is not all in the group, or holds frozen
+  // copies have changed. Collective. Returns what is wrong on this rank, empty if nothing is: a body
+  // of which it sees a part only. Errors: a body that is not all in the group, or holds frozen
   // spheres, and copies that do not reach far enough. `first_of_run`: bodies are counted afresh.
-  void find_bodies(inelastic::ContactProblem &problem, inelastic::Host &host, int groupbit,
-                   int frozen_bit, bool first_of_run);
+  std::string find_bodies(inelastic::ContactProblem &problem, inelastic::Host &host, int groupbit,
+                          int frozen_bit, bool first_of_run);
 
   // Arms and inertia at the present positions.
   void measure(inelastic::ContactProblem &problem);
@@ -71,6 +72,9 @@ class RigidMotion : protected Pointers {
   void turn(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
   const std::vector<double> &motion() const { return motion_; }
 
+  // By how much the last turn() turns the body of a particle; nothing for a free one [radians].
+  double angle(const inelastic::ContactProblem &problem, int i) const;
+
   // Velocity of a member after the step of the last turn().
   void velocity_after(const inelastic::ContactProblem &problem, int i, double *velocity) const;
 
@@ -78,18 +82,25 @@ class RigidMotion : protected Pointers {
   // momentum.
   void note_push(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
 
-  // By how much the last move has magnified the round-off of a local atom's position: a body that
-  // turns fast is known no better than the directions of its arms.
+  // By how much the last step has magnified the round-off of a local atom's position: how fast a
+  // body turns, and where to, is known no better than its arms, which may be short.
   double round_off_growth(int i) const
   {
     const double angle = carried_[i].angle;
     return (1.0 + angle) * (1.0 + angle);
   }
 
+  struct Kick {
+    double strength;    // time, in units that turn a force into a momentum
+    bool whole;         // not the half kick at the start of a run
+    bool last;          // of a run: no push stays in the velocities that it leaves behind
+  };
+
   // Adds to the force on a local member what replaces the last step's push by this one's, and keeps
-  // both, as well as the angular momentum after the last turn().
-  void finish(const inelastic::ContactProblem &problem, int i, double kick, bool whole_kick,
-              double *force);
+  // both, as well as the angular momentum after the last turn(). `contact_force` (3 per particle)
+  // only tells how large the moments were.
+  void finish(const inelastic::ContactProblem &problem, int i, const Kick &kick,
+              const double *contact_force, double *force);
 
   // Per atom, travelling with it
   void resize(int atoms) { carried_.resize(atoms, Carried{}); }
@@ -109,7 +120,7 @@ class RigidMotion : protected Pointers {
     std::array<double, 3> angular_momentum;    // after the last move, push included
     Push next;                                 // part of the motion after the last move
     Push held;                                 // at whole steps
-    double angle;                              // by which the last move turned it [radians]
+    double angle;    // turned in the last step, by motion and by moments of contacts [radians]
   };
   struct Body {
     double mass;
