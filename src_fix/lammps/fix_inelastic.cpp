@@ -748,7 +748,7 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
     if (origin_[c].wall != 0 || !(is_member(i) || is_member(j))) continue;
     if (is_entangled(i, j)) continue;
     const double gap = gap_at_end(i, j);
-    const bool too_deep = ends_too_deep(origin_[c].gap_now, gap);
+    const bool too_deep = ends_too_deep(origin_[c].gap_now, origin_[c].size, gap);
     if ((too_deep || origin_[c].followed) && may_change)
       changed += follow(c, relinearised_gap(c, gap), too_deep);
   }
@@ -756,7 +756,7 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
     if (listed_pair_taken_[slot] || !(is_member(i) || is_member(j))) return;
     if (is_entangled(i, j)) return;
     const double gap = gap_at_end(i, j);
-    if (!ends_too_deep(0.0, gap) || !may_change) return;
+    if (!ends_too_deep(0.0, 0.0, gap) || !may_change) return;
     const std::size_t before = contacts.size();
     take_pair(slot, i, j);
     if (contacts.size() > before) changed += follow(before, relinearised_gap(before, gap), true);
@@ -764,12 +764,13 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
   return changed;
 }
 
-// Notes the excess as well. What starts with a bad overlap may keep it, but not get deeper.
-bool FixInelastic::ends_too_deep(double gap_now, double gap_at_end)
+// Notes the excess as well: what starts with a bad overlap may keep it, but not get deeper. It is
+// asked for more, which costs no shorter step where it is not to be had.
+bool FixInelastic::ends_too_deep(double gap_now, double size, double gap_at_end)
 {
-  const double deeper = (is_bad(gap_now) ? gap_now : 0.0) - gap_at_end;
-  output_[EXCESS] = std::max(output_[EXCESS], deeper - REGULAR_OVERLAP * tolerance_);
-  return deeper > RELINEARISE_BEYOND * tolerance_;
+  const double allowed = is_bad(gap_now) ? gap_now : 0.0;
+  output_[EXCESS] = std::max(output_[EXCESS], allowed - gap_at_end - REGULAR_OVERLAP * tolerance_);
+  return wanted_gap(gap_now, size) - gap_at_end > RELINEARISE_BEYOND * tolerance_;
 }
 
 // Sets the gap of a constraint to one that is exact for the present velocity, or to the linearised
@@ -854,7 +855,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
         const bool known = existing != wall_constraint_.end();
         const double gap_now = known ? origin_[existing->second].gap_now : 0.0;
         const double gap = view.distance - atom->radius[look.atom];
-        const bool too_deep = ends_too_deep(gap_now, gap);
+        const bool too_deep = ends_too_deep(gap_now, atom->radius[look.atom], gap);
         if (too_deep || (known && origin_[existing->second].followed))
           add_plane(look, view, too_deep);
       },

@@ -208,7 +208,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool same_plane(std::size_t c, const double *normal) const;
   double effective_gap(double gap_now, double size) const;
   double wanted_gap(double gap_now, double size) const;
-  bool ends_too_deep(double gap_now, double gap_at_end);
+  bool ends_too_deep(double gap_now, double size, double gap_at_end);
   long follow(std::size_t c, double exact_gap, bool too_deep);
   bool is_bad(double gap) const;
   void note_overlap(double gap);
