@@ -919,6 +919,7 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
   std::copy_n(velocity_.begin(), 3 * static_cast<std::size_t>(problem_.particles),
               problem_.predicted_velocity.begin());
   phase_ = Phase::PUSH;
+  relinearisations_ = 0;
   if (rigid_) find_entangled();
   for (std::size_t c = 0; c < problem_.contacts.size(); ++c) {
     const Origin &origin = origin_[c];

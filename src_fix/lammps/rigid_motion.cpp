@@ -20,7 +20,15 @@ namespace {
 
 constexpr double SPHERE_MOMENT = 0.4;    // of a solid ball, in m R^2
 constexpr double COLLINEAR = 1.0e-7;     // smallest moment over the others; LAMMPS drops it there
-constexpr double AGREEMENT = 1.0e-6;     // relative, of two ways to compute moments and momenta
+constexpr tagint MOST_MOLECULES = 100000000;    // every rank counts them all
+constexpr double AGREEMENT = 1.0e-6;    // relative, of two ways to compute moments and momenta
+
+// Per owned atom: its body, -1 = in none.
+const int *bodies_of_atoms(Fix *fix)
+{
+  int dimension;
+  return static_cast<const int *>(fix->extract("body", dimension));
+}
 
 void cross(const double *a, const double *b, double *c)
 {
@@ -143,16 +151,6 @@ double RigidMotion::mass(int i) const
    who belongs to which body
 ------------------------------------------------------------------------- */
 
-namespace {
-
-const int *bodies_of_atoms(Fix *fix)
-{
-  int dimension;
-  return static_cast<const int *>(fix->extract("body", dimension));
-}
-
-}    // namespace
-
 void RigidMotion::count_spheres(int groupbit, int frozen_bit)
 {
   const int *const body = bodies_of_atoms(fix_);
@@ -162,6 +160,11 @@ void RigidMotion::count_spheres(int groupbit, int frozen_bit)
     if (body[i] >= 0) largest = std::max(largest, atom->molecule[i]);
   MPI_Allreduce(&largest, &most, 1, MPI_LMP_TAGINT, MPI_MAX, world);
 
+  if (most > MOST_MOLECULES)
+    error->all(FLERR,
+               "Fix inelastic rigid: molecule ID {} is too large, at most {} is allowed: use "
+               "reset_atoms mol",
+               most, MOST_MOLECULES);
   const std::size_t molecules = static_cast<std::size_t>(most) + 1;
   std::vector<int> mine(3 * molecules, 0), all(3 * molecules);
   for (int i = 0; i < atom->nlocal; ++i) {
