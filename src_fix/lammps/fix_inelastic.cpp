@@ -1079,12 +1079,15 @@ void FixInelastic::check_expected()
                           id, later.empty() ? "" : ". Fixes that may have:", later);
   }
   if (rigid_) {
-    // Another inertia is the better explanation where there is one.
     double failed = message.empty() ? 0.0 : 1.0;
     reduce(&failed, 1, nullptr, 0);
+    // Masses and moments agreed when the run began.
     if (failed > 0.0) {
       rigid_->measure(problem_);
-      fail_together(rigid_->disagreement(problem_));
+      if (!rigid_->disagreement(problem_).empty())
+        message = fmt::format("the spheres of a body have moved against one another: another fix "
+                              "moves them beside fix {}",
+                              rigid_->fix()->id);
     }
   }
   fail_together(message);

@@ -281,6 +281,7 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
 // A sphere of another rank that touches one of this rank's brings its whole body with it.
 void RigidMotion::check_reach(double extent) const
 {
+  constexpr double ROUNDED_UP = 1.00001;    // six digits of it are enough
   const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;
   if (comm->nprocs == 1 && !periodic) return;
   const double needed = neighbor->cutneighmax + extent;
@@ -289,7 +290,7 @@ void RigidMotion::check_reach(double extent) const
     error->all(FLERR,
                "Fix inelastic rigid: ranks and periodic images see {:.6g} far, which is too short "
                "for bodies of this size: set comm_modify cutoff to at least {:.6g}",
-               cutoff, needed);
+               cutoff, ROUNDED_UP * needed);
   const double period[3] = {domain->xperiodic ? domain->xprd : 2.0 * needed,
                             domain->yperiodic ? domain->yprd : 2.0 * needed,
                             domain->zperiodic ? domain->zprd : 2.0 * needed};
@@ -299,7 +300,7 @@ void RigidMotion::check_reach(double extent) const
           FLERR,
           "Fix inelastic rigid: the periodic box is {:.6g} wide and must be at least {:.6g}, "
           "so that no body can meet its own image",
-          length, 2.0 * needed);
+          length, 2.0 * ROUNDED_UP * needed);
 }
 
 /* ----------------------------------------------------------------------
