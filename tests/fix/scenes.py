@@ -60,16 +60,23 @@ def scene(
     thermo: str = "step ke f_contact[1] f_contact[2] f_contact[3] f_contact[4] f_contact[5] "
     "f_contact[6]",
     style: str = "atom_style sphere",
+    molecules: ArrayLike | None = None,
+    spins: ArrayLike = (0.0, 0.0, 0.0),
 ) -> str:
     """Return a deck up to its first `run`, and write the spheres' data file beside it.
 
     `setup` stands before the box is made, `fixes` before the contact fix. The box is a region named
     container. LAMMPS's box is larger by 1 than the container in directions that are not periodic.
+    With `molecules` (0 = none) the style must be BODY_STYLE. `spins` are angular velocities.
     """
     centres = np.atleast_2d(np.asarray(positions, dtype=float))
     radius = np.broadcast_to(np.asarray(radii, dtype=float), len(centres))
     velocity = np.zeros_like(centres)
     velocity[:] = 0.0 if velocities is None else velocities
+    spin = np.broadcast_to(np.asarray(spins, dtype=float), centres.shape)
+    columns = [""] * len(centres)
+    if molecules is not None:
+        columns = [f" {molecule}" for molecule in np.asarray(molecules, dtype=int)]
     limits = np.asarray(box, dtype=float)
     room = [0.0 if flag.startswith("p") else 1.0 for flag in boundary.split()]
     folder.mkdir(parents=True, exist_ok=True)
@@ -77,12 +84,16 @@ def scene(
     lines = ["# spheres", "", f"{len(centres)} atoms", "1 atom types", ""]
     for (lower, upper), (low, high), extra in zip(names, limits, room, strict=True):
         lines.append(f"{low - extra:.17g} {high + extra:.17g} {lower} {upper}")
-    lines += ["", "Atoms # sphere", ""]
-    for number, (x, r) in enumerate(zip(centres, radius, strict=True), 1):
-        lines.append(f"{number} 1 {2 * r:.17g} 1.0 {x[0]:.17g} {x[1]:.17g} {x[2]:.17g}")
+    lines += ["", "Atoms", ""]
+    for number, (x, r, molecule) in enumerate(zip(centres, radius, columns, strict=True), 1):
+        size, place = f"{2 * r:.17g} 1.0", f"{x[0]:.17g} {x[1]:.17g} {x[2]:.17g}"
+        # A hybrid style has the coordinates first.
+        lines.append(
+            f"{number} 1 {place} {size}{molecule}" if molecule else f"{number} 1 {size} {place}"
+        )
     lines += ["", "Velocities", ""]
-    for number, v in enumerate(velocity, 1):
-        lines.append(f"{number} {v[0]:.17g} {v[1]:.17g} {v[2]:.17g} 0 0 0")
+    for number, (v, w) in enumerate(zip(velocity, spin, strict=True), 1):
+        lines.append(f"{number} " + " ".join(f"{value:.17g}" for value in (*v, *w)))
     (folder / "spheres.data").write_text("\n".join(lines) + "\n")
 
     largest = 2 * float(radius.max())
@@ -186,9 +197,15 @@ def _frames(path: Path) -> Iterator[Frame]:
 
 
 def deepest_pair(
-    positions: FloatArray, radii: FloatArray, periods: Sequence[float] | None = None
+    positions: FloatArray,
+    radii: FloatArray,
+    periods: Sequence[float] | None = None,
+    molecules: FloatArray | None = None,
 ) -> float:
-    """Largest r_i + r_j - |x_i - x_j| over all pairs, not below 0. `periods`: 0 = not periodic."""
+    """Largest r_i + r_j - |x_i - x_j| over all pairs, not below 0. `periods`: 0 = not periodic.
+
+    With `molecules` pairs within one of them (but 0) do not count.
+    """
     if periods is None:
         tree = KDTree(positions)
     else:
@@ -198,6 +215,9 @@ def deepest_pair(
                 positions[:, axis] %= period
         tree = KDTree(positions, boxsize=periods)
     pairs = tree.query_pairs(2 * radii.max(), output_type="ndarray")
+    if molecules is not None:
+        first, second = molecules[pairs].T
+        pairs = pairs[(first != second) | (first == 0)]
     if len(pairs) == 0:
         return 0.0
     apart = positions[pairs[:, 0]] - positions[pairs[:, 1]]

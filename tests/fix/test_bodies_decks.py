@@ -90,7 +90,11 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
         ("dimers.in", {"aspect_ratio": 2.1}, "aspect_ratio must be above 1"),
         ("dimers.in", {"inertia": "hollow"}, "inertia must be point or solid"),
         ("dimers.in", {"start": "ordered"}, "start must be random or regular"),
-        ("dimers.in", {"start": "regular", "particles": 2000, "aspect_ratio": 2}, "no room for a regular"),
+        (
+            "dimers.in",
+            {"start": "regular", "particles": 2000, "aspect_ratio": 2},
+            "no room for a regular",
+        ),
         ("dimers.in", {"diameter": 0.7}, "dimers are too long"),
         ("dimers.in", {"diameter": 0.2}, "no room"),
         ("clusters.in", {"extent": 0}, "extent must be above 0"),

@@ -1,0 +1,333 @@
+"""Every mistake with rigid bodies ends with one line that says what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bodies import (
+    BENT,
+    DUMP_BODY_SPHERES,
+    INERTIAS,
+    Bodies,
+    body_scene,
+    dimer,
+    placed,
+    random_bodies,
+    rigid_velocities,
+)
+from lammps_run import Runner
+from scenes import read_dump
+
+RADIUS = 0.05
+EPS = 0.0005 * RADIUS
+BOX = ((0.0, 0.57), (0.0, 1.0), (0.0, 0.57))
+SPHERE = np.zeros((1, 3))
+BODIES = random_bodies(
+    [dimer(1.5), SPHERE, BENT] * 5, RADIUS, np.array(BOX) + np.array([RADIUS, -RADIUS]), seed=1
+)
+Refused = Callable[..., str]
+
+
+def deck(folder: Path, inertia: str = "solid", **options: Any) -> str:
+    """Return a small scene that runs."""
+    defaults: dict[str, Any] = {"tolerance": EPS, "box": BOX}
+    return body_scene(BODIES, RADIUS, folder, inertia=inertia, **defaults | options)
+
+
+def changed(text: str, old: str, new: str) -> str:
+    """Return a deck with one text in place of another, which must be there."""
+    assert old in text, old
+    return text.replace(old, new)
+
+
+def test_the_scenes_themselves_run(tmp_path: Path, lmp: Runner) -> None:
+    for inertia in INERTIAS:
+        for ranks in (1, 2):
+            lmp(deck(tmp_path, inertia) + "run 20\n", ranks=ranks)
+
+
+LINES = {
+    "no fix of this name": ("rigid bodies solid", "rigid nobody solid", ["no fix nobody"]),
+    "no inertia": ("rigid bodies solid", "rigid bodies", ["point", "solid", "not nothing"]),
+    "another keyword": (
+        "rigid bodies solid",
+        "rigid bodies shorten yes",
+        ["point", "solid", "not shorten"],
+    ),
+    "a wrong word": ("rigid bodies solid", "rigid bodies points", ["point", "solid", "points"]),
+    "no value": ("rigid bodies solid", "rigid", ["rigid"]),
+    "a fix of the style nve": (
+        "rigid bodies solid",
+        "rigid motion solid",
+        ["motion", "nve", "rigid/small"],
+    ),
+    "fix rigid": (
+        "bodies bodies rigid/small molecule",
+        "bodies bodies rigid molecule",
+        ["fix bodies", "style rigid", "rigid/small"],
+    ),
+    "fix rigid/nve/small": (
+        "bodies bodies rigid/small molecule",
+        "bodies bodies rigid/nve/small molecule",
+        ["fix bodies", "rigid/nve/small", "must be rigid/small"],
+    ),
+    "langevin": (
+        "bodies bodies rigid/small molecule",
+        "bodies bodies rigid/small molecule langevin 1 1 1 48",
+        ["bodies"],
+    ),
+    "gravity by fix rigid/small": (
+        "vector 0 -1 0\n",
+        "vector 0 -1 0 disable\n",
+        ["did not move as predicted", "without its keywords gravity and langevin"],
+    ),
+    "a frozen sphere in a body": (
+        "fix contact all inelastic",
+        "group ice id 1\nfix contact all inelastic {eps} frozen ice region container "
+        "rigid bodies solid #",
+        ["molecule 1", "frozen"],
+    ),
+    "a body partly in the group": (
+        "fix contact all inelastic",
+        "group some id 2:100\nfix contact some inelastic",
+        ["molecule 1", "group", "partly"],
+    ),
+    "two fixes move the bodies": (
+        "thermo 1\n",
+        "fix again bodies nve\nthermo 1\n",
+        ["did not move as predicted"],
+    ),
+    "a force afterwards": (
+        "thermo 1\n",
+        "fix wind all addforce 1e-6 0 0\nthermo 1\n",
+        ["did not move as predicted", "wind (addforce)", "before fix contact"],
+    ),
+    "gravity afterwards": (
+        "thermo 1\n",
+        "fix more all gravity 1 vector 1 0 0\nthermo 1\n",
+        ["did not move as predicted", "more (gravity)"],
+    ),
+    "momentum": (
+        "thermo 1\n",
+        "fix drift all momentum 1 linear 1 1 1 angular\nthermo 1\n",
+        ["did not move as predicted", "drift (momentum)"],
+    ),
+    "a torque from elsewhere": (
+        "thermo 1\n",
+        "fix twist bodies addtorque 0 0 1e-5\nthermo 1\n",
+        ["did not move as predicted", "twist (addtorque)"],
+    ),
+    "no mover at all": (
+        "fix bodies bodies rigid/small molecule \n",
+        "",
+        ["no fix bodies"],
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "ranks"),
+    [(name, 1) for name in LINES]
+    + [
+        (name, 2)
+        for name in (
+            "a frozen sphere in a body",
+            "a body partly in the group",
+            "a force afterwards",
+            "a torque from elsewhere",
+        )
+    ],
+)
+def test_one_line_says_what_is_wrong(
+    name: str, ranks: int, tmp_path: Path, refused: Refused
+) -> None:
+    old, new, words = LINES[name]
+    rigid = "gravity gravity" if name == "gravity by fix rigid/small" else ""
+    text = changed(deck(tmp_path, rigid_options=rigid), old, new.replace("{eps}", str(EPS)))
+    error = refused(text + "run 30\n", ranks=ranks, timeout=20)
+    for word in words:
+        assert word.lower() in error.lower(), error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_bodies_that_are_no_molecules(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    centres = np.array(BOX) + np.array([RADIUS, -RADIUS])
+    dimers = random_bodies([dimer(1.5)] * 6, RADIUS, centres, seed=1)
+    text = body_scene(dimers, RADIUS, tmp_path, inertia="solid", tolerance=EPS, box=BOX)
+    text = changed(
+        text,
+        "fix bodies bodies rigid/small molecule",
+        "comm_modify cutoff 2\nvariable two atom floor((mol+1)/2)\n"
+        "fix bodies bodies rigid/small custom v_two",
+    )
+    error = refused(text + "run 3\n", ranks=ranks)
+    assert "bodies must be molecules" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("inertia", INERTIAS)
+def test_the_two_fixes_have_another_inertia(
+    inertia: str, ranks: int, tmp_path: Path, refused: Refused
+) -> None:
+    other = INERTIAS[1 - INERTIAS.index(inertia)]
+    text = changed(deck(tmp_path, inertia), f"rigid bodies {inertia}", f"rigid bodies {other}")
+    error = refused(text + "run 3\n", ranks=ranks)
+    words = {"point": "of point masses", "solid": "of solid spheres"}
+    assert f"{words[inertia]}, where fix inelastic has rigid bodies {other}" in error, error
+    assert "fix bodies turns the body of molecule" in error, error
+    assert "diameter is 0" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_radii_that_changed_after_the_bodies(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    """Between two runs, where fix rigid/small does not look again."""
+    text = deck(tmp_path, rigid_options="reinit no")
+    # The command set ... diameter crashes this version of LAMMPS once fix rigid/small is there.
+    slim = "variable wide equal 0.09\nfix slim bodies adapt 0 atom diameter v_wide mass no\n"
+    error = refused(text + f"run 3\n{slim}run 0\nrun 3\n", ranks=ranks)
+    assert "molecule" in error, error
+    assert "moments of inertia" in error, error
+
+
+@pytest.mark.parametrize("inertia", INERTIAS)
+def test_velocities_changed_between_runs(inertia: str, tmp_path: Path, lmp: Runner) -> None:
+    """They count, unless fix rigid/small is told `reinit no`: then it keeps its own."""
+    text = deck(tmp_path, inertia, gravity=False, options="")
+    lmp(text + f"run 10\nvelocity bodies set 1 0 0\n{DUMP_BODY_SPHERES}run 5\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    member = frames[0]["mol"] > 0
+    expected = 0 if inertia == "point" else 1  # round-off
+    assert frames[0]["vx"][member] == pytest.approx(expected, abs=1e-12)
+    moved = frames[-1]["x"][member] - frames[0]["x"][member]
+    assert (moved < 5 * 0.005 * 1.001).all()
+    assert moved.max() == pytest.approx(5 * 0.005 * expected, abs=1e-12)
+
+
+def test_ghosts_that_do_not_reach(tmp_path: Path, refused: Refused) -> None:
+    text = "\n".join(
+        line for line in deck(tmp_path).splitlines() if not line.startswith("comm_modify")
+    )
+    error = refused(text + "\nrun 3\n", ranks=2)
+    assert "comm_modify cutoff to at least" in error, error
+    needed = error.split("at least ")[1].split()[0]
+    text = changed(text, "neigh_modify delay", f"comm_modify cutoff {needed}\nneigh_modify delay")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_cutoff_that_is_named_does(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    text = "\n".join(
+        line for line in deck(tmp_path).splitlines() if not line.startswith("comm_modify")
+    )
+    first = lmp(text + "\nrun 3\n", ranks=ranks, must_pass=False)
+    assert (first.status == 0) == (ranks == 1)  # one rank has no ghosts here
+    if first.status != 0:
+        needed = first.errors[0].split("at least ")[1].split()[0]
+        cutoff = f"comm_modify cutoff {float(needed) * (1 + 1e-5)}\n"  # printed with 6 digits
+        lmp(
+            changed(text, "neigh_modify delay", cutoff + "neigh_modify delay") + "\nrun 30\n",
+            ranks=2,
+        )
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_periodic_box_that_is_too_small(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    text = deck(tmp_path, boundary="p f p", setup="region floor plane 0 0 0 0 1 0").replace(
+        "region container rigid", "region floor rigid"
+    )
+    error = refused(text + "run 3\n", ranks=ranks)
+    assert "periodic box is 0.57 wide" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize(("lost", "speed"), [("error", 1), ("ignore", 1), ("ignore", 20)])
+def test_a_body_that_leaves_the_box(
+    lost: str, speed: float, ranks: int, tmp_path: Path, lmp: Runner
+) -> None:
+    """LAMMPS deletes what is beyond its own, not periodic boundaries: a whole body, or a part."""
+    body = placed(2 * RADIUS * dimer(1.9), [0.3, -0.8, 0.3], [0, 0, 0.7])
+    both = body.joined(placed(2 * RADIUS * dimer(1.9), [0.3, 0.9, 0.3]))
+    falling = np.array([[0, -speed, 0], [0, 0, 0]])
+    velocities, spins = rigid_velocities(both, RADIUS, falling, [0, 0, 5])
+    text = body_scene(
+        both,
+        RADIUS,
+        tmp_path,
+        inertia="solid",
+        tolerance=EPS,
+        box=BOX,
+        gravity=False,
+        options="",
+        velocities=velocities,
+        spins=spins,
+        skin=0.3,
+    )
+    text = changed(text, "lost error", f"lost {lost}") + "neigh_modify every 1 check no\n"
+    result = lmp(text + DUMP_BODY_SPHERES + "run 100\n", ranks=ranks, timeout=20, must_pass=False)
+    assert result.status != 0
+    # Fix rigid/small aborts all ranks at once, which may swallow its line.
+    assert ranks == 2 or "Rigid body atoms" in result.errors[0]
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_body_in_parts_outside_the_region(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    body = placed(2 * RADIUS * dimer(1.9), [0.0, 0.5, 0.3])
+    text = body_scene(
+        BODIES.joined(body), RADIUS, tmp_path, inertia="solid", tolerance=EPS, box=BOX
+    )
+    error = refused(text + "run 3\n", ranks=ranks)
+    assert "centre of atom" in error
+    assert "region container" in error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_coincident_centres(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    one = placed(2 * RADIUS * dimer(1.5), [0.3, 0.5, 0.3])
+    two = placed(2 * RADIUS * dimer(1.5), one.positions[1])
+    two = Bodies(two.positions - two.positions[0] + one.positions[1], two.molecules)
+    text = body_scene(one.joined(two), RADIUS, tmp_path, inertia="solid", tolerance=EPS, box=BOX)
+    error = refused(text + "run 3\n", ranks=ranks)
+    assert "centres of atoms" in error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_free_spheres_that_do_not_see_each_other(
+    ranks: int, tmp_path: Path, refused: Refused
+) -> None:
+    """LAMMPS takes all atoms without a molecule for one when it excludes pairs of a molecule."""
+    text = changed(deck(tmp_path), "molecule/intra bodies", "molecule/intra all")
+    error = refused(text + "run 3\n", ranks=ranks)
+    assert "exclude" in error
+    assert "molecule" in error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_bodies_that_are_not_told_of(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    text = changed(deck(tmp_path), "rigid bodies solid", "")
+    error = refused(text + "run 3\n", ranks=ranks)
+    assert "fix bodies (rigid/small)" in error, error
+    assert "rigid bodies point, or solid" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_bodies_made_during_a_run(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    (tmp_path / "drop.mol").write_text(
+        "a dimer\n\n2 atoms\n\nCoords\n\n1 0 0 0\n2 0.05 0 0\n\nTypes\n\n1 1\n2 1\n\n"
+        f"Diameters\n\n1 {2 * RADIUS}\n2 {2 * RADIUS}\n\nMasses\n\n1 0.0005\n2 0.0005\n"
+    )
+    text = deck(tmp_path, rigid_options="mol drop")
+    text = changed(
+        text,
+        "group bodies molecule > 0",
+        "molecule drop drop.mol\ngroup bodies molecule > 0",
+    )
+    text += (
+        "region slot block 0.15 0.4 0.9 1.2 0.15 0.4\n"
+        "fix rain bodies deposit 3 0 5 4711 region slot near 0.13 mol drop rigid bodies\n"
+    )
+    error = refused(text + "run 40\n", ranks=ranks)
+    assert "create no bodies during a run" in error, error
