@@ -100,8 +100,8 @@ def dimers() -> None:
     empty = [iteration(free, nothing) / iteration(free, {}) for _ in repeats]
     print(
         f"an iteration on {len(problem.first)} constraints of 1,000 dimers takes "
-        f"{statistics.median(cost):.2f} times as long as with 2,000 free spheres; with a list of no "
-        f"bodies {statistics.median(empty):.2f} times as long as without one",
+        f"{statistics.median(cost):.2f} times as long as with 2,000 free spheres; with an empty "
+        f"list of bodies {statistics.median(empty):.2f} times as long as without one",
         flush=True,
     )
 
