@@ -68,6 +68,15 @@ double dot(const double *a, const double *b)
 double norm(const double *a)
 { return std::sqrt(dot(a, a)); }
 
+// Whether the distance at the end of the step, linearised, |a| + h a.opening / |a|, is more than
+// `reach` > 0. Of a = `away` and what a.opening adds to a.a over the step; no root for listed pairs.
+bool ends_beyond(double reach, const double *away, double h, const double *opening)
+{
+  const double square = dot(away, away);
+  const double end = square + h * dot(away, opening);
+  return end > 0.0 && end * end > reach * reach * square;
+}
+
 }    // namespace
 
 /* ---------------------------------------------------------------------- */
@@ -543,13 +552,11 @@ void FixInelastic::collect_pairs()
 
   for_each_listed_pair([&](std::size_t slot, int i, int j) {
     const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
-    const double distance = norm(away);
-    const double size = radius[i] + radius[j];
-    const double gap = distance - size;
     const double opening[3] = {velocity[3 * i] - velocity[3 * j],
                                velocity[3 * i + 1] - velocity[3 * j + 1],
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
-    if (gap + std::min(0.0, h * dot(away, opening) / distance) > margin_) return;
+    const double reach = radius[i] + radius[j] + margin_;
+    if (dot(away, away) > reach * reach && ends_beyond(reach, away, h, opening)) return;
     take_pair(slot, i, j);
   });
 }
@@ -680,17 +687,24 @@ long FixInelastic::add_violated_pairs(const std::vector<double> &velocity)
   const double *const *const x = atom->x;
   const double *const radius = atom->radius;
   const double h = problem_.timestep;
+  const double *const moved = motion().data();
+  auto square_at_end = [&](int i, int j) {
+    double away[3];
+    for (int d = 0; d < 3; ++d)
+      away[d] = x[i][d] - x[j][d] + h * (moved[3 * i + d] - moved[3 * j + d]);
+    return dot(away, away);
+  };
   const std::size_t before = problem_.contacts.size();
   for_each_listed_pair([&](std::size_t slot, int i, int j) {
     if (listed_pair_taken_[slot]) return;
     const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
-    const double distance = norm(away);
     const double opening[3] = {velocity[3 * i] - velocity[3 * j],
                                velocity[3 * i + 1] - velocity[3 * j + 1],
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
-    if (distance - radius[i] - radius[j] + h * dot(away, opening) / distance < -tolerance_ &&
-        !is_entangled(i, j))
-      take_pair(slot, i, j);
+    const double touching = radius[i] + radius[j] - tolerance_;
+    const bool apart = ends_beyond(touching, away, h, opening) &&
+        !(rigid_ && square_at_end(i, j) < touching * touching);
+    if (!apart && !is_entangled(i, j)) take_pair(slot, i, j);
   });
   return static_cast<long>(problem_.contacts.size() - before);
 }
@@ -752,15 +766,6 @@ long FixInelastic::relinearise_pairs(const std::vector<double> &velocity)
     if ((too_deep || origin_[c].followed) && may_change)
       changed += follow(c, relinearised_gap(c, gap), too_deep);
   }
-  for_each_listed_pair([&](std::size_t slot, int i, int j) {
-    if (listed_pair_taken_[slot] || !(is_member(i) || is_member(j))) return;
-    if (is_entangled(i, j)) return;
-    const double gap = gap_at_end(i, j);
-    if (!ends_too_deep(0.0, 0.0, gap) || !may_change) return;
-    const std::size_t before = contacts.size();
-    take_pair(slot, i, j);
-    if (contacts.size() > before) changed += follow(before, relinearised_gap(before, gap), true);
-  });
   return changed;
 }
 
