@@ -34,6 +34,21 @@ dump_modify forces sort id format float %.17g colname 2 particles colname 3 wall
      colname 4 fx colname 5 fy colname 6 fz
 """
 
+# How ranks share the box: what stands before it, what balances it, number of ranks.
+DIVISIONS = {
+    "default": ("", "", 2),
+    "x": ("processors 2 1 1", "", 2),
+    "height": ("processors 1 2 1", "", 2),
+    "z": ("processors 1 1 2", "", 2),
+    "newton-off": ("newton off", "", 2),
+    "newton-off-one-rank": ("newton off", "", 1),
+    "tiled": ("comm_style tiled", "", 2),
+    "rcb": ("comm_style tiled", "fix balance all balance 10 1.0 rcb", 2),
+    "rcb-newton-off": ("comm_style tiled\nnewton off", "fix balance all balance 10 1.0 rcb", 2),
+    "shift": ("processors 1 2 1", "fix balance all balance 7 1.0 shift y 10 1.0", 2),
+    "sorted-rarely": ("atom_modify sort 7 0.1", "", 1),
+}
+
 
 def mass(radius: ArrayLike) -> FloatArray:
     """Mass of spheres of density 1."""

@@ -24,7 +24,7 @@ from bodies import (
     rigid_velocities,
 )
 from lammps_run import Runner, run_lmp
-from scenes import FloatArray, deepest_pair, read_dump
+from scenes import DIVISIONS, FloatArray, deepest_pair, read_dump
 
 RADIUS = 0.055
 EXACT = 5e-9 * RADIUS
@@ -198,21 +198,6 @@ def test_a_tumbling_body_goes_on_tumbling(
             lmp(going_on + dump + "run 25\n" + write)
     # Round-off of files with 17 digits and of four set-ups, amplified by the free tumbling.
     assert last_positions(tmp_path) == pytest.approx(expected, abs=1e-11)
-
-
-DIVISIONS = {
-    "default": ("", "", 2),
-    "x": ("processors 2 1 1", "", 2),
-    "height": ("processors 1 2 1", "", 2),
-    "z": ("processors 1 1 2", "", 2),
-    "newton-off": ("newton off", "", 2),
-    "newton-off-one-rank": ("newton off", "", 1),
-    "tiled": ("comm_style tiled", "", 2),
-    "rcb": ("comm_style tiled", "fix balance all balance 10 1.0 rcb", 2),
-    "rcb-newton-off": ("comm_style tiled\nnewton off", "fix balance all balance 10 1.0 rcb", 2),
-    "shift": ("processors 1 2 1", "fix balance all balance 7 1.0 shift y 10 1.0", 2),
-    "sorted-rarely": ("atom_modify sort 7 0.1", "", 1),
-}
 
 
 @pytest.mark.parametrize("name", DIVISIONS)

@@ -10,6 +10,7 @@ import pytest
 from lammps_inelastic.analysis import iterate_contact_frames
 from lammps_run import Runner
 from scenes import (
+    DIVISIONS,
     DUMP_CONTACTS,
     DUMP_FORCES,
     DUMP_PARTICLES,
@@ -149,21 +150,6 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
     result = run_lmp(folder, deck + DUMP_PARTICLES + "run 80\n")
     assert result.thermo["f_contact[5]"][-1] > 30
     return read_dump(folder / "particles.dump")
-
-
-DIVISIONS = {
-    "default": ("", "", 2),
-    "x": ("processors 2 1 1", "", 2),
-    "height": ("processors 1 2 1", "", 2),
-    "z": ("processors 1 1 2", "", 2),
-    "newton-off": ("newton off", "", 2),
-    "newton-off-one-rank": ("newton off", "", 1),
-    "tiled": ("comm_style tiled", "", 2),
-    "rcb": ("comm_style tiled", "fix balance all balance 10 1.0 rcb", 2),
-    "rcb-newton-off": ("comm_style tiled\nnewton off", "fix balance all balance 10 1.0 rcb", 2),
-    "shift": ("processors 1 2 1", "fix balance all balance 7 1.0 shift y 10 1.0", 2),
-    "sorted-rarely": ("atom_modify sort 7 0.1", "", 1),
-}
 
 
 @pytest.mark.parametrize("name", DIVISIONS)
