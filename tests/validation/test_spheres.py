@@ -50,7 +50,8 @@ def test_table_1(tmp_path: Path) -> None:
     standard_error = np.hypot(
         PAPER_PHI_STD / PAPER_RUNS**0.5, np.std(phi, ddof=1) / len(phi) ** 0.5
     )
-    assert abs(np.mean(phi) - PAPER_PHI) < 2 * standard_error
+    # One in 370 by chance: the nine packings are others after any change of the code.
+    assert abs(np.mean(phi) - PAPER_PHI) < 3 * standard_error
     assert abs(np.mean(z) - PAPER_Z) < PAPER_Z_STD
 
 
