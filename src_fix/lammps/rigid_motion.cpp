@@ -21,7 +21,7 @@ namespace {
 constexpr double SPHERE_MOMENT = 0.4;    // of a solid ball, in m R^2
 constexpr double COLLINEAR = 1.0e-7;     // smallest moment over the others; LAMMPS drops it there
 constexpr tagint MOST_MOLECULES = 100000000;    // every rank counts them all
-constexpr double AGREEMENT = 1.0e-6;    // relative, of two ways to compute moments and momenta
+constexpr double AGREEMENT = 1.0e-6;    // relative, of masses and moments computed in two ways
 
 // Per owned atom: its body, -1 = in none.
 const int *bodies_of_atoms(Fix *fix)
