@@ -8,7 +8,17 @@ from .coordination import (
     contact_counts,
     coordination_number,
 )
-from .errors import AnalysisError, DumpError, InputError, PictureError
+from .errors import AnalysisError, DumpError, ExportError, InputError, PictureError
+from .export import (
+    VoxelImage,
+    voxel_shape,
+    voxel_slices,
+    write_raw,
+    write_stl,
+    write_tiff,
+    write_vtk,
+    write_xyz,
+)
 from .geometry import particles_inside
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
@@ -22,6 +32,7 @@ __all__ = [
     "ContactFrame",
     "CoordinationNumber",
     "DumpError",
+    "ExportError",
     "InputError",
     "Orientation",
     "PackingFraction",
@@ -30,6 +41,7 @@ __all__ = [
     "ParticleFrame",
     "Particles",
     "PictureError",
+    "VoxelImage",
     "WallOverlap",
     "contact_counts",
     "coordination_number",
@@ -42,4 +54,11 @@ __all__ = [
     "packing_fraction",
     "particles_inside",
     "read_particle_frame",
+    "voxel_shape",
+    "voxel_slices",
+    "write_raw",
+    "write_stl",
+    "write_tiff",
+    "write_vtk",
+    "write_xyz",
 ]

@@ -24,3 +24,7 @@ class DumpError(AnalysisError):
 
 class PictureError(AnalysisError):
     """The picture could not be drawn: no LAMMPS, or LAMMPS refused."""
+
+
+class ExportError(AnalysisError):
+    """A file for another program could not be written."""
