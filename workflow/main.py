@@ -35,6 +35,8 @@ from lammps_inelastic.analysis import (
     read_particle_frame,
 )
 
+from . import export_command
+
 PARTICLE_DUMP = "particles.lammpsdump"
 CONTACT_DUMP = "contacts.lammpsdump"
 PICTURE = "packing.png"
@@ -53,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand; 0 if all went well, 2 after one line on stderr about what did not."""
     options = _parser().parse_args(arguments)
     try:
-        return _look(options)
+        return export_command.run(options) if options.command == "export" else _look(options)
     except (AnalysisError, OSError) as error:
         return _complain(error)
     except KeyboardInterrupt:
@@ -106,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     look.add_argument("--no-picture", action="store_true", help="draw nothing")
     look.add_argument("--json", action="store_true", help="print JSON")
+    export_command.add_parser(commands)
     return parser
 
 

@@ -1,0 +1,228 @@
+"""`inelastic export` on a run of three spheres in two bodies."""
+
+from __future__ import annotations
+
+import re
+
+import meshio
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from lammps_inelastic.workflow.main import main
+
+CENTRES = np.array([(0.3, 1, 0.5), (0.4, 1, 0.5), (0.6, 1.5, 0.5)])
+RADIUS = 0.125
+ENDINGS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
+# About the first two spheres.
+BOX = ["--box", "0.2", "0.5", "0.8", "1.2", "0.25", "0.75"]
+
+
+@pytest.fixture
+def run(tmp_path, write_particles, write_contacts):
+    """Return a folder whose spheres 1 and 2 are a body; sphere 2 touches 3 at step 90 only.
+
+    At step 0 all centres are 0.25 lower; nothing is known of the contacts there.
+    """
+
+    def rows(fall):
+        mol = (1, 1, 2)
+        return [
+            [i + 1, mol[i], 1, x, y - fall, z, 0, 0, 0, RADIUS]
+            for i, (x, y, z) in enumerate(CENTRES)
+        ]
+
+    frames = {0: rows(0.25), 50: rows(0), 90: rows(0)}
+    write_particles(frames, columns="id mol type x y z vx vy vz radius")
+    floor = [1, -3, 0, 0, 0, 0, 1, 0, 0, 1]
+    write_contacts({50: [floor], 90: [[2, 3, 0, 0, 0, 0, 1, 0, 0, 1], floor]})
+    return tmp_path
+
+
+def xyz_rows(path):
+    return [
+        [float(word) for word in line.split()[1:]] for line in path.read_text().split("\n")[2:-1]
+    ]
+
+
+@pytest.mark.parametrize("name", ENDINGS)
+def test_the_last_frame_into_the_folder_of_the_run(run, name, capsys):
+    assert main(["export", str(run), "--format", name]) == 0
+    path = run / f"packing{ENDINGS[name]}"
+    assert path.exists()
+    output = capsys.readouterr().out
+    assert f"{path} (" in output
+    assert "step 90" in output
+
+
+def test_columns_of_points(run, capsys):
+    assert main(["export", str(run), "--format", "xyz"]) == 0
+    assert "columns  radius, id, body, contacts\n" in capsys.readouterr().out
+    assert xyz_rows(run / "packing.xyz") == [
+        [*CENTRES[0], RADIUS, 1, 1, 0],
+        [*CENTRES[1], RADIUS, 2, 1, 1],
+        [*CENTRES[2], RADIUS, 3, 2, 1],
+    ]
+    comment = (run / "packing.xyz").read_text().split("\n")[1]
+    assert 'Lattice="1.0 0.0 0.0 0.0 5.0 0.0 0.0 0.0 1.0"' in comment
+    assert 'pbc="F F F"' in comment
+    assert comment.endswith(" step=90")
+
+    assert main(["export", str(run), "--format", "vtk"]) == 0
+    mesh = meshio.read(run / "packing.vtu")
+    assert mesh.points.tolist() == CENTRES.tolist()
+    assert mesh.point_data["body"].tolist() == [1, 1, 2]
+    assert mesh.point_data["contacts"].tolist() == [0, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("choice", "height", "contacts"),
+    [
+        (["--frame", "0"], 0.75, None),
+        (["--frame", "1"], 1, [0, 0, 0]),
+        (["--frame", "-1"], 1, [0, 1, 1]),
+        (["--frame", "-3"], 0.75, None),
+        (["--step", "0"], 0.75, None),
+        (["--step", "50"], 1, [0, 0, 0]),
+    ],
+)
+def test_frames(run, choice, height, contacts, capsys):
+    assert main(["export", str(run), "--format", "vtk", *choice]) == 0
+    mesh = meshio.read(run / "packing.vtu")
+    assert mesh.points[0, 1] == height
+    known = contacts is not None
+    assert ("no contacts are known at this step" in capsys.readouterr().out) != known
+    assert mesh.point_data.get("contacts", np.array(None)).tolist() == contacts
+
+
+def test_a_dump_alone_has_no_contacts(run):
+    # The contacts beside it may be those of another dump.
+    path = run / "particles.lammpsdump"
+    assert main(["export", str(path), "--format", "xyz", "--out", str(run / "some.xyz")]) == 0
+    assert xyz_rows(run / "some.xyz")[2] == [*CENTRES[2], RADIUS, 3, 2]
+
+
+def test_periodic_axes_are_said(run):
+    path = run / "particles.lammpsdump"
+    path.write_text(path.read_text().replace("ff ff ff", "pp ff ff"))
+    assert main(["export", str(run), "--format", "xyz"]) == 0
+    assert 'pbc="T F F"' in (run / "packing.xyz").read_text()
+
+
+def test_whole_spheres_by_their_centres(run, capsys):
+    command = ["export", str(run), *BOX]
+    assert main([*command, "--format", "xyz"]) == 0
+    # The contact of sphere 2 with sphere 3 still counts.
+    assert [row[4:] for row in xyz_rows(run / "packing.xyz")] == [[1, 1, 0], [2, 1, 1]]
+    assert "spheres  2 of 3, step 90" in capsys.readouterr().out
+
+    assert main([*command, "--format", "stl", "--subdivisions", "1"]) == 0
+    assert "faces    160" in capsys.readouterr().out
+    mesh = trimesh.load_mesh(run / "packing.stl")
+    # They are not cut, and overlap: two closed meshes. Corners are float32 numbers near 1.
+    assert len(mesh.split()) == 2
+    assert mesh.bounds[:, 0] == pytest.approx([0.3 - RADIUS, 0.4 + RADIUS], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["tiff", "raw"])
+def test_image_of_a_box(run, name, capsys):
+    assert main(["export", str(run), *BOX, "--format", name, "--voxel", "0.02"]) == 0
+    captured = capsys.readouterr()
+    assert "voxels       15 x 20 x 25 of 0.02\n" in captured.out
+    share = float(re.search(r"solid share  (\S+)", captured.out)[1])
+    # Nothing here is a terminal.
+    assert captured.err.splitlines()[-1] == "slice 25 of 25"
+    assert len(captured.err.splitlines()) == 10
+    # Two spheres but for their lens and the cap beyond xhi, where sphere 2 ends at 0.525.
+    lens = np.pi / 12 * (4 * RADIUS + 0.1) * (2 * RADIUS - 0.1) ** 2
+    caps = [np.pi / 3 * h**2 * (3 * RADIUS - h) for h in (0.025, 0.025)]
+    exact = 8 / 3 * np.pi * RADIUS**3 - lens - sum(caps)
+    # About 850 pairs of neighbours, of which one is solid: each is right or wrong by half a voxel.
+    # Four standard deviations.
+    assert share * 0.3 * 0.4 * 0.5 == pytest.approx(exact, abs=4 * 0.5 * np.sqrt(850) * 0.02**3)
+
+
+def test_voxels_follow_the_smallest_radius(run, capsys):
+    assert main(["export", str(run), *BOX, "--format", "tiff"]) == 0
+    assert "voxels       24 x 32 x 40 of 0.0125\n" in capsys.readouterr().out
+    with Image.open(run / "packing.tif") as image:
+        assert (image.size, image.n_frames) == ((24, 32), 40)
+
+
+def test_bar_on_a_terminal(run, capsys, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert main(["export", str(run), *BOX, "--format", "tiff"]) == 0
+    captured = capsys.readouterr()
+    assert "slices" in captured.err
+    assert "slice 40 of 40" not in captured.err
+    assert "solid share" in captured.out
+
+
+def failure_of(arguments, capsys):
+    """Run the command line; return what it says, after seeing that it is one line and no more."""
+    assert main(["export", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("inelastic: ")
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["xyz", "--step", "7"], "particles.lammpsdump: no step 7; the steps are 0, 50, 90"),
+        (["xyz", "--frame", "3"], "no frame 3; there are 3, from 0 to 2"),
+        (["xyz", "--frame", "-4"], "no frame -4; there are 3, from 0 to 2"),
+        (["xyz", "--voxel", "1"], "--voxel is for tiff and raw, not for xyz"),
+        (["raw", "--subdivisions", "1"], "--subdivisions is for stl, not for raw"),
+        (["stl", "--subdivisions", "-1"], "must not be negative, not -1"),
+        (["stl", "--box", "2", "3", "2", "3", "2", "3"], "no sphere's centre lies in the box"),
+        (["tiff", "--box", "2", "3", "2", "3", "2", "3"], "no sphere reaches into the box"),
+        (["tiff", "--box", "1", "0", "0", "1", "0", "1"], "xlo = 1 must be less than xhi = 0"),
+        (["tiff", "--voxel", "0"], "the size of a voxel must be positive, not 0"),
+        (["tiff", "--voxel", "1e-4"], "more than 4e+09 voxels: choose larger ones"),
+        (["vtk", "--out", "packing.vtk"], "packing.vtk: the name must end in .vtu"),
+        (["tiff", "--out", "/no/such/folder/a.tif"], "cannot be written: No such file"),
+    ],
+)
+def test_wrong_values(run, arguments, message, capsys):
+    assert message in failure_of([str(run), "--format", *arguments], capsys)
+    assert len(list(run.iterdir())) == 2
+
+
+def test_of_many_steps_some_are_named(run, write_particles, capsys):
+    write_particles({step: [[1, 1, 0, 0, 0, 0, 0, 0, 1]] for step in range(0, 1000, 10)})
+    message = failure_of([str(run), "--format", "xyz", "--step", "7"], capsys)
+    assert "no step 7; the 100 steps are 0, 10, 20, 30, 40, ..., 990\n" in message
+
+
+def test_no_dump(tmp_path, capsys):
+    message = failure_of([str(tmp_path), "--format", "xyz"], capsys)
+    assert "particles.lammpsdump: no such file" in message
+    assert "nowhere: no such file" in failure_of(["nowhere", "--format", "xyz"], capsys)
+
+
+def test_image_of_a_periodic_box(run, capsys):
+    path = run / "particles.lammpsdump"
+    path.write_text(path.read_text().replace("ff ff ff", "pp ff ff"))
+    message = failure_of([str(run), "--format", "raw"], capsys)
+    assert "the box is periodic (pp ff ff)" in message
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["x"],
+        ["x", "--format", "png"],
+        ["x", "--format", "xyz", "--frame", "1", "--step", "1"],
+        ["x", "--format", "tiff", "--box", "1"],
+    ],
+)
+def test_wrong_arguments(arguments, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["export", *arguments])
+    error = capsys.readouterr().err
+    assert error.startswith("inelastic: ")
+    assert error.count("\n") == 1
