@@ -16,11 +16,13 @@ change it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import gzip
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
@@ -28,6 +30,7 @@ from .errors import DumpError
 from .geometry import FloatArray
 
 HEADER_LINES = 9
+GZIP_MAGIC = b"\x1f\x8b"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,17 +60,28 @@ class FrameHeader:
         return self.first_row_line + self.rows
 
 
-def open_dump(path: Path) -> BinaryIO:
-    """Open a dump for reading."""
+@contextmanager
+def open_dump(path: Path) -> Iterator[Iterator[bytes]]:
+    """Open a dump for reading, also one that gzip has compressed, whatever its name ends in."""
     try:
-        return path.open("rb")
+        with path.open("rb") as raw:
+            compressed = raw.read(len(GZIP_MAGIC)) == GZIP_MAGIC
+            raw.seek(0)
+            if compressed:
+                with gzip.open(raw) as text:
+                    yield text
+            else:
+                yield raw
     except FileNotFoundError:
         raise DumpError(path, "no such file") from None
+    # A compressed file that was cut off or damaged.
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise DumpError(path, f"cannot be unpacked: {error}") from None
     except OSError as error:
         raise DumpError(path, f"cannot be read: {error.strerror}") from None
 
 
-def read_header(dump: BinaryIO, path: Path, line: int) -> FrameHeader | None:
+def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | None:
     """Read the header that starts at the given line number; None at the end of the file."""
     raw = list(islice(dump, HEADER_LINES))
     if not raw:
@@ -112,7 +126,7 @@ def read_header(dump: BinaryIO, path: Path, line: int) -> FrameHeader | None:
     )
 
 
-def read_rows(dump: BinaryIO, path: Path, header: FrameHeader) -> list[bytes]:
+def read_rows(dump: Iterator[bytes], path: Path, header: FrameHeader) -> list[bytes]:
     """Read the lines of one frame's rows, unparsed, and see that they are all there."""
     rows = list(islice(dump, header.rows))
     # A last line without its end of line may have lost digits: it counts as missing.
@@ -131,17 +145,26 @@ def require_columns(header: FrameHeader, needed: Sequence[str], path: Path) -> N
     """Raise with the names of the columns that are missing and of those that are there."""
     missing = [name for name in needed if name not in header.columns]
     if missing:
-        raise DumpError(
-            path,
-            f"no column {', '.join(missing)}; there is {' '.join(header.columns) or 'none'}",
-            header.first_row_line - 1,
-        )
+        raise missing_columns(header, path, ", ".join(missing))
+
+
+def missing_columns(header: FrameHeader, path: Path, names: str) -> DumpError:
+    """Make the error that says which columns are missing and which are there."""
+    there = " ".join(header.columns) or "none"
+    return DumpError(path, f"no column {names}; there is {there}", header.first_row_line - 1)
 
 
 def malformed_row(
-    rows: Sequence[bytes], header: FrameHeader, needed: Sequence[str], path: Path
+    rows: Sequence[bytes],
+    header: FrameHeader,
+    needed: Sequence[str],
+    path: Path,
+    whole: Sequence[str] = (),
 ) -> DumpError | None:
-    """Name the first row that does not hold numbers, where a parser only said that there is one."""
+    """Name the first row that does not hold numbers, where a parser only said that there is one.
+
+    The columns `whole`, some of those `needed`, must hold whole numbers.
+    """
     expected = len(header.columns)
     for number, row in enumerate(rows, start=header.first_row_line):
         fields = row.decode("ascii", errors="replace").split()
@@ -150,9 +173,10 @@ def malformed_row(
         for name in needed:
             value = fields[header.columns.index(name)]
             try:
-                float(value)
+                int(value) if name in whole else float(value)
             except ValueError:
-                return DumpError(path, f"{name} = '{_shortened(value)}' is no number", number)
+                kind = "whole number" if name in whole else "number"
+                return DumpError(path, f"{name} = '{_shortened(value)}' is no {kind}", number)
     return None
 
 

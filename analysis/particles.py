@@ -1,12 +1,18 @@
-"""Particle frames: LAMMPS's custom text dump, read through MDAnalysis."""
+"""Particle frames: LAMMPS's custom text dump of spheres, read through MDAnalysis.
+
+Needed are the columns `id`, positions and, unless the reader gives a radius, `radius` or
+`diameter`. Positions may be as they are (x, xu) or in shares of the box (xs, xsu).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from MDAnalysis.coordinates.LAMMPS import DumpReader
@@ -15,15 +21,22 @@ from .bodies import Particles, group_spheres
 from .dump_text import (
     FrameHeader,
     malformed_row,
+    missing_columns,
     open_dump,
     read_header,
     read_rows,
     require_columns,
 )
-from .errors import DumpError
+from .errors import DumpError, InputError
 from .geometry import FloatArray, IntArray
 
-COLUMNS = ("id", "x", "y", "z", "vx", "vy", "vz", "radius")
+# The first of these that a dump has whole are read: those in the box before those that left it
+# through a periodic face, lengths before shares of the box, which have lost digits.
+POSITIONS = (("x", "y", "z"), ("xu", "yu", "zu"), ("xs", "ys", "zs"), ("xsu", "ysu", "zsu"))
+SCALED = POSITIONS[2:]
+VELOCITIES = ("vx", "vy", "vz")
+# What the whole numbers of a column are, for errors.
+WHOLE_NUMBERS = {"mol": "a body's number or 0", "contacts": "a number of contacts"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,26 +48,52 @@ class ParticleFrame:
     step : time step
     ids : (n,), positive and each there once
     positions : (n, 3), length
-    velocities : (n, 3), length / time
+    velocities : (n, 3), length / time; None where the dump has not all of `vx`, `vy`, `vz`
     radii : (n,), positive, length
     bodies : (n,), the dump's `mol`, 0 for a free sphere; None where the dump has no `mol`
     box : (3, 2), lower and upper bound per axis, length
     boundaries : two letters per axis (f fixed, p periodic, s or m shrink-wrapped), lower then upper
+    contacts : (n,), each sphere's contacts with spheres of other particles; None where the dump has
+        no `contacts`
     """
 
     step: int
     ids: IntArray
     positions: FloatArray
-    velocities: FloatArray
+    velocities: FloatArray | None
     radii: FloatArray
     bodies: IntArray | None
     box: FloatArray
     boundaries: tuple[str, str, str]
+    contacts: IntArray | None = None
 
     @cached_property
     def particles(self) -> Particles:
         """Which spheres make up which particle; all are free where the dump has no `mol`."""
         return group_spheres(np.zeros_like(self.ids) if self.bodies is None else self.bodies)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Which columns of a dump are read.
+
+    Attributes
+    ----------
+    positions : names of the three columns
+    velocities : names of the three columns, or none
+    size : `radius` or `diameter`; None where the reader gives the radius
+    whole : those of `mol` and `contacts` that are there
+    """
+
+    positions: tuple[str, str, str]
+    velocities: tuple[str, ...]
+    size: str | None
+    whole: tuple[str, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        sizes = () if self.size is None else (self.size,)
+        return ("id", *self.positions, *self.velocities, *sizes, *self.whole)
 
 
 class ParticleDump:
@@ -64,11 +103,20 @@ class ParticleDump:
     `dump[i]`, `len(dump)` and `for frame in dump` work as for a list; `steps` are the time steps.
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
-        """Read the headers of all frames of the file."""
+    def __init__(self, path: str | PathLike[str], *, radius: float | None = None) -> None:
+        """Read the headers of all frames of the file.
+
+        Parameters
+        ----------
+        path : of the dump, plain text or compressed by gzip
+        radius : of all spheres, length, where the dump has neither `radius` nor `diameter`
+        """
+        if radius is not None and not (radius > 0 and math.isfinite(radius)):
+            raise InputError(f"a radius must be positive and finite, not {radius:g}")
         self.path = Path(path)
         self._headers = _scanned_headers(self.path)
-        self._columns = COLUMNS + (("mol",) if "mol" in self._headers[0].columns else ())
+        self._radius = radius
+        self._layout = _layout(self._headers[0], self.path, radius)
         self.steps: tuple[int, ...] = tuple(header.step for header in self._headers)
         self._reader: DumpReader | None = None
 
@@ -84,34 +132,43 @@ class ParticleDump:
         """Read one frame; negative indices count from the end."""
         if not -len(self) <= index < len(self):
             raise IndexError(f"{self.path}: no frame {index}, there are {len(self)}")
-        header = self._headers[index]
+        header, layout = self._headers[index], self._layout
         data = self._read(index % len(self))
         self._check(header.step, data)
+        positions = _side_by_side(data, layout.positions)
+        if layout.positions in SCALED:
+            lower, upper = header.box.T
+            positions = lower + positions * (upper - lower)
+        if layout.size is None:
+            radii = np.full(len(positions), self._radius)
+        else:
+            radii = data[layout.size] * (0.5 if layout.size == "diameter" else 1.0)
         return ParticleFrame(
             step=header.step,
-            ids=data[:, 0].astype(np.int64),
-            positions=data[:, 1:4].copy(),
-            velocities=data[:, 4:7].copy(),
-            radii=data[:, 7].copy(),
-            bodies=data[:, 8].astype(np.int64) if "mol" in self._columns else None,
+            ids=data["id"].astype(np.int64),
+            positions=positions,
+            velocities=_side_by_side(data, layout.velocities) if layout.velocities else None,
+            radii=radii,
+            bodies=data["mol"].astype(np.int64) if "mol" in data else None,
             box=header.box,
             boundaries=header.boundaries,
+            contacts=data["contacts"].astype(np.int64) if "contacts" in data else None,
         )
 
-    def _read(self, index: int) -> FloatArray:
-        """Read one frame's columns, (n, columns), ordered by id."""
+    def _read(self, index: int) -> dict[str, FloatArray]:
+        """Read one frame's columns, each (n,) and ordered by id."""
+        columns = self._layout.columns
         try:
             if self._reader is None:
                 # Additional columns are the only exact ones: MDAnalysis keeps positions as
                 # float32 and shifts them to the box's origin. dt only silences its warning.
-                self._reader = DumpReader(
-                    str(self.path), additional_columns=list(self._columns), dt=1.0
-                )
+                self._reader = DumpReader(str(self.path), additional_columns=[*columns], dt=1.0)
             values = self._reader[index].data
-        except (ValueError, IndexError) as error:
+        except (ValueError, IndexError, OverflowError) as error:
             self._reader = None
             raise self._malformed() or DumpError(self.path, f"cannot be read: {error}") from None
-        return np.column_stack([values[name] for name in self._columns])
+        # Copies: MDAnalysis reads the next frame into the same arrays.
+        return {name: np.array(values[name], dtype=np.float64) for name in columns}
 
     def _malformed(self) -> DumpError | None:
         """Find the first row that MDAnalysis cannot read; it does not tell which one it was."""
@@ -119,43 +176,72 @@ class ParticleDump:
         with open_dump(self.path) as dump:
             while header := read_header(dump, self.path, line):
                 rows = read_rows(dump, self.path, header)
-                if error := malformed_row(rows, header, self._columns, self.path):
+                columns = self._layout.columns
+                if error := malformed_row(rows, header, columns, self.path, whole=("id",)):
                     return error
                 line = header.next_line
         return None
 
-    def _check(self, step: int, data: FloatArray) -> None:
-        ids, radii = data[:, 0], data[:, 7]
-        finite = np.isfinite(data)
+    def _check(self, step: int, data: dict[str, FloatArray]) -> None:
+        ids = data["id"]
+
+        def raise_at(row: int, message: str) -> NoReturn:
+            raise DumpError(self.path, f"step {step}, sphere {ids[row]:.0f}: {message}")
+
+        table = np.column_stack(list(data.values()))
+        finite = np.isfinite(table)
         if not finite.all():
             row, column = np.argwhere(~finite)[0]
-            raise DumpError(
-                self.path,
-                f"step {step}, sphere {ids[row]:.0f}: "
-                f"{self._columns[column]} is {data[row, column]}",
-            )
+            raise_at(row, f"{list(data)[column]} is {table[row, column]}")
         if ids[0] < 1 or (np.diff(ids) == 0).any():
             raise DumpError(self.path, f"step {step}: ids must be positive and each there once")
-        if (radii <= 0).any():
-            first = np.argmax(radii <= 0)
-            raise DumpError(
-                self.path, f"step {step}, sphere {ids[first]:.0f}: radius is not positive"
-            )
-        if "mol" in self._columns:
-            bodies = data[:, 8]
-            wrong = (bodies < 0) | (bodies != np.rint(bodies))
+        size = self._layout.size
+        if size is not None and (data[size] <= 0).any():
+            raise_at(int(np.argmax(data[size] <= 0)), f"{size} is not positive")
+        for name in self._layout.whole:
+            values = data[name]
+            wrong = (values < 0) | (values != np.rint(values))
             if wrong.any():
-                first = np.argmax(wrong)
-                raise DumpError(
-                    self.path,
-                    f"step {step}, sphere {ids[first]:.0f}: mol must be a body's number or 0, "
-                    f"not {bodies[first]:g}",
-                )
+                first = int(np.argmax(wrong))
+                raise_at(first, f"{name} must be {WHOLE_NUMBERS[name]}, not {values[first]:g}")
 
 
-def read_particle_frame(path: str | PathLike[str], index: int = -1) -> ParticleFrame:
-    """Read one frame of a particle dump, by default the last."""
-    return ParticleDump(path)[index]
+def read_particle_frame(
+    path: str | PathLike[str], index: int = -1, *, radius: float | None = None
+) -> ParticleFrame:
+    """Read one frame of a particle dump, by default the last.
+
+    Parameters
+    ----------
+    path : of the dump, plain text or compressed by gzip
+    index : of the frame; negative indices count from the end
+    radius : of all spheres, length, where the dump has neither `radius` nor `diameter`
+    """
+    return ParticleDump(path, radius=radius)[index]
+
+
+def _side_by_side(data: dict[str, FloatArray], names: Sequence[str]) -> FloatArray:
+    """Return some columns as one array (n, columns)."""
+    return np.column_stack([data[name] for name in names])
+
+
+def _layout(header: FrameHeader, path: Path, radius: float | None) -> _Layout:
+    """Choose among the columns that are there; raise with their names where that is impossible."""
+    require_columns(header, ("id",), path)
+    there = set(header.columns)
+    whole = [names for names in POSITIONS if there.issuperset(names)]
+    if not whole:
+        others = "; ".join(", ".join(names) for names in POSITIONS[1:])
+        raise missing_columns(header, path, f"x, y, z (nor {others})")
+    size = next((name for name in ("radius", "diameter") if name in there), None)
+    if size is None and radius is None:
+        raise missing_columns(header, path, "radius (nor diameter), and no radius is given")
+    return _Layout(
+        positions=whole[0],
+        velocities=VELOCITIES if there.issuperset(VELOCITIES) else (),
+        size=size,
+        whole=tuple(name for name in WHOLE_NUMBERS if name in there),
+    )
 
 
 def _scanned_headers(path: Path) -> list[FrameHeader]:
@@ -164,7 +250,6 @@ def _scanned_headers(path: Path) -> list[FrameHeader]:
     line = 1
     with open_dump(path) as dump:
         while header := read_header(dump, path, line):
-            require_columns(header, COLUMNS, path)
             if header.rows == 0:
                 raise DumpError(path, f"the frame of step {header.step} has no spheres", line + 3)
             first = headers[0] if headers else header

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lammps_inelastic.analysis import DumpError, ParticleDump, read_particle_frame
+from lammps_inelastic.analysis import DumpError, InputError, ParticleDump, read_particle_frame
 
 FIRST = [1, 1, 0.12345678901234567, 0.1, 0.5, 0.0, -1.0 / 3.0, 0.0, 0.055]
 SECOND = [2, 1, 0.7, 1e-17, 0.5, 1e-300, 0.0, 2.0, 0.11]
@@ -24,6 +25,95 @@ def test_float64_survives(write_particles):
     assert frame.boundaries == ("ff", "ff", "ff")
     assert frame.step == 7
     assert frame.bodies is None
+    assert frame.contacts is None
+
+
+# A box that starts elsewhere than at the origin, and a place in it that float32 does not hold.
+BOX = np.array([[-2.0, 1.0], [0.5, 5.5], [1e3, 1.001e3]])
+SHARES = np.array([0.1234567890123456, -0.25, 1.75])
+PLACE = BOX[:, 0] + SHARES * (BOX[:, 1] - BOX[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("names", "values"),
+    [("x y z", PLACE), ("xu yu zu", PLACE), ("xs ys zs", SHARES), ("xsu ysu zsu", SHARES)],
+)
+def test_positions_in_any_convention(write_particles, names, values):
+    path = write_particles({0: [[3, *values, 0.4]]}, f"id {names} diameter")
+    text = path.read_text().splitlines(keepends=True)
+    text[5:8] = [f"{lower:.17g} {upper:.17g}\n" for lower, upper in BOX]
+    path.write_text("".join(text))
+    frame = read_particle_frame(path)
+    # The same float64 operations on numbers that 17 digits give back.
+    assert frame.positions.tolist() == [PLACE.tolist()]
+    assert frame.radii.tolist() == [0.2]
+    assert frame.velocities is None
+
+
+def test_lengths_come_before_shares_of_the_box(write_particles):
+    path = write_particles({0: [[1, 0.9, 0.9, 0.9, 7, 8, 9, 1]]}, "id xs ys zs x y z radius")
+    assert read_particle_frame(path).positions.tolist() == [[7, 8, 9]]
+
+
+def test_radius_comes_before_diameter_and_both_before_a_given_one(write_particles):
+    path = write_particles({0: [[1, 0, 0, 0, 8, 3]]}, "id x y z diameter radius")
+    assert read_particle_frame(path, radius=1.0).radii.tolist() == [3]
+    path = write_particles({0: [[1, 0, 0, 0]], 5: [[1, 0, 0, 1]]}, "id x y z")
+    assert read_particle_frame(path, radius=0.125).radii.tolist() == [0.125]
+    assert [frame.radii.tolist() for frame in ParticleDump(path, radius=2)] == [[2], [2]]
+
+
+@pytest.mark.parametrize("radius", [0, -1, np.nan, np.inf])
+def test_radius_that_is_none(write_particles, radius):
+    with pytest.raises(InputError, match="a radius must be positive and finite, not"):
+        ParticleDump(write_particles({0: [FIRST]}), radius=radius)
+
+
+def test_two_of_three_velocities_are_none(write_particles):
+    path = write_particles({0: [[1, 0, 0, 0, 5, 6, 1]]}, "id x y z vx vy radius")
+    assert read_particle_frame(path).velocities is None
+
+
+def test_contacts_of_each_sphere(write_particles):
+    rows = [[2, 0, 0, 0, 1, 7], [1, 0, 0, 0, 1, 0]]
+    frame = read_particle_frame(write_particles({0: rows}, "id x y z radius contacts"))
+    assert frame.contacts is not None
+    assert frame.contacts.tolist() == [0, 7]
+
+
+@pytest.mark.parametrize("contacts", [-1, 2.5])
+def test_contacts_that_are_no_number_of_contacts(write_particles, contacts):
+    path = write_particles({0: [[1, 0, 0, 0, 1, contacts]]}, "id x y z radius contacts")
+    message = f"sphere 1: contacts must be a number of contacts, not {contacts}"
+    with pytest.raises(DumpError, match=message):
+        read_particle_frame(path)
+
+
+def test_a_frame_keeps_its_numbers_when_the_next_is_read(write_particles):
+    frames = {step: [[1, 1, step, 0, 0, step, 0, 0, 1 + step]] for step in (0, 1)}
+    dump = ParticleDump(write_particles(frames))
+    first, _ = dump[0], dump[1]
+    assert (first.positions[0, 0], first.velocities[0, 0], first.radii[0]) == (0, 0, 1)
+
+
+def compressed(path: Path) -> Path:
+    target = path.with_name("dump.gz")
+    target.write_bytes(gzip.compress(path.read_bytes()))
+    return target
+
+
+def test_compressed_dump(write_particles):
+    frames = {step: [[1, 1, step / 8, 0, 0, 0, 0, 0, 1]] for step in (0, 3, 5)}
+    dump = ParticleDump(compressed(write_particles(frames)))
+    assert [frame.positions[0, 0] for frame in dump] == [0, 3 / 8, 5 / 8]
+    assert dump[0].step == 0
+
+
+def test_compressed_dump_that_was_cut_off(write_particles):
+    path = compressed(write_particles({step: [FIRST, SECOND] for step in range(100)}))
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(DumpError, match=r"dump\.gz: cannot be unpacked: Compressed file ended"):
+        read_particle_frame(path)
 
 
 def test_rows_come_ordered_by_id(write_particles):
@@ -114,9 +204,23 @@ def test_empty_file(tmp_path):
         read_particle_frame(tmp_path / "empty")
 
 
-def test_missing_column_names_what_is_there(write_particles):
-    path = write_particles({0: [[1, 0.5, 0.5, 0.5]]}, "id x y z")
-    with pytest.raises(DumpError, match="line 9: no column vx, vy, vz, radius; there is id x y z"):
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ("type x y z radius", "no column id; there is type x y z radius"),
+        (
+            "id x y xs ys",
+            r"no column x, y, z \(nor xu, yu, zu; xs, ys, zs; xsu, .*\); there is id x y xs ys",
+        ),
+        (
+            "id x y z vx",
+            r"no column radius \(nor diameter\), and no radius is given; there is id x",
+        ),
+    ],
+)
+def test_missing_column_names_what_is_there(write_particles, columns, message):
+    path = write_particles({0: [[1, 0.5, 0.5, 0.5, 0.5]]}, columns)
+    with pytest.raises(DumpError, match=f"line 9: {message}"):
         read_particle_frame(path)
 
 
@@ -173,6 +277,8 @@ def test_columns_change(write_particles):
         (" 0.11 ", " inf ", "step 0, sphere 2: radius is inf"),
         (" 0.11 ", " 0 ", "step 0, sphere 2: radius is not positive"),
         (" 0.11 ", " \xe9 ", "line 11: radius = .* is no number"),
+        ("\n2 1", "\n2.5 1", r"line 11: id = '2\.5' is no whole number"),
+        ("\n2 1", "\n2e0 1", "line 11: id = '2e0' is no whole number"),
         ("\n2 1", "\n1 1", "step 0: ids must be positive and each there once"),
         ("ff ff ff", "xy xz yz ff ff ff", "line 5: expected an orthogonal box"),
         ("e+00 5.0", "e+00 -5.0", "line 7: box bounds 0 -5 are not in order"),
