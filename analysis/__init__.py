@@ -20,6 +20,7 @@ from .export import (
     write_xyz,
 )
 from .geometry import particles_inside
+from .neighbours import DistanceContacts, contacts_by_distance
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import PackingFraction, packing_fraction
@@ -31,6 +32,7 @@ __all__ = [
     "ContactCounts",
     "ContactFrame",
     "CoordinationNumber",
+    "DistanceContacts",
     "DumpError",
     "ExportError",
     "InputError",
@@ -44,6 +46,7 @@ __all__ = [
     "VoxelImage",
     "WallOverlap",
     "contact_counts",
+    "contacts_by_distance",
     "coordination_number",
     "dimer_orientation",
     "draw_packing",

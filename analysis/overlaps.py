@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
 
 from .errors import InputError
 from .geometry import as_box, as_spheres
+from .neighbours import near_pairs
 
 FACES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
@@ -60,27 +60,19 @@ def largest_pair_overlap(
     """
     centres, radius = as_spheres(positions, radii)
     count = len(radius)
-    # r_i + r_j is at most twice the larger radius: seen from its larger sphere, a touching pair
-    # is within 2 r. One search reach for all would list far too many pairs of small spheres.
-    found = KDTree(centres).query_ball_point(centres, 2 * radius, return_sorted=False)
-    larger = np.repeat(np.arange(count), [len(near) for near in found])
-    smaller = np.concatenate(found).astype(np.int64)
-    once = (radius[smaller] < radius[larger]) | (
-        (radius[smaller] == radius[larger]) & (smaller > larger)
-    )
+    first, second = near_pairs(centres, radius, 0.0).T
     if bodies is not None:
         body = np.asarray(bodies, dtype=np.int64)
         if body.shape != (count,):
             raise InputError(f"bodies must have shape ({count},), not {body.shape}")
-        once &= (body[larger] != body[smaller]) | (body[larger] == 0)
-    first, second = larger[once], smaller[once]
+        free = (body[first] != body[second]) | (body[first] == 0)
+        first, second = first[free], second[free]
     distance = np.linalg.norm(centres[first] - centres[second], axis=1)
     depth = radius[first] + radius[second] - distance
     if len(depth) == 0 or depth.max() <= 0:
         return PairOverlap(0.0, None)
     deepest = np.argmax(depth)
-    i, j = sorted((int(first[deepest]), int(second[deepest])))
-    return PairOverlap(float(depth[deepest]), (i, j))
+    return PairOverlap(float(depth[deepest]), (int(first[deepest]), int(second[deepest])))
 
 
 def largest_wall_overlap(
