@@ -26,6 +26,7 @@ from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wa
 from .packing import PackingFraction, packing_fraction
 from .particles import ParticleDump, ParticleFrame, read_particle_frame
 from .pictures import draw_packing
+from .volumes import particle_volumes_in_box, sphere_volumes_in_box
 
 __all__ = [
     "AnalysisError",
@@ -55,8 +56,10 @@ __all__ = [
     "largest_pair_overlap",
     "largest_wall_overlap",
     "packing_fraction",
+    "particle_volumes_in_box",
     "particles_inside",
     "read_particle_frame",
+    "sphere_volumes_in_box",
     "voxel_shape",
     "voxel_slices",
     "write_raw",
