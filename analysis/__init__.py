@@ -23,7 +23,12 @@ from .geometry import particles_inside
 from .neighbours import DistanceContacts, contacts_by_distance
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
-from .packing import PackingFraction, packing_fraction
+from .packing import (
+    ExactPackingFraction,
+    PackingFraction,
+    exact_packing_fraction,
+    packing_fraction,
+)
 from .particles import ParticleDump, ParticleFrame, read_particle_frame
 from .pictures import draw_packing
 from .volumes import particle_volumes_in_box, sphere_volumes_in_box
@@ -35,6 +40,7 @@ __all__ = [
     "CoordinationNumber",
     "DistanceContacts",
     "DumpError",
+    "ExactPackingFraction",
     "ExportError",
     "InputError",
     "Orientation",
@@ -51,6 +57,7 @@ __all__ = [
     "coordination_number",
     "dimer_orientation",
     "draw_packing",
+    "exact_packing_fraction",
     "group_spheres",
     "iterate_contact_frames",
     "largest_pair_overlap",

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
+from .bodies import Particles
 from .errors import InputError
-from .geometry import FloatArray, as_box, as_spheres
+from .geometry import BoolArray, FloatArray, as_box, as_spheres
+from .neighbours import near_pairs
+from .volumes import Pieces, pieces_of, split
 
 # Points are drawn in batches: the memory stays small, however many are asked for.
 BATCH = 250_000
@@ -30,6 +34,23 @@ class PackingFraction:
     value: float
     uncertainty: float
     points: int
+
+
+@dataclass(frozen=True)
+class ExactPackingFraction:
+    """A packing fraction from the exact volumes of spheres and dimers in a box.
+
+    Attributes
+    ----------
+    value : sum of the particles' volumes in the box over the box's volume; where different
+        particles overlap, their common volume counts for each of them
+    overlap : sum of the common volumes in the box, over all pairs of spheres of different
+        particles, over the box's volume. The share that is covered at all lies between
+        `value - overlap` and `value`; it is `value - overlap` if no point is in two of these pairs
+    """
+
+    value: float
+    overlap: float
 
 
 def packing_fraction(
@@ -65,18 +86,67 @@ def packing_fraction(
     )
     if not reaches_box.any():
         return PackingFraction(0.0, 0.0, points)
-    covers = _Cover(centres[reaches_box], radius[reaches_box])
+    cover = Cover(centres[reaches_box], radius[reaches_box])
+    return share_of_points(cover.holds, bounds, points, seed)
 
+
+def exact_packing_fraction(
+    positions: ArrayLike,
+    radii: ArrayLike,
+    box: ArrayLike,
+    particles: Particles | None = None,
+) -> ExactPackingFraction:
+    """Compute the packing fraction of spheres and dimers in a box without random points.
+
+    Within a dimer, what both spheres cover counts once; between different particles it counts
+    twice, see `ExactPackingFraction.overlap`. Spheres that stick out of the box count with their
+    part inside. Bodies of three or more spheres are refused. Nothing is periodic.
+
+    Parameters
+    ----------
+    positions : (n, 3), of the spheres, length
+    radii : (n,), of the spheres, length
+    box : (3, 2), lower and upper bound per axis, length
+    particles : which spheres make up which particle; without, every sphere is one
+    """
+    centres, radius = as_spheres(positions, radii)
+    bounds = as_box(box)
+    lower, upper = bounds.T
+    pieces = pieces_of(centres, radius, particles)
+    volume = float(pieces.volumes_in(lower, upper).sum())
+
+    common = 0.0
+    size = radius[:, None]
+    near = np.flatnonzero(((centres + size > lower) & (centres - size < upper)).all(axis=1))
+    if len(near):
+        one, other = near[near_pairs(centres[near], radius[near], 0.0)].T
+        if particles is not None:
+            apart = particles.index[one] != particles.index[other]
+            one, other = one[apart], other[apart]
+        for part in split(centres, radius, one, other):
+            # The common part of two balls is what each one's part of the union leaves out.
+            rest = Pieces(part.centres, part.radii, -part.normals, -part.offsets, part.particles)
+            rest = rest[rest.offsets > -np.inf]
+            common += float(rest.volumes_in(lower, upper).sum())
+    size_of_box = float(np.prod(upper - lower))
+    return ExactPackingFraction(volume / size_of_box, common / size_of_box)
+
+
+def share_of_points(
+    holds: Callable[[FloatArray], BoolArray], bounds: FloatArray, points: int, seed: int
+) -> PackingFraction:
+    """Count the uniform random points in a box, (k, 3) at a time, that `holds` says yes to."""
     generator = np.random.default_rng(seed)
     inside = 0
     for start in range(0, points, BATCH):
         batch = min(BATCH, points - start)
-        inside += covers.count(generator.uniform(bounds[:, 0], bounds[:, 1], (batch, 3)))
+        drawn = generator.uniform(bounds[:, 0], bounds[:, 1], (batch, 3))
+        inside += int(np.count_nonzero(holds(drawn)))
     value = inside / points
     return PackingFraction(value, math.sqrt(value * (1 - value) / points), points)
 
 
-class _Cover:
+class Cover:
     """The union of spheres of any radii, as one nearest-neighbour search in four dimensions.
 
     The nearest centre decides nothing when the radii differ. A point p is in sphere i exactly if
@@ -90,9 +160,10 @@ class _Cover:
         lift = np.sqrt(self._largest**2 - radii**2)
         self._tree = KDTree(np.column_stack([centres, lift]))
 
-    def count(self, points: FloatArray) -> int:
-        """Count the points, (k, 3), that lie in a sphere."""
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Say which of the points, (k, 3), lie in a sphere."""
         lifted = np.column_stack([points, np.zeros(len(points))])
         # Points without a neighbour within the bound come back at infinity.
         distance, _ = self._tree.query(lifted, distance_upper_bound=self._largest)
-        return int(np.count_nonzero(np.isfinite(distance)))
+        inside: BoolArray = np.isfinite(distance)
+        return inside
