@@ -20,6 +20,12 @@ from .export import (
     write_xyz,
 )
 from .geometry import particles_inside
+from .necks import (
+    dimer_volume,
+    neck_volume,
+    packing_fraction_with_necks,
+    with_scaled_necks,
+)
 from .neighbours import DistanceContacts, contacts_by_distance
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
@@ -56,19 +62,23 @@ __all__ = [
     "contacts_by_distance",
     "coordination_number",
     "dimer_orientation",
+    "dimer_volume",
     "draw_packing",
     "exact_packing_fraction",
     "group_spheres",
     "iterate_contact_frames",
     "largest_pair_overlap",
     "largest_wall_overlap",
+    "neck_volume",
     "packing_fraction",
+    "packing_fraction_with_necks",
     "particle_volumes_in_box",
     "particles_inside",
     "read_particle_frame",
     "sphere_volumes_in_box",
     "voxel_shape",
     "voxel_slices",
+    "with_scaled_necks",
     "write_raw",
     "write_stl",
     "write_tiff",

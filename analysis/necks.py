@@ -1,0 +1,173 @@
+"""The neck of a dimer: the volume near its junction that no sphere of the same size can reach.
+
+Section 3.2 of the paper adds it to the particle by thought (the second curve of its Figure 11). A
+sphere of radius r that rolls around the junction of a dimer's two spheres of radius r touches both:
+its centre runs on a circle of radius sqrt(4 r^2 - D^2 / 4) around the axis, with D the distance of
+the two centres. The neck lies between the two spheres and the torus that the rolling sphere sweeps.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import KDTree
+from scipy.special import spherical_jn
+
+from .bodies import Particles
+from .errors import InputError
+from .geometry import BoolArray, FloatArray, IntArray, as_box, as_spheres
+from .packing import Cover, PackingFraction, share_of_points
+from .volumes import dimer_spheres, require_dimers
+
+# Positions in a dump are rounded: two spheres that touch may seem a little apart, and two equal
+# radii may differ. Relative.
+TOLERANCE = 1e-6
+
+
+def dimer_volume(radius: float, distance: float) -> float:
+    """Return the volume of the union of two equal spheres, length^3.
+
+    Parameters
+    ----------
+    radius : of both spheres, length
+    distance : of their centres, 0 < distance <= 2 radius, length
+    """
+    _check(radius, distance)
+    overlap = max(2 * radius - distance, 0)
+    return 8 / 3 * math.pi * radius**3 - math.pi / 12 * (4 * radius + distance) * overlap**2
+
+
+def neck_volume(radius: float, distance: float) -> float:
+    """Return the volume of a dimer's neck, length^3.
+
+    At the height z along the axis, from the junction up to a quarter of the distance D on either
+    side, the neck is the ring between the sphere, of squared radius r^2 - (D / 2 - |z|)^2, and the
+    torus, of radius sqrt(4 r^2 - D^2 / 4) - sqrt(r^2 - z^2). The integral is
+
+        V = 4 pi r^3 (sin(b) - b cos(b)), sin(b) = D / (4 r).
+
+    Parameters
+    ----------
+    radius : r, of both spheres, length
+    distance : D, of their centres, 0 < distance <= 2 radius, length
+    """
+    _check(radius, distance)
+    angle = math.asin(min(distance / (4 * radius), 0.5))
+    # sin(b) - b cos(b), without cancellation where the angle is small.
+    return float(4 * math.pi * radius**3 * angle**2 * spherical_jn(1, angle))
+
+
+def with_scaled_necks(value: float, radius: float, distance: float) -> float:
+    """Return the packing fraction of equal dimers scaled as if each was as large as with its neck.
+
+    value (V + V_neck) / V. Necks of different dimers may overlap, and then count twice here; also,
+    this says nothing of what the box cuts. `packing_fraction_with_necks` measures both.
+
+    Parameters
+    ----------
+    value : packing fraction of the dimers
+    radius : of all spheres, length
+    distance : of the two centres of each dimer, 0 < distance <= 2 radius, length
+    """
+    return value * (1 + neck_volume(radius, distance) / dimer_volume(radius, distance))
+
+
+def packing_fraction_with_necks(
+    positions: ArrayLike,
+    radii: ArrayLike,
+    box: ArrayLike,
+    particles: Particles,
+    *,
+    points: int = 1_000_000,
+    seed: int = 0,
+) -> PackingFraction:
+    """Measure the share of a box that lies in a sphere or in a dimer's neck, with random points.
+
+    Overlaps, also of necks, count once. Free spheres have no neck; bodies of three or more spheres
+    and dimers of unequal spheres are refused. With the same seed, the points are those of
+    `packing_fraction`. Nothing is periodic.
+
+    Parameters
+    ----------
+    positions : (n, 3), of the spheres, length
+    radii : (n,), of the spheres, length
+    box : (3, 2), lower and upper bound per axis, length
+    particles : which spheres make up which particle
+    points : number of random points
+    seed : of numpy's default generator
+    """
+    centres, radius = as_spheres(positions, radii)
+    bounds = as_box(box)
+    if points < 1:
+        raise InputError(f"at least one point is needed, not {points}")
+    particles.checked(centres)
+    require_dimers(particles)
+    one, other = dimer_spheres(particles)
+    unequal = np.flatnonzero(abs(radius[one] - radius[other]) > TOLERANCE * radius[one])
+    if len(unequal):
+        raise InputError(
+            "only a dimer of two equal spheres has a neck: the radii in body "
+            f"{particles.bodies[particles.index[one[unequal[0]]]]} are "
+            f"{radius[one[unequal[0]]]:g} and {radius[other[unequal[0]]]:g}"
+        )
+    distance = np.linalg.norm(centres[other] - centres[one], axis=1)
+    for extreme in (np.argmin, np.argmax):
+        if len(distance):
+            dimer = extreme(distance / radius[one])
+            _check(float(radius[one[dimer]]), float(distance[dimer]))
+    cover = Cover(centres, radius)
+    necks = _Necks(centres, radius, one, other)
+
+    def holds(drawn: FloatArray) -> BoolArray:
+        inside = cover.holds(drawn)
+        left = np.flatnonzero(~inside)
+        inside[left] = necks.hold(drawn[left])
+        return inside
+
+    return share_of_points(holds, bounds, points, seed)
+
+
+class _Necks:
+    """The necks of some dimers, each within a radius of the middle between its two spheres."""
+
+    def __init__(
+        self, centres: FloatArray, radii: FloatArray, one: IntArray, other: IntArray
+    ) -> None:
+        self._middles = (centres[one] + centres[other]) / 2
+        axes = centres[other] - centres[one]
+        distance = np.linalg.norm(axes, axis=1)
+        self._axes = axes / distance[:, None]
+        self._radii = radii[one]
+        self._heights = distance / 4
+        self._circles = np.sqrt(4 * self._radii**2 - distance**2 / 4)
+
+    def hold(self, points: FloatArray) -> BoolArray:
+        """Say which of the points, (k, 3), none in a sphere, lie in a neck."""
+        inside = np.zeros(len(points), dtype=np.bool_)
+        if len(points) == 0 or len(self._middles) == 0:
+            return inside
+        # The neck is widest where it meets the spheres, at z = D / 4, and its edge there is r
+        # away from the middle.
+        found = KDTree(points).query_ball_point(self._middles, self._radii, return_sorted=False)
+        dimer = np.repeat(np.arange(len(found)), [len(near) for near in found])
+        point = np.concatenate(found).astype(np.int64)
+        arm = points[point] - self._middles[dimer]
+        height = (arm * self._axes[dimer]).sum(axis=1)
+        across = np.sqrt(np.maximum((arm**2).sum(axis=1) - height**2, 0))
+        # The height is at most a radius: the square root is that of a positive number.
+        torus = self._circles[dimer] - np.sqrt(np.maximum(self._radii[dimer] ** 2 - height**2, 0))
+        inside[point[(abs(height) <= self._heights[dimer]) & (across <= torus)]] = True
+        return inside
+
+
+def _check(radius: float, distance: float) -> None:
+    # Written so that NaN fails too.
+    if not 0 < radius < math.inf:
+        raise InputError(f"a radius must be positive and finite, not {radius:g}")
+    if not 0 < distance <= 2 * radius * (1 + TOLERANCE):
+        raise InputError(
+            f"the distance of a dimer's centres must be above 0 and at most {2 * radius:g}, two "
+            f"radii, not {distance:g}"
+        )
