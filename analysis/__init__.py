@@ -37,6 +37,12 @@ from .packing import (
 )
 from .particles import ParticleDump, ParticleFrame, read_particle_frame
 from .pictures import draw_packing
+from .profile import (
+    WallProfile,
+    mueller_packing_fraction,
+    wall_profile,
+    wall_profile_monte_carlo,
+)
 from .volumes import particle_volumes_in_box, sphere_volumes_in_box
 
 __all__ = [
@@ -58,6 +64,7 @@ __all__ = [
     "PictureError",
     "VoxelImage",
     "WallOverlap",
+    "WallProfile",
     "contact_counts",
     "contacts_by_distance",
     "coordination_number",
@@ -69,6 +76,7 @@ __all__ = [
     "iterate_contact_frames",
     "largest_pair_overlap",
     "largest_wall_overlap",
+    "mueller_packing_fraction",
     "neck_volume",
     "packing_fraction",
     "packing_fraction_with_necks",
@@ -78,6 +86,8 @@ __all__ = [
     "sphere_volumes_in_box",
     "voxel_shape",
     "voxel_slices",
+    "wall_profile",
+    "wall_profile_monte_carlo",
     "with_scaled_necks",
     "write_raw",
     "write_stl",
