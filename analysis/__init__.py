@@ -43,10 +43,12 @@ from .profile import (
     wall_profile,
     wall_profile_monte_carlo,
 )
+from .rattlers import Backbone, backbone, contacts_to_hold
 from .volumes import particle_volumes_in_box, sphere_volumes_in_box
 
 __all__ = [
     "AnalysisError",
+    "Backbone",
     "ContactCounts",
     "ContactFrame",
     "CoordinationNumber",
@@ -65,8 +67,10 @@ __all__ = [
     "VoxelImage",
     "WallOverlap",
     "WallProfile",
+    "backbone",
     "contact_counts",
     "contacts_by_distance",
+    "contacts_to_hold",
     "coordination_number",
     "dimer_orientation",
     "dimer_volume",

@@ -75,38 +75,51 @@ def contact_counts(
     particles : which spheres make up which particle, in the order of `sphere_ids`; the result has
         the order of the particles. None: all spheres are free, and in the order of the result
     """
+    sides = contact_sides(contact_ids, sphere_ids, particles)
+    count = len(np.asarray(sphere_ids)) if particles is None else len(particles)
+    with_wall = sides[:, 1] < 0
+    walls = np.bincount(sides[with_wall, 0], minlength=count)
+    pairs = np.sort(sides[~with_wall], axis=1)
+    between = np.bincount(pairs.ravel(), minlength=count)
+    if particles is None or not particles.composite:
+        return ContactCounts(between, between, walls)
+    touching = np.concatenate(np.divmod(np.unique(pairs @ [count, 1]), count))
+    return ContactCounts(between, np.bincount(touching, minlength=count), walls)
+
+
+def contact_sides(
+    contact_ids: ArrayLike, sphere_ids: ArrayLike, particles: Particles | None = None
+) -> IntArray:
+    """Return the particles on both sides of every contact, (m, 2); -k stays for wall k.
+
+    Parameters as for `contact_counts`. Particles are indices, 0 to p - 1.
+    """
     contacts = np.asarray(contact_ids, dtype=np.int64)
     ids = np.asarray(sphere_ids, dtype=np.int64)
     if contacts.ndim != 2 or contacts.shape[1] != 2:
         raise InputError(f"contact ids must have shape (m, 2), not {contacts.shape}")
     if ids.ndim != 1 or len(ids) == 0:
         raise InputError(f"sphere ids must have shape (n,) with n >= 1, not {ids.shape}")
-
     if particles is not None and len(particles.index) != len(ids):
         raise InputError(f"{len(ids)} sphere ids, but {len(particles.index)} spheres in particles")
 
-    with_wall = contacts[:, 1] < 0
-    pairs = _index_of(contacts[~with_wall], ids)
-    at_wall = _index_of(contacts[with_wall, 0], ids)
+    of_spheres = contacts >= 0
+    # The first side is never a wall: a negative number there is an unknown sphere.
+    of_spheres[:, 0] = True
+    sides = contacts.copy()
+    sides[of_spheres] = _index_of(contacts[of_spheres], ids)
     if particles is None or not particles.composite:
-        between = np.bincount(pairs.ravel(), minlength=len(ids))
-        return ContactCounts(between, between, np.bincount(at_wall, minlength=len(ids)))
-
-    sides = np.sort(particles.index[pairs], axis=1)
+        return sides
+    spheres = sides.copy()
+    sides[of_spheres] = particles.index[sides[of_spheres]]
     within = sides[:, 0] == sides[:, 1]
     if within.any():
-        one, other = ids[pairs[within][0]]
+        one, other = ids[spheres[within][0]]
         body = particles.bodies[sides[within][0, 0]]
         raise InputError(
             f"spheres {one} and {other} are in contact, but both belong to body {body}"
         )
-    count = len(particles)
-    touching = np.concatenate(np.divmod(np.unique(sides @ [count, 1]), count))
-    return ContactCounts(
-        particles=np.bincount(sides.ravel(), minlength=count),
-        neighbours=np.bincount(touching, minlength=count),
-        walls=np.bincount(particles.index[at_wall], minlength=count),
-    )
+    return sides
 
 
 def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> CoordinationNumber:
