@@ -27,6 +27,7 @@ from .necks import (
     with_scaled_necks,
 )
 from .neighbours import DistanceContacts, contacts_by_distance
+from .network import contact_graph, draw_network
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import (
@@ -69,11 +70,13 @@ __all__ = [
     "WallProfile",
     "backbone",
     "contact_counts",
+    "contact_graph",
     "contacts_by_distance",
     "contacts_to_hold",
     "coordination_number",
     "dimer_orientation",
     "dimer_volume",
+    "draw_network",
     "draw_packing",
     "exact_packing_fraction",
     "group_spheres",

@@ -1,0 +1,161 @@
+"""The network of contacts as a graph, and its drawing (Figure 8 of Faure et al. 2009)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import networkx
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from numpy.typing import ArrayLike
+
+from .bodies import Particles, group_spheres
+from .coordination import contact_sides
+from .errors import InputError
+from .geometry import FloatArray, as_positions
+
+PALETTE = "viridis"
+# Of the line of the mean force, in points.
+MEAN_WIDTH = 0.8
+# The thickest line, in mean forces: few contacts carry more.
+LARGEST_SHOWN = 4.0
+
+
+def contact_graph(
+    contact_ids: ArrayLike,
+    sphere_ids: ArrayLike,
+    positions: ArrayLike,
+    forces: ArrayLike | None = None,
+    particles: Particles | None = None,
+    *,
+    walls: bool = False,
+) -> networkx.Graph:
+    """Make the graph whose nodes are particles and whose edges join neighbours.
+
+    Node i is particle i, with `position` (its centre, three floats). Node -k is wall k, without a
+    position; a wall that touches nothing has no node. An edge has `contacts`, the number of
+    contacts between the two, and `force`, the sum of their strengths. networkx does the rest:
+    `networkx.connected_components(graph)`, `networkx.has_path(graph, -3, i)`.
+
+    Parameters
+    ----------
+    contact_ids : (m, 2), as for `contact_counts`
+    sphere_ids : (n,), ids of the spheres, in any order
+    positions : (n, 3), of the spheres, in the order of `sphere_ids`, length
+    forces : (m,), strength of each contact, force; None: unknown, edges have no `force`
+    particles : which spheres make up which particle; None: all are free
+    walls : whether walls are nodes too; else contacts with walls are left out
+    """
+    sides = contact_sides(contact_ids, sphere_ids, particles)
+    if particles is None:
+        particles = group_spheres(np.zeros(len(np.asarray(sphere_ids)), dtype=np.int64))
+    centres = particles.centres(positions)
+    strength = None if forces is None else np.asarray(forces, dtype=np.float64)
+    if strength is not None and strength.shape != (len(sides),):
+        raise InputError(f"forces must have shape ({len(sides)},), not {strength.shape}")
+    wanted = np.full(len(sides), True) if walls else sides[:, 1] >= 0
+
+    graph = networkx.Graph()
+    graph.add_nodes_from(
+        (index, {"position": (x, y, z)}) for index, (x, y, z) in enumerate(centres.tolist())
+    )
+    pairs, edge = np.unique(np.sort(sides[wanted], axis=1), axis=0, return_inverse=True)
+    data: dict[str, list[Any]] = {"contacts": np.bincount(edge, minlength=len(pairs)).tolist()}
+    if strength is not None:
+        sums = np.bincount(edge, weights=strength[wanted], minlength=len(pairs))
+        data["force"] = sums.tolist()
+    graph.add_edges_from(
+        (one, other, dict(zip(data, values, strict=True)))
+        for (one, other), values in zip(
+            pairs.tolist(), zip(*data.values(), strict=True), strict=True
+        )
+    )
+    return graph
+
+
+def draw_network(
+    ax: Axes,
+    graph: networkx.Graph,
+    *,
+    up: int = 1,
+    across: int = 0,
+    lower_half: bool = False,
+    palette: str = PALETTE,
+) -> Axes:
+    """Draw the edges between particles as lines between their centres; walls are not drawn.
+
+    Thickness and colour grow with the force, up to four times the mean force. Without forces all
+    lines look alike.
+
+    Parameters
+    ----------
+    ax : flat axes, onto which the packing is projected, or 3-D axes (projection="3d")
+    graph : from `contact_graph`
+    up : axis against gravity, 0 to 2 for x to z
+    across : axis that runs to the right on flat axes, other than `up`
+    lower_half : only edges whose particles are both in the lower half of the packing's height, as
+        in the paper
+    palette : name of a colour map of matplotlib
+    """
+    if not (up in (0, 1, 2) and across in (0, 1, 2) and up != across):
+        raise InputError(f"up and across must be two of the axes 0, 1, 2, not {up} and {across}")
+    nodes = [node for node in graph if node >= 0]
+    place = {node: index for index, node in enumerate(nodes)}
+    centres = as_positions([graph.nodes[node]["position"] for node in nodes])
+    edges = [
+        (one, other, data) for one, other, data in graph.edges(data=True) if min(one, other) >= 0
+    ]
+    ends = np.array([(place[one], place[other]) for one, other, _ in edges], dtype=np.int64)
+    ends = ends.reshape(-1, 2)
+    has_forces = bool(edges) and all("force" in data for *_, data in edges)
+    force = np.array([data["force"] if has_forces else 1.0 for *_, data in edges])
+    if lower_half:
+        height = centres[:, up]
+        below = height <= (height.min() + height.max()) / 2
+        shown = below[ends].all(axis=1)
+        ends, force = ends[shown], force[shown]
+
+    depth = 3 - up - across
+    order = [across, depth, up] if isinstance(ax, Axes3D) else [across, up]
+    # The strongest are drawn last, on top of the others.
+    rank = np.argsort(force, kind="stable")
+    lines: FloatArray = centres[ends[rank]][:, :, order]
+    share = np.zeros(len(force))
+    if has_forces and len(force):
+        share = np.minimum(force[rank] / force.mean(), LARGEST_SHOWN)
+    style: dict[str, Any] = {
+        "linewidths": np.maximum(share, 0.15) * MEAN_WIDTH if has_forces else MEAN_WIDTH,
+        "cmap": palette,
+    }
+    collection: LineCollection
+    if isinstance(ax, Axes3D):
+        collection = Line3DCollection(lines, **style)
+        ax.add_collection3d(collection)
+        ax.set_zlabel("xyz"[up])
+        ax.set_ylabel("xyz"[depth])
+    else:
+        collection = LineCollection(list(lines), **style)
+        ax.add_collection(collection)
+        ax.set_ylabel("xyz"[up])
+    collection.set_array(share)
+    collection.set_clim(0, LARGEST_SHOWN)
+    ax.set_xlabel("xyz"[across])
+    if len(lines):
+        spans = np.ptp(lines.reshape(-1, len(order)), axis=0)
+        starts = lines.reshape(-1, len(order)).min(axis=0)
+        margin = 0.02 * float(spans.max())
+        limits = np.column_stack([starts - margin, starts + spans + margin]).tolist()
+        ax.set_xlim(*limits[0])
+        ax.set_ylim(*limits[1])
+        if isinstance(ax, Axes3D):
+            ax.set_zlim(*limits[2])
+            # Depth runs away from the viewer: where that would mirror the packing it is turned.
+            if (across, depth, up) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
+                ax.invert_yaxis()
+            ax.set_box_aspect(tuple((spans + 2 * margin).tolist()))
+        else:
+            ax.set_aspect("equal")
+    return ax
