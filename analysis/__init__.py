@@ -19,6 +19,9 @@ from .export import (
     write_vtk,
     write_xyz,
 )
+from .coordination import ContactCounts, CoordinationNumber, contact_counts, coordination_number
+from .errors import AnalysisError, DumpError, InputError, PictureError
+from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
 from .geometry import particles_inside
 from .necks import (
     dimer_volume,
@@ -57,6 +60,7 @@ __all__ = [
     "DumpError",
     "ExactPackingFraction",
     "ExportError",
+    "ForceDistribution",
     "InputError",
     "Orientation",
     "PackingFraction",
@@ -72,6 +76,7 @@ __all__ = [
     "contact_counts",
     "contact_graph",
     "contacts_by_distance",
+    "contacts_of",
     "contacts_to_hold",
     "coordination_number",
     "dimer_orientation",
@@ -79,6 +84,7 @@ __all__ = [
     "draw_network",
     "draw_packing",
     "exact_packing_fraction",
+    "force_distribution",
     "group_spheres",
     "iterate_contact_frames",
     "largest_pair_overlap",
@@ -89,6 +95,7 @@ __all__ = [
     "packing_fraction_with_necks",
     "particle_volumes_in_box",
     "particles_inside",
+    "plot_force_distribution",
     "read_particle_frame",
     "sphere_volumes_in_box",
     "voxel_shape",

@@ -1,0 +1,120 @@
+"""Contact forces: which contacts belong to chosen particles, and how their strengths spread."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from .bodies import Particles
+from .coordination import contact_sides
+from .errors import InputError
+from .geometry import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ForceDistribution:
+    """The probability density P(f / <f>) of the strengths f of some contacts.
+
+    Attributes
+    ----------
+    edges : (bins + 1,), of the bins, in mean forces
+    density : (bins,), share of all contacts per unit of f / <f>; its integral is below 1 if some
+        are stronger than the last edge
+    standard_errors : (bins,), of `density`, sqrt(n) / (N width) for n of N contacts in a bin; it
+        takes contacts as independent
+    mean : <f>, force
+    contacts : N, number of contacts
+    """
+
+    edges: FloatArray
+    density: FloatArray
+    standard_errors: FloatArray
+    mean: float
+    contacts: int
+
+
+def contacts_of(
+    chosen: ArrayLike,
+    contact_ids: ArrayLike,
+    sphere_ids: ArrayLike,
+    particles: Particles | None = None,
+    *,
+    walls: bool = False,
+) -> BoolArray:
+    """Say which contacts have a chosen particle on at least one side, (m,).
+
+    Parameters
+    ----------
+    chosen : (p,) of bool, such as the result of `particles_inside`
+    contact_ids : (m, 2), as for `contact_counts`
+    sphere_ids : (n,), ids of the spheres, in any order
+    particles : which spheres make up which particle; None: all are free
+    walls : whether contacts with walls are among them
+    """
+    sides = contact_sides(contact_ids, sphere_ids, particles)
+    mask = np.asarray(chosen, dtype=np.bool_)
+    count = len(np.asarray(sphere_ids)) if particles is None else len(particles)
+    if mask.shape != (count,):
+        raise InputError(f"chosen must have shape ({count},), not {mask.shape}")
+    at_wall = sides[:, 1] < 0
+    of_them: BoolArray = mask[sides[:, 0]]
+    of_them[~at_wall] |= mask[sides[~at_wall, 1]]
+    return of_them if walls else of_them & ~at_wall
+
+
+def force_distribution(
+    forces: ArrayLike, *, bins: int = 50, largest: float = 5.0
+) -> ForceDistribution:
+    """Measure how the strengths of contacts spread around their mean.
+
+    Parameters
+    ----------
+    forces : (m,), of the contacts wanted: `frame.forces[contacts_of(...)]`, or those of several
+        frames one after the other, force
+    bins : number of bins of the same width, from 0
+    largest : upper edge of the last bin, in mean forces
+    """
+    strength = np.asarray(forces, dtype=np.float64)
+    if strength.ndim != 1 or len(strength) == 0:
+        raise InputError(f"forces must have shape (m,) with m >= 1, not {strength.shape}")
+    if not ((strength >= 0) & np.isfinite(strength)).all() or not strength.any():
+        raise InputError("forces must be finite and not negative, and not all of them 0")
+    if bins < 1 or not (largest > 0 and math.isfinite(largest)):
+        raise InputError(
+            f"at least one bin up to a positive force is needed, not {bins}, {largest}"
+        )
+    mean = float(strength.mean())
+    numbers, edges = np.histogram(strength / mean, bins=bins, range=(0.0, largest))
+    scale = len(strength) * np.diff(edges)
+    return ForceDistribution(
+        edges=edges,
+        density=numbers / scale,
+        standard_errors=np.sqrt(numbers) / scale,
+        mean=mean,
+        contacts=len(strength),
+    )
+
+
+def plot_force_distribution(
+    ax: Axes, distribution: ForceDistribution, *, label: str | None = None
+) -> Axes:
+    """Plot P(f / <f>) over f / <f>, on a logarithmic scale; empty bins are left out."""
+    filled = distribution.density > 0
+    middles = (distribution.edges[:-1] + distribution.edges[1:]) / 2
+    ax.errorbar(
+        middles[filled],
+        distribution.density[filled],
+        yerr=distribution.standard_errors[filled],
+        fmt="o-",
+        markersize=3,
+        linewidth=0.8,
+        label=label,
+    )
+    ax.set_yscale("log", nonpositive="mask")
+    ax.set_xlabel("f / <f>")
+    ax.set_ylabel("P(f / <f>)")
+    return ax
