@@ -21,6 +21,7 @@ from .export import (
 )
 from .coordination import ContactCounts, CoordinationNumber, contact_counts, coordination_number
 from .errors import AnalysisError, DumpError, InputError, PictureError
+from .evolution import Evolution, Plateau, measure_evolution, monte_carlo, plateau, plot_evolution
 from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
 from .geometry import particles_inside
 from .necks import (
@@ -60,6 +61,7 @@ __all__ = [
     "DumpError",
     "ExactPackingFraction",
     "ExportError",
+    "Evolution",
     "ForceDistribution",
     "InputError",
     "Orientation",
@@ -70,6 +72,7 @@ __all__ = [
     "Particles",
     "PictureError",
     "VoxelImage",
+    "Plateau",
     "WallOverlap",
     "WallProfile",
     "backbone",
@@ -91,10 +94,14 @@ __all__ = [
     "largest_wall_overlap",
     "mueller_packing_fraction",
     "neck_volume",
+    "measure_evolution",
+    "monte_carlo",
     "packing_fraction",
     "packing_fraction_with_necks",
     "particle_volumes_in_box",
     "particles_inside",
+    "plateau",
+    "plot_evolution",
     "plot_force_distribution",
     "read_particle_frame",
     "sphere_volumes_in_box",
