@@ -50,10 +50,18 @@ from .profile import (
 )
 from .rattlers import Backbone, backbone, contacts_to_hold
 from .volumes import particle_volumes_in_box, sphere_volumes_in_box
+from .structure import (
+    BondOrder,
+    RadialDistribution,
+    bond_order,
+    plot_radial_distribution,
+    radial_distribution,
+)
 
 __all__ = [
     "AnalysisError",
     "Backbone",
+    "BondOrder",
     "ContactCounts",
     "ContactFrame",
     "CoordinationNumber",
@@ -73,9 +81,11 @@ __all__ = [
     "PictureError",
     "VoxelImage",
     "Plateau",
+    "RadialDistribution",
     "WallOverlap",
     "WallProfile",
     "backbone",
+    "bond_order",
     "contact_counts",
     "contact_graph",
     "contacts_by_distance",
@@ -103,6 +113,8 @@ __all__ = [
     "plateau",
     "plot_evolution",
     "plot_force_distribution",
+    "plot_radial_distribution",
+    "radial_distribution",
     "read_particle_frame",
     "sphere_volumes_in_box",
     "voxel_shape",
