@@ -9,6 +9,7 @@ from .coordination import (
     coordination_number,
 )
 from .errors import AnalysisError, DumpError, ExportError, InputError, PictureError
+from .evolution import Evolution, Plateau, measure_evolution, monte_carlo, plateau, plot_evolution
 from .export import (
     VoxelImage,
     voxel_shape,
@@ -19,9 +20,6 @@ from .export import (
     write_vtk,
     write_xyz,
 )
-from .coordination import ContactCounts, CoordinationNumber, contact_counts, coordination_number
-from .errors import AnalysisError, DumpError, InputError, PictureError
-from .evolution import Evolution, Plateau, measure_evolution, monte_carlo, plateau, plot_evolution
 from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
 from .geometry import particles_inside
 from .necks import (
@@ -49,7 +47,6 @@ from .profile import (
     wall_profile_monte_carlo,
 )
 from .rattlers import Backbone, backbone, contacts_to_hold
-from .volumes import particle_volumes_in_box, sphere_volumes_in_box
 from .structure import (
     BondOrder,
     RadialDistribution,
@@ -57,6 +54,7 @@ from .structure import (
     plot_radial_distribution,
     radial_distribution,
 )
+from .volumes import particle_volumes_in_box, sphere_volumes_in_box
 
 __all__ = [
     "AnalysisError",
@@ -67,9 +65,9 @@ __all__ = [
     "CoordinationNumber",
     "DistanceContacts",
     "DumpError",
+    "Evolution",
     "ExactPackingFraction",
     "ExportError",
-    "Evolution",
     "ForceDistribution",
     "InputError",
     "Orientation",
@@ -79,9 +77,9 @@ __all__ = [
     "ParticleFrame",
     "Particles",
     "PictureError",
-    "VoxelImage",
     "Plateau",
     "RadialDistribution",
+    "VoxelImage",
     "WallOverlap",
     "WallProfile",
     "backbone",
@@ -102,10 +100,10 @@ __all__ = [
     "iterate_contact_frames",
     "largest_pair_overlap",
     "largest_wall_overlap",
-    "mueller_packing_fraction",
-    "neck_volume",
     "measure_evolution",
     "monte_carlo",
+    "mueller_packing_fraction",
+    "neck_volume",
     "packing_fraction",
     "packing_fraction_with_necks",
     "particle_volumes_in_box",
