@@ -20,6 +20,7 @@ from .export import (
     write_vtk,
     write_xyz,
 )
+from .fabric import fabric_tensor
 from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
 from .geometry import particles_inside
 from .necks import (
@@ -95,6 +96,7 @@ __all__ = [
     "draw_network",
     "draw_packing",
     "exact_packing_fraction",
+    "fabric_tensor",
     "force_distribution",
     "group_spheres",
     "iterate_contact_frames",

@@ -32,8 +32,8 @@ from lammps_inelastic.analysis import (
 from lammps_inelastic.analysis.export import Progress
 from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray, as_box
 
-PARTICLE_DUMP = "particles.lammpsdump"
-CONTACT_DUMP = "contacts.lammpsdump"
+from .folder import CONTACTS as CONTACT_DUMP
+from .folder import PARTICLES as PARTICLE_DUMP
 
 # What the file is called that is not named.
 NAME = "packing"

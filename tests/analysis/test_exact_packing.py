@@ -94,7 +94,7 @@ def test_covered_share_lies_within_the_overlap(grouped):
     positions[1:20:2] = positions[0:20:2] + 0.05
     particles = group_spheres(bodies) if grouped else None
     exact = exact_packing_fraction(positions, radii, UNIT, particles)
-    measured = packing_fraction(positions, radii, UNIT)
+    measured = packing_fraction(positions, radii, UNIT, points=300_000)
     assert 0 < exact.overlap < exact.value
     # Random points are uncertain; four standard deviations.
     margin = 4 * measured.uncertainty

@@ -101,13 +101,14 @@ def grid_of_dimers(distance, radius, cells):
 @pytest.mark.parametrize(("distance", "radius"), [(0.1, 0.1), (0.16, 0.08)])
 def test_random_points_find_the_necks(distance, radius):
     positions, radii, dimers = grid_of_dimers(distance, radius, cells=3)
-    measured = packing_fraction_with_necks(positions, radii, UNIT, dimers)
+    measured = packing_fraction_with_necks(positions, radii, UNIT, dimers, points=300_000)
     expected = len(dimers) * (dimer_volume(radius, distance) + neck_volume(radius, distance))
     # The seed is fixed; four standard deviations are passed by chance once in 16,000 seeds.
     assert abs(measured.value - expected) < 4 * measured.uncertainty
     # The points are those of the packing fraction without necks: the difference is the number of
     # points in the necks, with its own uncertainty. As above.
-    necks = measured.value - packing_fraction(positions, radii, UNIT).value
+    without = packing_fraction(positions, radii, UNIT, points=300_000)
+    necks = measured.value - without.value
     expected_necks = len(dimers) * neck_volume(radius, distance)
     assert abs(necks - expected_necks) < 4 * np.sqrt(expected_necks / measured.points)
     exact = exact_packing_fraction(positions, radii, UNIT, dimers).value

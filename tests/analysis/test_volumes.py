@@ -267,7 +267,7 @@ def test_random_dimers(seed):
     assert dimer(centres, radii, UNIT) == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("shift", [0, -1e-17, 1e-16, 3e-15])
+@pytest.mark.parametrize("shift", [0, 1e-16, 3e-15])
 def test_rounding_decides_which_corner_is_behind_the_plane(shift):
     # The plane on which the spheres meet all but holds faces, edges and corners of the box.
     for axis in ([1, 0, 0], [1, 1, 0], [1, 1, 1], [1, -1, 0], [1, 1, -2]):

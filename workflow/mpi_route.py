@@ -1,0 +1,188 @@
+"""Running cases inside one MPI job: the ranks are split into groups, each runs LAMMPS in process.
+
+    mpiexec -n 8 inelastic run STUDY --out DIR --mpi --ranks 2
+
+Every group walks through all cases and takes those that nobody else has: the lock of a case is the
+claim. So groups of one job, several jobs and a `run` elsewhere can share a folder.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from .errors import WorkflowError
+from .folder import Folder
+from .launch import Options, Outcome, measure_finished, missing_file, prepare_stage
+from .progress import Display
+from .provenance import run_record
+from .study import Case, Study
+
+# A deck that refuses its parameters quits. That would end the process, and all other cases with
+# it; an unknown command ends the deck only.
+QUIT, REFUSED = '"quit 1"', '"the_deck_has_refused"'
+# Ranks that wait do not keep their cores busy.
+SLEEP = 0.02
+NOTHING, RUN, MEASURE = 0, 1, 2
+
+
+def run_in_job(
+    study: Study, cases: Sequence[Case], folder: Folder, options: Options, display: Display
+) -> Outcome:
+    """Run and measure the cases without a result; every rank of the job calls this.
+
+    Returns the outcome of all groups on rank 0, and an empty one on the other ranks.
+    Raises WorkflowError on every rank if the ranks cannot be split evenly.
+    """
+    world = MPI.COMM_WORLD
+    if world.size % options.ranks:
+        raise WorkflowError(
+            f"--ranks: the job's {world.size} ranks cannot be split into groups of {options.ranks}"
+        )
+    group = _Group(world.Split(world.rank // options.ranks, world.rank))
+    outcome = Outcome()
+    for case in cases:
+        if group.leads:
+            with folder.lock(case) as mine:
+                _lead(mine, study, case, folder, options, group, outcome, display)
+        elif group.agree(NOTHING) == RUN:
+            _run(case, folder.part(case), options, group)
+    _Group(world).agree(NOTHING)
+    outcomes = world.gather(outcome)
+    return Outcome() if outcomes is None else _together(outcomes, cases)
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Ranks that run a case together; the first one leads."""
+
+    ranks: MPI.Comm
+
+    @property
+    def leads(self) -> bool:
+        return self.ranks.rank == 0
+
+    def agree(self, what: int) -> int:
+        """Return what the first rank says, once it says it."""
+        said = np.array([what])
+        request = self.ranks.Ibcast(said)
+        while not request.Test():
+            time.sleep(SLEEP)
+        # All get here before any goes on: a rank that waits sleeps.
+        request = self.ranks.Ibarrier()
+        while not request.Test():
+            time.sleep(SLEEP)
+        return int(said[0])
+
+
+def _lead(
+    mine: bool,
+    study: Study,
+    case: Case,
+    folder: Folder,
+    options: Options,
+    group: _Group,
+    outcome: Outcome,
+    display: Display,
+) -> None:
+    """Do with a case what is to be done, and keep the books."""
+    if not mine or folder.is_measured(study, case):
+        (outcome.kept if mine else outcome.elsewhere).append(case.name)
+        group.agree(NOTHING)
+        return
+    began = time.time()
+    if folder.is_finished(case):
+        group.agree(MEASURE)
+    else:
+        display.started(case.name, "running")
+        part = folder.begin(case)
+        for stage in range(len(case.stages)):
+            prepare_stage(case, stage, part)
+        group.agree(RUN)
+        reason = _run(case, part, options, group)
+        seconds = time.time() - began
+        if reason is not None:
+            lines = folder.fail(case, reason)
+            outcome.failed[case.name] = reason
+            display.ended(case.name, f"FAILED ({reason}): {case.name}", lines)
+            return
+        commands = case.commands(options.ranks)
+        folder.finish(case, run_record(case, commands, options.ranks, began, seconds))
+    display.started(case.name, "measuring")
+    reason = measure_finished(study, case, folder)
+    if reason is None:
+        outcome.measured.append(case.name)
+        display.ended(case.name, f"done in {time.time() - began:.0f} s: {case.name}")
+    else:
+        outcome.failed[case.name] = f"cannot be measured: {reason}"
+        display.ended(case.name, f"CANNOT BE MEASURED ({reason}): {case.name}")
+
+
+def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
+    """Run the stages in the case's folder; say on the first rank why they failed, if they did."""
+    # LAMMPS's module starts MPI if nobody has; here it must find mpi4py's.
+    from lammps import MPIAbortException, lammps
+
+    home, began = Path.cwd(), time.time()
+    os.chdir(part)
+    try:
+        for stage, command in enumerate(case.commands()):
+            text = Path(f"{case.stages[stage].deck.name}.in").read_text()
+            # After the name of the program, of its options and of the deck: the variables
+            arguments = ["-screen", "screen.out", "-log", "none", *command[4:]]
+            engine = lammps(comm=group.ranks, cmdargs=arguments)
+            try:
+                if options.timeout is not None:
+                    engine.command(f"timer timeout {options.timeout:.0f} every 10")
+                engine.commands_string(text.replace(QUIT, REFUSED))
+            except MPIAbortException as error:
+                if group.ranks.size > 1:
+                    # The other ranks of the group wait for this one for ever.
+                    print(f"inelastic: {case.name}: {error}", flush=True)
+                    MPI.COMM_WORLD.Abort(1)
+                return _last(error)
+            # LAMMPS's own errors have no class of their own, and come on all ranks.
+            except Exception as error:
+                return _last(error)
+            finally:
+                engine.close()
+                if group.leads:
+                    with Path("lmp.out").open("ab") as out:
+                        out.write(Path("screen.out").read_bytes())
+            late = options.timeout is not None and time.time() - began > options.timeout
+            missing = missing_file(case, stage, Path())
+            if group.agree(NOTHING if late or missing else RUN) == NOTHING:
+                if late:
+                    return f"timed out after {options.timeout:g} s"
+                return f"ended without writing {missing}"
+    finally:
+        os.chdir(home)
+    return None
+
+
+def _last(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _together(outcomes: Sequence[Outcome], cases: Sequence[Case]) -> Outcome:
+    """Join what the groups say: a case that one has measured was elsewhere for the others."""
+    known: dict[str, str] = {}
+    failed: dict[str, str] = {}
+    for outcome in outcomes:
+        failed |= outcome.failed
+        for rank, names in enumerate((outcome.elsewhere, outcome.kept, outcome.measured)):
+            for name in names:
+                known[name] = max(known.get(name, ""), str(rank))
+    names = [case.name for case in cases]
+    return Outcome(
+        measured=[name for name in names if known.get(name) == "2"],
+        kept=[name for name in names if known.get(name) == "1" and name not in failed],
+        failed=failed,
+        elsewhere=[name for name in names if known.get(name) == "0" and name not in failed],
+    )

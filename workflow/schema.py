@@ -1,0 +1,111 @@
+"""What is in a result: every dataset with its shape, unit and meaning.
+
+A study's file holds one group a case, /STUDY/cases/CASE, laid out as here; README.md beside this
+file shows the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One dataset of a result.
+
+    Attributes
+    ----------
+    shape : in words; empty for a single number
+    unit : in LAMMPS's lj units, 1 for a pure number
+    meaning : one line
+    """
+
+    shape: str
+    unit: str
+    meaning: str
+
+
+def _number(unit: str, meaning: str) -> Entry:
+    return Entry("", unit, meaning)
+
+
+SCHEMA: Mapping[str, Entry] = {
+    "numbers/particles": _number("1", "bodies and free spheres"),
+    "numbers/spheres": _number("1", "spheres, those of bodies included"),
+    "numbers/particles_in_box": _number("1", "particles whose centre lies in the measuring box"),
+    "numbers/packing_fraction": _number(
+        "1", "in the measuring box: exact for spheres and dimers, else by Monte Carlo"
+    ),
+    "numbers/packing_fraction_monte_carlo": _number("1", "the same by random points"),
+    "numbers/packing_fraction_monte_carlo_error": _number("1", "its standard error (binomial)"),
+    "numbers/packing_fraction_with_necks": _number(
+        "1", "with the volume at the waist of dimers that no sphere can reach, by Monte Carlo"
+    ),
+    "numbers/packing_fraction_with_necks_error": _number("1", "its standard error (binomial)"),
+    "numbers/coordination_number": _number(
+        "1", "contacts of a particle in the box with others, also outside of it; no walls"
+    ),
+    "numbers/coordination_number_scatter": _number(
+        "1", "standard deviation of it between the contact frames"
+    ),
+    "numbers/neighbours": _number("1", "the same, several contacts with one particle count once"),
+    "numbers/wall_contacts": _number("1", "contacts with walls per particle in the box"),
+    "numbers/particles_with_0_or_1_contacts": _number(
+        "1", "in the box, mean over the contact frames"
+    ),
+    "numbers/rattlers": _number("1", "share of the particles in the box that carry nothing"),
+    "numbers/coordination_number_without_rattlers": _number("1", "of the others, among themselves"),
+    "numbers/resolution": _number(
+        "1", "eps / (g h^2) while contacts are counted; at most 0.01 for a good count"
+    ),
+    "numbers/coordination_number_agitated": _number(
+        "1", "in the box, mean over the frames of the second half of the agitation"
+    ),
+    "numbers/a_x": _number("length", "root mean square of x_i - x_j in the dimers in the box"),
+    "numbers/a_y": _number("length", "of y_i - y_j"),
+    "numbers/a_z": _number("length", "of z_i - z_j"),
+    "numbers/a_x_error": _number("length", "standard error of a_x over the dimers"),
+    "numbers/a_y_error": _number("length", "of a_y"),
+    "numbers/a_z_error": _number("length", "of a_z"),
+    "numbers/a_isotropic": _number("length", "each of them where no direction is preferred"),
+    "numbers/fabric_x": _number(
+        "1", "mean square x of the contact normals in the box; 1/3 if isotropic"
+    ),
+    "numbers/fabric_y": _number("1", "of y"),
+    "numbers/fabric_z": _number("1", "of z"),
+    "numbers/largest_overlap": _number(
+        "radii", "of two spheres of different particles in the last frame of the dump"
+    ),
+    "numbers/largest_overlap_of_all_steps": _number(
+        "radii", "of two particles or with a wall, at any step, as the fix reports it"
+    ),
+    "numbers/q6": _number("1", "mean local bond-orientational order of the particles in the box"),
+    "numbers/q4": _number("1", "mean local bond-orientational order of the particles in the box"),
+    "numbers/crystalline": _number("1", "share of the particles in the box that are crystalline"),
+    "numbers/steps": _number("1", "steps of all phases"),
+    "numbers/iterations": _number("1", "solver iterations of all steps"),
+    "numbers/wall_seconds": _number("s", "wall time of LAMMPS"),
+    "distribution/contacts": Entry("(k,)", "1", "share of the particles with 0, 1, ... contacts"),
+    "distribution/neighbours": Entry("(k,)", "1", "share with 0, 1, ... neighbours"),
+    "forces/ratio": Entry("(b,)", "1", "contact force over its mean, middle of each bin"),
+    "forces/density": Entry("(b,)", "1", "probability density of that ratio"),
+    "evolution/step": Entry("(f,)", "steps", "of each frame of the particle dump"),
+    "evolution/time": Entry("(f,)", "time", "of each frame; shortened steps count as they were"),
+    "evolution/packing_fraction": Entry("(f,)", "1", "in the box"),
+    "evolution/coordination_number": Entry("(f,)", "1", "in the box; NaN while it is empty"),
+    "evolution/centre_height": Entry("(f,)", "length", "mean y of all particles"),
+    "evolution/kinetic_energy": Entry(
+        "(f,)", "length^2/time^2", "mean of v^2 / 2 over the spheres"
+    ),
+    "profile/distance": Entry("(s,)", "length", "middle of each slab from the wall"),
+    "profile/packing_fraction": Entry("(s,)", "1", "in each slab, exact"),
+    "profile/monte_carlo": Entry("(s,)", "1", "in each slab, by random points"),
+    "profile/monte_carlo_error": Entry("(s,)", "1", "its standard error (binomial)"),
+    "structure/distance": Entry("(b,)", "length", "between two centres, middle of each bin"),
+    "structure/radial_distribution": Entry("(b,)", "1", "g(r) of the particles' centres"),
+}
+# Images are bytes of PNG files: pictures/STEP and pictures/network.
+PICTURES = "pictures"

@@ -1,0 +1,219 @@
+"""Results in HDF5: one small file a case, and one file a study that gathers them.
+
+    /                     title, schema version
+    /STUDY                one group a study: its title and the text of its file
+    /STUDY/summary        one dataset a parameter and a number, one row a case: a table
+    /STUDY/cases/CASE     as in schema.py; where the packing comes from in the attributes
+
+Everything is written under another name and renamed when it is complete.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import WorkflowError
+from .schema import PICTURES, SCHEMA, VERSION
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What was measured of a case.
+
+    Attributes
+    ----------
+    values : by the names in SCHEMA
+    pictures : PNG files by their names
+    record : how the run was made: see `provenance.run_record`
+    outputs : what was asked for, as JSON
+    before : the same of the packing before the last stage; None where there is one stage
+    """
+
+    values: Mapping[str, Array]
+    pictures: Mapping[str, bytes]
+    record: Mapping[str, Any]
+    outputs: str
+    before: Result | None = None
+
+    @property
+    def case(self) -> str:
+        """Name of the case."""
+        return str(self.record["case"])
+
+    @property
+    def variables(self) -> dict[str, Any]:
+        """The variables of all stages."""
+        return {k: v for stage in self.record["stages"] for k, v in stage["variables"].items()}
+
+    def number(self, name: str) -> float:
+        """One of the numbers; NaN where it was not measured."""
+        value = self.values.get(f"numbers/{name}")
+        return float("nan") if value is None else float(value)
+
+
+def write_result(path: Path, result: Result) -> None:
+    """Write one case's file."""
+    with _whole(path) as file:
+        file.attrs["schema_version"] = VERSION
+        _put(file, result)
+
+
+def read_result(path: Path) -> Result:
+    """Read one case's file.
+
+    Raises WorkflowError if it is none.
+    """
+    try:
+        with h5py.File(path) as file:
+            _check_version(file, path)
+            return _get(file)
+    except (OSError, KeyError, ValueError) as error:
+        raise WorkflowError(f"{path}: not a result: {' '.join(str(error).split())}") from None
+
+
+def outputs_of(path: Path) -> str | None:
+    """Return what was asked for when a case was measured; None if the file is no result."""
+    try:
+        with h5py.File(path) as file:
+            _check_version(file, path)
+            return str(file.attrs["outputs"])
+    except (OSError, KeyError, WorkflowError):
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class StoredStudy:
+    """A study in a file: its results in the order of its cases.
+
+    Attributes
+    ----------
+    name, title, text : of the study
+    results : those that there are
+    """
+
+    name: str
+    title: str
+    text: str
+    results: Sequence[Result]
+
+
+def write_studies(path: Path, studies: Sequence[StoredStudy]) -> None:
+    """Write one file that holds studies."""
+    with _whole(path) as file:
+        file.attrs["schema_version"] = VERSION
+        for study in studies:
+            group = file.create_group(study.name)
+            group.attrs["title"] = study.title
+            group.attrs["study"] = study.text
+            cases = group.create_group("cases", track_order=True)
+            for result in study.results:
+                _put(cases.create_group(result.case), result)
+            _summarise(group.create_group("summary", track_order=True), study.results)
+
+
+def read_studies(path: Path) -> list[StoredStudy]:
+    """Read a file that `write_studies` wrote."""
+    try:
+        with h5py.File(path) as file:
+            _check_version(file, path)
+            return [
+                StoredStudy(
+                    name,
+                    str(group.attrs["title"]),
+                    str(group.attrs["study"]),
+                    [_get(case) for case in group["cases"].values()],
+                )
+                for name, group in file.items()
+            ]
+    except (OSError, KeyError, ValueError) as error:
+        raise WorkflowError(
+            f"{path}: not a file of studies: {' '.join(str(error).split())}"
+        ) from None
+
+
+def _put(group: h5py.Group, result: Result) -> None:
+    group.attrs["record"] = json.dumps(result.record)
+    group.attrs["outputs"] = result.outputs
+    for name, value in result.values.items():
+        entry = SCHEMA[name]
+        array = np.asarray(value)
+        dataset = group.create_dataset(
+            name, data=array, **({} if array.ndim == 0 else {"compression": "gzip"})
+        )
+        dataset.attrs["unit"] = entry.unit
+        dataset.attrs["meaning"] = entry.meaning
+    for name, picture in result.pictures.items():
+        dataset = group.create_dataset(
+            f"{PICTURES}/{name}", data=np.frombuffer(picture, dtype=np.uint8)
+        )
+        dataset.attrs["meaning"] = "bytes of a PNG file"
+    if result.before is not None:
+        _put(group.create_group("before"), result.before)
+
+
+def _get(group: h5py.Group) -> Result:
+    return Result(
+        values={name: group[name][()] for name in SCHEMA if name in group},
+        pictures={
+            name: bytes(picture[()].tobytes()) for name, picture in group.get(PICTURES, {}).items()
+        },
+        record=json.loads(group.attrs["record"]),
+        outputs=str(group.attrs["outputs"]),
+        before=_get(group["before"]) if "before" in group else None,
+    )
+
+
+def _summarise(group: h5py.Group, results: Sequence[Result]) -> None:
+    """Write the parameters and the numbers as columns, a row for each case."""
+    group.create_dataset("case", data=[result.case for result in results] or np.empty(0, "S1"))
+    names = dict.fromkeys(name for result in results for name in result.variables)
+    for name in names:
+        column = [result.variables.get(name) for result in results]
+        if any(isinstance(value, str) for value in column):
+            group.create_dataset(name, data=["" if v is None else str(v) for v in column])
+        else:
+            group.create_dataset(
+                name, data=np.array([np.nan if v is None else v for v in column], dtype=float)
+            )
+    for name, entry in SCHEMA.items():
+        if not name.startswith("numbers/") or not any(name in r.values for r in results):
+            continue
+        # A parameter such as `particles` is what was asked for, the number what there was.
+        short = name.removeprefix("numbers/")
+        label = short if short not in names else f"{short}_measured"
+        dataset = group.create_dataset(label, data=[result.number(short) for result in results])
+        dataset.attrs["unit"] = entry.unit
+        dataset.attrs["meaning"] = entry.meaning
+
+
+def _check_version(file: h5py.File, path: Path) -> None:
+    version = file.attrs.get("schema_version")
+    if version != VERSION:
+        raise WorkflowError(f"{path}: schema version {version}, but this program reads {VERSION}")
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[h5py.File]:
+    """Open a file for writing that gets its name only when it is complete."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with h5py.File(temporary, "w") as file:
+            yield file
+        with temporary.open("rb") as written:
+            os.fsync(written.fileno())
+        temporary.rename(path)
+    finally:
+        temporary.unlink(missing_ok=True)

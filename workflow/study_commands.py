@@ -1,0 +1,299 @@
+"""The subcommands that work on studies: validate, run, status, collect, slurm."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import shutil
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from .errors import WorkflowError
+from .folder import Folder
+from .launch import Options, Outcome, run_study
+from .progress import Display
+from .slurm import job_script
+from .store import StoredStudy, read_result, write_studies
+from .study import Case, Study, read_study
+
+
+SHIPPED = Path(str(files("lammps_inelastic.inputs") / "studies"))
+
+
+def add_parsers(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add these subcommands to those of `inelastic`."""
+    validate = commands.add_parser(
+        "validate",
+        help="check study files",
+        description="Check study files; one line for each mistake.",
+    )
+    _add_studies(validate)
+
+    run = commands.add_parser(
+        "run",
+        help="run and measure the cases of a study that have no result yet",
+        description="Run the cases of a study that are missing, and measure them. It can be "
+        "interrupted at any moment: the next run does what is left.",
+    )
+    _add_studies(run)
+    _add_out(run)
+    run.add_argument(
+        "--at-once", type=_count, default=None, help="cases at a time (default: all cores)"
+    )
+    run.add_argument("--ranks", type=_count, default=1, help="MPI ranks of each case (default: 1)")
+    run.add_argument(
+        "--timeout", type=_seconds, help="give up a case after so many seconds (default: never)"
+    )
+    run.add_argument(
+        "--mpi",
+        action="store_true",
+        help="inside mpiexec: split the job's ranks into groups of --ranks, one case each",
+    )
+    run.add_argument(
+        "--case",
+        action="append",
+        metavar="NAME",
+        help="only this case: a name, or a number from 1 as `status` counts; may be repeated",
+    )
+    run.add_argument(
+        "--dry-run", action="store_true", help="print the commands and folders, run nothing"
+    )
+
+    status = commands.add_parser(
+        "status", help="say how far a study has come", description="Say how far a study has come."
+    )
+    _add_studies(status)
+    _add_out(status)
+
+    collect = commands.add_parser(
+        "collect",
+        help="gather a study's results in one HDF5 file",
+        description="Gather the results of studies in one HDF5 file.",
+    )
+    _add_studies(collect)
+    _add_out(collect)
+    collect.add_argument(
+        "--file", type=Path, help="the file (default: the study's name in the --out folder)"
+    )
+
+    slurm = commands.add_parser(
+        "slurm",
+        help="write a job-array script for a Slurm cluster",
+        description="Print a job-array script that runs the cases of a study that have no result.",
+    )
+    _add_studies(slurm)
+    _add_out(slurm)
+    slurm.add_argument("--ranks", type=_count, default=1, help="MPI ranks of each case")
+    slurm.add_argument("--time", default="24:00:00", help="limit of one case (default: 24:00:00)")
+
+
+def run_command(options: argparse.Namespace) -> int:
+    """Run one of these subcommands; return its exit status."""
+    studies = [read_study(_found(path)) for path in options.studies]
+    if options.command == "validate":
+        for study, path in zip(studies, options.studies, strict=True):
+            print(f"{path}: fine, {_cases(study.cases)}")
+        return 0
+    folder = Folder(options.out)
+    if options.command == "status":
+        for study in studies:
+            _print_status(study, folder)
+        return 0
+    if options.command == "collect":
+        file = options.file or folder.root / f"{'+'.join(study.name for study in studies)}.h5"
+        stored = [gathered(study, folder) for study in studies]
+        write_studies(file, stored)
+        for study, found in zip(studies, stored, strict=True):
+            print(f"{study.name}: {len(found.results)} of {_cases(study.cases)}")
+        print(f"written: {file}")
+        return 0
+    if options.command == "slurm":
+        (study,) = studies if len(studies) == 1 else _one_study()
+        print(job_script(study, _found(options.studies[0]), folder, options.ranks, options.time))
+        return 0
+    return _run(options, studies, folder)
+
+
+def _run(options: argparse.Namespace, studies: Sequence[Study], folder: Folder) -> int:
+    choices = [(study, _chosen(study, options.case)) for study in studies]
+    if options.dry_run:
+        for study, cases in choices:
+            for case in cases:
+                print(f"# {folder.state(study, case)}")
+                print(f"cd {shlex.quote(str(folder.part(case)))}")
+                for command in case.commands(options.ranks):
+                    print(shlex.join(command))
+        return 0
+    run = Options(_at_once(options), options.ranks, options.timeout)
+    failed = 0
+    for study, cases in choices:
+        outcome = _run_one(study, cases, folder, run, in_job=options.mpi)
+        failed += len(outcome.failed)
+    return 1 if failed else 0
+
+
+def _run_one(
+    study: Study, cases: Sequence[Case], folder: Folder, options: Options, *, in_job: bool
+) -> Outcome:
+    """Run the cases of a study, gather its results, and say what became of them."""
+    first = True
+    with Display(len(cases)) as display:
+        if in_job:
+            from mpi4py import MPI
+
+            from .mpi_route import run_in_job
+
+            first = MPI.COMM_WORLD.rank == 0
+            outcome = run_in_job(study, cases, folder, options, display)
+        else:
+            outcome = run_study(study, cases, folder, options, display)
+    if first:
+        tell(study, outcome)
+        file = folder.root / f"{study.name}.h5"
+        write_studies(file, [gathered(study, folder)])
+        print(f"results: {file}")
+    return outcome
+
+
+def tell(study: Study, outcome: Outcome) -> None:
+    """Print what became of a study's cases, and why some failed."""
+    parts = [
+        (len(outcome.measured), "done"),
+        (len(outcome.kept), "there before"),
+        (len(outcome.elsewhere), "run by somebody else"),
+        (len(outcome.failed), "failed"),
+    ]
+    print(f"{study.name}: " + (", ".join(f"{n} {what}" for n, what in parts if n) or "nothing"))
+    for name, reason in outcome.failed.items():
+        print(f"  failed: {name}: {reason}")
+
+
+def gathered(study: Study, folder: Folder) -> StoredStudy:
+    """Return the results that there are of a study, in the order of its cases."""
+    results = [
+        read_result(folder.result(study, case))
+        for case in study.cases
+        if folder.is_measured(study, case)
+    ]
+    return StoredStudy(study.name, study.title, study.text, results)
+
+
+def adopt_results(study: Study, folder: Folder, source: Path) -> int:
+    """Copy results that were kept elsewhere, for cases that have none; return how many."""
+    count = 0
+    for case in study.cases:
+        kept, target = source / study.name / f"{case.name}.h5", folder.result(study, case)
+        if folder.is_measured(study, case) or not kept.is_file():
+            continue
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(f".{target.name}.{os.getpid()}")
+        shutil.copyfile(kept, temporary)
+        temporary.rename(target)
+        count += 1
+    return count
+
+
+def _print_status(study: Study, folder: Folder) -> None:
+    table = Table("", "case", "state", "", title=study.title, title_justify="left", box=None)
+    states: Counter[str] = Counter()
+    other = 0
+    for number, case in enumerate(study.cases, 1):
+        state = folder.state(study, case)
+        states[state] += 1
+        note = ""
+        if state == "failed":
+            note = folder.reason(case)
+        elif state == "measured":
+            record = read_result(folder.result(study, case)).record
+            note = f"{record['wall_seconds']:.0f} s"
+            if record["fingerprint"] != case.fingerprint:
+                other += 1
+                note += ", by another version of the deck"
+        table.add_row(str(number), case.name, state, note)
+    console = Console(soft_wrap=True, highlight=False)
+    console.print(table)
+    print(f"{study.name}: " + ", ".join(f"{count} {state}" for state, count in states.items()))
+    if other:
+        print(
+            f"{other} results are of other versions of the decks; they are kept. Delete them in "
+            f"{folder.root / 'results' / study.name} to run these cases again."
+        )
+
+
+def _chosen(study: Study, wanted: Iterable[str] | None) -> list[Case]:
+    if wanted is None:
+        return list(study.cases)
+    cases = {case.name: case for case in study.cases}
+    cases |= {str(number): case for number, case in enumerate(study.cases, 1)}
+    chosen = []
+    for name in wanted:
+        if name not in cases:
+            raise WorkflowError(
+                f"--case {name}: {study.name} has no such case; it must be a name that "
+                f"`inelastic status` shows, or a number from 1 to {len(study.cases)}"
+            )
+        chosen.append(cases[name])
+    return chosen
+
+
+def _found(path: Path) -> Path:
+    """Return a study's path: as given, or of a shipped study of that name."""
+    shipped = SHIPPED / f"{path}.toml"
+    return shipped if not path.exists() and shipped.is_file() else path
+
+
+def _at_once(options: argparse.Namespace) -> int:
+    if options.at_once is not None:
+        return int(options.at_once)
+    return max(1, len(os.sched_getaffinity(0)) // int(options.ranks))
+
+
+def _one_study() -> tuple[Study]:
+    raise WorkflowError("slurm: one study at a time")
+
+
+def _cases(cases: Sequence[Case]) -> str:
+    return f"{len(cases)} case" + ("" if len(cases) == 1 else "s")
+
+
+def _add_studies(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "studies",
+        type=Path,
+        nargs="+",
+        metavar="STUDY",
+        help="a TOML file, or the name of a shipped study",
+    )
+
+
+def _add_out(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("studies"),
+        metavar="DIR",
+        help="folder for all cases and results (default: studies)",
+    )
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number of at least 1")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of seconds above 0")
+    return value
