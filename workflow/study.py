@@ -41,6 +41,8 @@ from .errors import StudyError, WorkflowError
 # A study of more cases is a slip of the pen.
 MOST_CASES = 10_000
 LONGEST_NAME = 160
+# In a case's name even at their defaults; others where they differ.
+ALWAYS_SHOWN = ("particles", "aspect_ratio", "change", "seed")
 
 Bounds = tuple[float, float, float, float, float, float]
 
@@ -158,9 +160,17 @@ class Case:
 
     @cached_property
     def name(self) -> str:
-        """Of the case's folder: what differs from the deck's defaults, and a hash of all values."""
-        changed = {name: v for stage in self.stages for name, v in stage.values.items()}
-        words = [self.deck, *(f"{name}={_as_word(v)}" for name, v in changed.items())]
+        """Of the case's folder: what tells it from others, and a hash of all values.
+
+        It depends on nothing else in the study, so that one can be extended.
+        """
+        shown = {
+            name: value
+            for stage in self.stages
+            for name, value in stage.variables.items()
+            if name in stage.values or name in ALWAYS_SHOWN
+        }
+        words = [self.deck, *(f"{name}={_as_word(v)}" for name, v in shown.items())]
         identity = {
             "stages": [[stage.deck.name, stage.variables] for stage in self.stages],
             "inputs": {name: _hash(path.read_bytes()) for name, path in self.inputs.items()},
