@@ -210,7 +210,8 @@ def _whole(path: Path) -> Iterator[h5py.File]:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        with h5py.File(temporary, "w") as file:
+        # The newer layout has smaller headers, of which there are many here.
+        with h5py.File(temporary, "w", libver=("v110", "v110")) as file:
             yield file
         with temporary.open("rb") as written:
             os.fsync(written.fileno())

@@ -23,7 +23,6 @@ from .slurm import job_script
 from .store import StoredStudy, read_result, write_studies
 from .study import Case, Study, read_study
 
-
 SHIPPED = Path(str(files("lammps_inelastic.inputs") / "studies"))
 
 
@@ -44,13 +43,7 @@ def add_parsers(commands: argparse._SubParsersAction[Any]) -> None:
     )
     _add_studies(run)
     _add_out(run)
-    run.add_argument(
-        "--at-once", type=_count, default=None, help="cases at a time (default: all cores)"
-    )
-    run.add_argument("--ranks", type=_count, default=1, help="MPI ranks of each case (default: 1)")
-    run.add_argument(
-        "--timeout", type=_seconds, help="give up a case after so many seconds (default: never)"
-    )
+    add_options_of_run(run)
     run.add_argument(
         "--mpi",
         action="store_true",
@@ -131,16 +124,21 @@ def _run(options: argparse.Namespace, studies: Sequence[Study], folder: Folder) 
                 for command in case.commands(options.ranks):
                     print(shlex.join(command))
         return 0
-    run = Options(_at_once(options), options.ranks, options.timeout)
+    run = Options(at_once(options), options.ranks, options.timeout)
     failed = 0
     for study, cases in choices:
-        outcome = _run_one(study, cases, folder, run, in_job=options.mpi)
+        outcome = run_one(study, cases, folder, run, in_job=options.mpi)
         failed += len(outcome.failed)
     return 1 if failed else 0
 
 
-def _run_one(
-    study: Study, cases: Sequence[Case], folder: Folder, options: Options, *, in_job: bool
+def run_one(
+    study: Study,
+    cases: Sequence[Case],
+    folder: Folder,
+    options: Options,
+    *,
+    in_job: bool = False,
 ) -> Outcome:
     """Run the cases of a study, gather its results, and say what became of them."""
     first = True
@@ -155,14 +153,14 @@ def _run_one(
         else:
             outcome = run_study(study, cases, folder, options, display)
     if first:
-        tell(study, outcome)
+        _tell(study, outcome)
         file = folder.root / f"{study.name}.h5"
         write_studies(file, [gathered(study, folder)])
         print(f"results: {file}")
     return outcome
 
 
-def tell(study: Study, outcome: Outcome) -> None:
+def _tell(study: Study, outcome: Outcome) -> None:
     """Print what became of a study's cases, and why some failed."""
     parts = [
         (len(outcome.measured), "done"),
@@ -249,7 +247,8 @@ def _found(path: Path) -> Path:
     return shipped if not path.exists() and shipped.is_file() else path
 
 
-def _at_once(options: argparse.Namespace) -> int:
+def at_once(options: argparse.Namespace) -> int:
+    """Return how many cases may run at a time: as asked, or as the cores allow."""
     if options.at_once is not None:
         return int(options.at_once)
     return max(1, len(os.sched_getaffinity(0)) // int(options.ranks))
@@ -261,6 +260,17 @@ def _one_study() -> tuple[Study]:
 
 def _cases(cases: Sequence[Case]) -> str:
     return f"{len(cases)} case" + ("" if len(cases) == 1 else "s")
+
+
+def add_options_of_run(parser: argparse.ArgumentParser) -> None:
+    """Add how cases are run."""
+    parser.add_argument(
+        "--at-once", type=_count, default=None, help="cases at a time (default: all cores)"
+    )
+    parser.add_argument("--ranks", type=_count, default=1, help="MPI ranks of each (default: 1)")
+    parser.add_argument(
+        "--timeout", type=_seconds, help="give up a case after so many seconds (default: never)"
+    )
 
 
 def _add_studies(parser: argparse.ArgumentParser) -> None:
