@@ -85,6 +85,7 @@ RULES: Mapping[str, Rule] = {
     ),
     "dump_every": _integers(1),
     "inertia": _words("point", "solid"),
+    "solver": _words("apgd", "uzawa"),
     "extent": _NOT_NEGATIVE,
     "change": _words("walls", "tilt"),
     "angle": _numbers("from -90 to 90", lambda value: -90 <= value <= 90),

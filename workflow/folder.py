@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from .store import outputs_of
+from .store import origin_of
 from .study import Case, Study
 
 State = Literal["measured", "finished", "running", "cut off", "failed", "missing"]
@@ -79,11 +79,23 @@ class Folder:
     def is_measured(self, study: Study, case: Case) -> bool:
         """Whether there is a result, of what the study asks for now."""
         path = self.result(study, case)
-        return path.is_file() and outputs_of(path) == study.outputs.measured
+        origin = origin_of(path) if path.is_file() else None
+        return origin is not None and origin[0] == study.outputs.measured and case.is_of(origin[1])
 
     def is_finished(self, case: Case) -> bool:
-        """Whether there is a whole run that can still be measured."""
-        return (self.case(case) / FINISHED).is_file() and (self.case(case) / PARTICLES).is_file()
+        """Whether there is a whole run of the case that can still be measured."""
+        folder = self.case(case)
+        try:
+            record = json.loads((folder / FINISHED).read_text())
+            return case.is_of(record) and (folder / PARTICLES).is_file()
+        except (OSError, ValueError, KeyError, TypeError):
+            return False
+
+    def drop_dumps(self, case: Case) -> None:
+        """Delete the dumps of a run that has been measured."""
+        for stage in case.stages:
+            for name in (PARTICLES, CONTACTS):
+                (self.case(case) / case.folder_of(stage) / name).unlink(missing_ok=True)
 
     @contextmanager
     def lock(self, case: Case) -> Iterator[bool]:

@@ -143,6 +143,8 @@ class _Job:
         if self._measuring:
             if code == 0 and self._folder.is_measured(self._study, self._case):
                 outcome.measured.append(name)
+                if self._study.outputs.keep == "results":
+                    self._folder.drop_dumps(self._case)
                 display.ended(name, f"done in {self._seconds:.0f} s: {name}")
                 self._held.close()
                 return False
@@ -238,6 +240,8 @@ def measure_finished(study: Study, case: Case, folder: Folder) -> str | None:
         check=False,
     )
     if done.returncode == 0 and folder.is_measured(study, case):
+        if study.outputs.keep == "results":
+            folder.drop_dumps(case)
         return None
     lines = done.stderr.splitlines()
     return lines[-1] if lines else exit_reason(done.returncode)

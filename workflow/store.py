@@ -83,13 +83,13 @@ def read_result(path: Path) -> Result:
         raise WorkflowError(f"{path}: not a result: {' '.join(str(error).split())}") from None
 
 
-def outputs_of(path: Path) -> str | None:
-    """Return what was asked for when a case was measured; None if the file is no result."""
+def origin_of(path: Path) -> tuple[str, Mapping[str, Any]] | None:
+    """Return a result's outputs and its record, as in `Result`; None if the file is no result."""
     try:
         with h5py.File(path) as file:
             _check_version(file, path)
-            return str(file.attrs["outputs"])
-    except (OSError, KeyError, WorkflowError):
+            return str(file.attrs["outputs"]), json.loads(file.attrs["record"])
+    except (OSError, KeyError, ValueError):
         return None
 
 

@@ -160,7 +160,7 @@ class Case:
 
     @cached_property
     def name(self) -> str:
-        """Of the case's folder: what tells it from others, and a hash of all values.
+        """Of the case's folder: what tells it from others, and a hash of all that is set.
 
         It depends on nothing else in the study, so that one can be extended.
         """
@@ -171,8 +171,13 @@ class Case:
             if name in stage.values or name in ALWAYS_SHOWN
         }
         words = [self.deck, *(f"{name}={_as_word(v)}" for name, v in shown.items())]
+        # Not the defaults: a deck may get a new variable. `is_of` sees whether one has changed.
         identity = {
-            "stages": [[stage.deck.name, stage.variables] for stage in self.stages],
+            "stages": [
+                [stage.deck.name, dict(stage.values)]
+                + ([] if stage.deck.shipped else [stage.deck.fingerprint])
+                for stage in self.stages
+            ],
             "inputs": {name: _hash(path.read_bytes()) for name, path in self.inputs.items()},
         }
         digest = _hash(json.dumps(identity, sort_keys=True).encode())[:8]
@@ -182,6 +187,22 @@ class Case:
     def fingerprint(self) -> str:
         """A hash of what the decks do: another one means that a result is of another deck."""
         return "+".join(stage.deck.fingerprint for stage in self.stages)
+
+    def is_of(self, record: Mapping[str, Any]) -> bool:
+        """Whether a run was made with the values of this case, as far as it had the variables.
+
+        Parameters
+        ----------
+        record : how it was made: see `provenance.run_record`
+        """
+        made = [stage["variables"] for stage in record["stages"]]
+        if len(made) != len(self.stages):
+            return False
+        return all(
+            name not in before or before[name] == value
+            for before, stage in zip(made, self.stages, strict=True)
+            for name, value in stage.variables.items()
+        )
 
     def folder_of(self, stage: Stage) -> str:
         """Where a stage writes, seen from the case's folder; the last one writes into it."""

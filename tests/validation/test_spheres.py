@@ -74,12 +74,12 @@ def thrown(deck: str, velocity: float) -> str:
 
 def in_container(deck: str, container: str, centres: str) -> str:
     """Replace the box of walls and the region in which the spheres start."""
-    box = "create_box      1 container"
+    box = 'else "create_box 1 container"'
     deck = deck.replace(box, f"{box}\n{container}")
     before, _, rest = deck.partition("region          centres block")
     _, _, after = rest.partition("units box")
     deck = f"{before}region          centres {centres} units box{after}"
-    return deck.replace("region container shorten", "region walls shorten")
+    return deck.replace("region container solver", "region walls solver")
 
 
 SCENES = {
