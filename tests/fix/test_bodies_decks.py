@@ -89,7 +89,7 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
         ("dimers.in", {"aspect_ratio": 0.9}, "aspect_ratio must be above 1"),
         ("dimers.in", {"aspect_ratio": 2.1}, "aspect_ratio must be above 1"),
         ("dimers.in", {"inertia": "hollow"}, "inertia must be point or solid"),
-        ("dimers.in", {"start": "ordered"}, "start must be random or regular"),
+        ("dimers.in", {"start": "ordered"}, "start must be random, regular or a data file, not"),
         (
             "dimers.in",
             {"start": "regular", "particles": 2000, "aspect_ratio": 2},
