@@ -41,7 +41,10 @@ class Rule:
 
 
 def _number(value: Value) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    # A whole number may have more digits than float() takes.
+    return abs(value) < 1e300
 
 
 def _numbers(allowed: str, accepts: Callable[[float], bool]) -> Rule:
@@ -152,4 +155,7 @@ def find_deck(name: str, folder: Path) -> Deck:
         raise WorkflowError(
             f"no deck {name!r}: it must be {', '.join(SHIPPED)} or a file as seen from {folder}"
         )
-    return Deck(path.stem, path.read_text(), shipped=False)
+    try:
+        return Deck(path.stem, path.read_text(encoding="utf-8"), shipped=False)
+    except UnicodeDecodeError as error:
+        raise WorkflowError(f"{path}: not UTF-8: {error}") from None

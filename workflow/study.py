@@ -26,6 +26,7 @@ import hashlib
 import itertools
 import json
 import math
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -43,6 +44,9 @@ MOST_CASES = 10_000
 LONGEST_NAME = 160
 # In a case's name even at their defaults; others where they differ.
 ALWAYS_SHOWN = ("particles", "aspect_ratio", "change", "seed")
+
+# Keys of which pydantic has several things to say at a time.
+WHOLE = {("deck",): "a name or a list of names", ("outputs", "box"): "six numbers"}
 
 Bounds = tuple[float, float, float, float, float, float]
 
@@ -98,7 +102,10 @@ class Outputs(_Table):
     @field_validator("box")
     @classmethod
     def _ordered(cls, value: Bounds) -> Bounds:
-        if not all(low < high for low, high in zip(value[::2], value[1::2], strict=True)):
+        if not all(
+            -math.inf < low < high < math.inf
+            for low, high in zip(value[::2], value[1::2], strict=True)
+        ):
             raise ValueError("it must be xlo, xhi, ylo, yhi, zlo, zhi, each lower bound the lesser")
         return value
 
@@ -181,7 +188,8 @@ class Case:
             "inputs": {name: _hash(path.read_bytes()) for name, path in self.inputs.items()},
         }
         digest = _hash(json.dumps(identity, sort_keys=True).encode())[:8]
-        return f"{'_'.join(words)[:LONGEST_NAME]}_{digest}"
+        readable = re.sub(r"[^\w.=+-]", "-", "_".join(words), flags=re.ASCII)
+        return f"{readable[:LONGEST_NAME]}_{digest}"
 
     @property
     def fingerprint(self) -> str:
@@ -256,11 +264,12 @@ def read_study(path: Path) -> Study:
     Raises StudyError with one line for every mistake.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
         content = tomllib.loads(text)
     except OSError as error:
         raise StudyError([f"{path}: {error.strerror}"]) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    # A whole number of thousands of digits is a ValueError too.
+    except ValueError as error:
         raise StudyError([f"{path}: not TOML: {error}"]) from None
     try:
         file = _StudyFile.model_validate(content)
@@ -278,6 +287,7 @@ def read_study(path: Path) -> Study:
 def _cases(file: _StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case]:
     known: set[str] = set()
     seen: set[str] = set()
+    missing = False
     rows = file.rows or [{}]
     for number, row in enumerate(rows, 1):
         where = f"rows[{number}]" if file.rows else "parameters"
@@ -286,10 +296,13 @@ def _cases(file: _StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case
             decks = _decks(row.get("deck", file.deck), folder)
         except WorkflowError as error:
             mistakes.append(f"{where if 'deck' in row else 'deck'}: {error}")
+            missing = True
             continue
         parameters = {name: p for deck in decks for name, p in deck.parameters.items()}
         known |= set(parameters)
-        for name in own.keys() - parameters.keys():
+        for name in own:
+            if name in parameters:
+                continue
             mistakes.append(_unknown(f"{where}.{name}", decks))
         wanted = {f"parameters.{name}": (name, v) for name, v in file.parameters.items()}
         wanted = {key: pair for key, pair in wanted.items() if pair[0] not in own}
@@ -307,8 +320,12 @@ def _cases(file: _StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case
             if case.name not in seen:
                 seen.add(case.name)
                 yield case
-    for name in file.parameters.keys() - known:
-        mistakes.append(_unknown(f"parameters.{name}", _decks_of(file, folder)))
+    if missing:
+        # Their variables are not known.
+        return
+    for name in file.parameters:
+        if name not in known:
+            mistakes.append(_unknown(f"parameters.{name}", _decks_of(file, folder)))
 
 
 def _decks(name: Any, folder: Path) -> list[Deck]:
@@ -354,7 +371,7 @@ def _values(
             )
         elif isinstance(each, float) and not math.isfinite(each):
             mistakes.append(f"{key}: {each} is not allowed: it must be finite")
-        elif isinstance(each, str) and (not each or any(c.isspace() or c in "$\"'&" for c in each)):
+        elif isinstance(each, str) and not _is_word(each):
             mistakes.append(f"{key}: {each!r} must be one word, without spaces, quotes, $ and &")
         elif shipped and name in RULES and not RULES[name].accepts(each):
             mistakes.append(f"{key}: {each} is not allowed: it must be {RULES[name].allowed}")
@@ -367,6 +384,10 @@ def _values(
     return values
 
 
+def _is_word(text: str) -> bool:
+    return text.isprintable() and not re.search(r"[\s$\"'&]|^$", text)
+
+
 def _range(key: str, value: Mapping[str, Any], mistakes: list[str]) -> list[Value]:
     """Return from, from + step, ... up to `to`, which is included where it is met."""
     step = value.get("step", 1)
@@ -376,11 +397,14 @@ def _range(key: str, value: Mapping[str, Any], mistakes: list[str]) -> list[Valu
         mistakes.append(f"{key}: a range is {{ from = A, to = B, step = S }}, three numbers")
         return []
     low, high = value["from"], value["to"]
-    if not (step > 0 and low <= high and math.isfinite(high) and math.isfinite(low)):
+    if not (step > 0 and low <= high and all(abs(end) < math.inf for end in ends)):
         mistakes.append(f"{key}: a range needs from <= to and step > 0, not {dict(value)}")
         return []
-    # A hair more: 0.1 + 2 x 0.1 is above 0.3.
-    count = math.floor((high - low) / step * (1 + 1e-12) + 1e-9) + 1
+    try:
+        # A hair more: 0.1 + 2 x 0.1 is above 0.3.
+        count = math.floor((high - low) / step * (1 + 1e-12) + 1e-9) + 1
+    except OverflowError:
+        count = MOST_CASES + 1
     if count > MOST_CASES:
         mistakes.append(f"{key}: more than {MOST_CASES} values")
         return []
@@ -414,7 +438,19 @@ def _case(decks: Sequence[Deck], values: dict[str, Value], folder: Path) -> Case
 
 def _lines(error: ValidationError) -> Iterator[str]:
     """Say what pydantic found, one line each, as a user of the file would."""
+    said: set[str] = set()
     for mistake in error.errors():
+        key = next((key for key in WHOLE if mistake["loc"][: len(key)] == key), None)
+        # The key itself may be missing, and the bounds of a box in the wrong order.
+        if key is not None and (mistake["type"], mistake["loc"]) not in (
+            ("missing", key),
+            ("value_error", key),
+        ):
+            line = f"{'.'.join(key)}: it must be {WHOLE[key]}"
+            if line not in said:
+                said.add(line)
+                yield line
+            continue
         place = ".".join(str(step) for step in mistake["loc"] if step not in ("str", "list[str]"))
         message = mistake["msg"].removeprefix("Value error, ")
         if mistake["type"] == "extra_forbidden":
