@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import IO, Any, Literal
 
 from .store import origin_of
 from .study import Case, Study
@@ -35,6 +35,8 @@ FINISHED, FAILED = "finished.json", "failed.json"
 PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
 # How long a killed process may take to go.
 PATIENCE = 10.0
+# How long after one attempt at a lock comes the next [seconds].
+LOOK = 0.05
 
 
 @dataclass(frozen=True)
@@ -106,12 +108,7 @@ class Folder:
         path = self.root / "cases" / ".locks" / case.name
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("w") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                yield False
-                return
-            yield True
+            yield _locked(file)
 
     def _is_locked(self, case: Case) -> bool:
         if not (self.root / "cases" / ".locks" / case.name).exists():
@@ -156,6 +153,18 @@ class Folder:
             return str(json.loads((self.failure(case) / FAILED).read_text())["reason"])
         except (OSError, ValueError, KeyError):
             return "unknown"
+
+
+def _locked(file: IO[str]) -> bool:
+    for last in (False, False, True):
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            # It may be `status` only, which looks for a moment.
+            time.sleep(0 if last else LOOK)
+        else:
+            return True
+    return False
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

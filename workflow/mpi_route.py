@@ -8,7 +8,9 @@ claim. So groups of one job, several jobs and a `run` elsewhere can share a fold
 
 from __future__ import annotations
 
+import math
 import os
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,6 +29,8 @@ from .study import Case, Study
 # A deck that refuses its parameters quits. That would end the process, and all other cases with
 # it; an unknown command ends the deck only.
 QUIT, REFUSED = '"quit 1"', '"the_deck_has_refused"'
+# What LAMMPS prints when its timer ends a run.
+CUT_SHORT = "Wall time limit reached"
 # Ranks that wait do not keep their cores busy.
 SLEEP = 0.02
 NOTHING, RUN, MEASURE = 0, 1, 2
@@ -49,8 +53,15 @@ def run_in_job(
     outcome = Outcome()
     for case in cases:
         if group.leads:
-            with folder.lock(case) as mine:
-                _lead(mine, study, case, folder, options, group, outcome, display)
+            try:
+                with folder.lock(case) as mine:
+                    _lead(mine, study, case, folder, options, group, outcome, display)
+            except Exception as error:
+                if world.size > 1:
+                    # Such as a full disk. The other ranks would wait for this one for ever.
+                    print(f"inelastic: {case.name}: {_last(error)}", file=sys.stderr, flush=True)
+                    world.Abort(2)
+                raise
         elif group.agree(NOTHING) == RUN:
             _run(case, folder.part(case), options, group)
     _Group(world).agree(NOTHING)
@@ -139,7 +150,7 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
             engine = lammps(comm=group.ranks, cmdargs=arguments)
             try:
                 if options.timeout is not None:
-                    engine.command(f"timer timeout {options.timeout:.0f} every 10")
+                    engine.command(f"timer timeout {math.ceil(options.timeout)} every 10")
                 engine.commands_string(text.replace(QUIT, REFUSED))
             except MPIAbortException as error:
                 if group.ranks.size > 1:
@@ -155,7 +166,11 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
                 if group.leads:
                     with Path("lmp.out").open("ab") as out:
                         out.write(Path("screen.out").read_bytes())
-            late = options.timeout is not None and time.time() - began > options.timeout
+            late = options.timeout is not None and (
+                time.time() - began > options.timeout
+                # The deck has gone on with the runs cut short.
+                or CUT_SHORT in Path("screen.out").read_text(errors="replace")
+            )
             missing = missing_file(case, stage, Path())
             if group.agree(NOTHING if late or missing else RUN) == NOTHING:
                 if late:
