@@ -181,6 +181,8 @@ def _summarise(group: h5py.Group, results: Sequence[Result]) -> None:
     names = dict.fromkeys(name for result in results for name in result.variables)
     for name in names:
         column = [result.variables.get(name) for result in results]
+        # That of the names is there already.
+        name = "case_variable" if name == "case" else name
         if any(isinstance(value, str) for value in column):
             group.create_dataset(name, data=["" if v is None else str(v) for v in column])
         else:

@@ -14,6 +14,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from .errors import WorkflowError
 from .folder import Folder
@@ -199,7 +200,11 @@ def adopt_results(study: Study, folder: Folder, source: Path) -> int:
 
 
 def _print_status(study: Study, folder: Folder) -> None:
-    table = Table("", "case", "state", "", title=study.title, title_justify="left", box=None)
+    table = Table("", "case", "state", "", title=Text(study.title), title_justify="left", box=None)
+    # A name is there to be copied: a line may be longer than the terminal is wide.
+    for column in table.columns:
+        column.no_wrap = True
+        column.overflow = "ignore"
     states: Counter[str] = Counter()
     other = 0
     for number, case in enumerate(study.cases, 1):
@@ -214,9 +219,9 @@ def _print_status(study: Study, folder: Folder) -> None:
             if record["fingerprint"] != case.fingerprint:
                 other += 1
                 note += ", by another version of the deck"
-        table.add_row(str(number), case.name, state, note)
-    console = Console(soft_wrap=True, highlight=False)
-    console.print(table)
+        table.add_row(str(number), Text(case.name), state, Text(note))
+    console = Console(highlight=False)
+    console.print(table, width=max(console.width, console.measure(table).maximum), crop=False)
     print(f"{study.name}: " + ", ".join(f"{count} {state}" for state, count in states.items()))
     if other:
         print(
