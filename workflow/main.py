@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from lammps_inelastic.analysis import AnalysisError
 
-from . import export_command, look_command, reproduce_command, study_commands
+from . import export_command, look_command, report_command, reproduce_command, study_commands
 from .errors import StudyError, WorkflowError
 
 
@@ -24,6 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return look_command.run(options)
         if options.command == "export":
             return export_command.run(options)
+        if options.command == "report":
+            return report_command.run(options)
         if options.command == "reproduce":
             return reproduce_command.run(options)
         return study_commands.run_command(options)
@@ -53,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     study_commands.add_parsers(commands)
     reproduce_command.add_parser(commands)
     export_command.add_parser(commands)
+    report_command.add_parser(commands)
     return parser
 
 

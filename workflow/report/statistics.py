@@ -1,0 +1,197 @@
+"""From the cases of a study to means over seeds, and from two numbers to a difference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..store import Result
+
+FloatArray = NDArray[np.float64]
+
+# Parameters that do not change what is measured: cases that differ in these alone are repeats.
+REPEATS = frozenset({"seed"})
+# Above this many standard errors a difference is marked.
+LARGE = 2.0
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The mean of some independent values.
+
+    Attributes
+    ----------
+    mean : NaN of no values
+    std : standard deviation, with n - 1 in its denominator; NaN of fewer than two values
+    n : number of values
+    """
+
+    mean: float
+    std: float
+    n: int
+
+    @property
+    def error(self) -> float:
+        """Standard error of the mean; NaN of fewer than two values."""
+        return self.std / math.sqrt(self.n) if self.n else math.nan
+
+    def scaled(self, factor: float) -> Sample:
+        """Return the same in another unit."""
+        return Sample(self.mean * factor, self.std * abs(factor), self.n)
+
+
+def sample(values: Iterable[float]) -> Sample:
+    """Return mean and scatter of the values that are not NaN."""
+    known = [float(value) for value in values if not math.isnan(value)]
+    if not known:
+        return Sample(math.nan, math.nan, 0)
+    std = float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
+    return Sample(float(np.mean(known)), std, len(known))
+
+
+def numbers(results: Iterable[Result], name: str) -> Sample:
+    """Return mean and scatter of one of the results' numbers."""
+    return sample(result.number(name) for result in results)
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A number that the paper states.
+
+    Attributes
+    ----------
+    value : as it is printed
+    error : its standard error; NaN where the paper tells no scatter
+    std, n : standard deviation and number of simulations, where the error is made of these
+    """
+
+    value: float
+    error: float = math.nan
+    std: float = math.nan
+    n: int = 0
+
+    @classmethod
+    def of_series(cls, value: float, std: float, n: int) -> Stated:
+        """Return a mean of n simulations with this standard deviation."""
+        return cls(value, std / math.sqrt(n), std, n)
+
+
+def difference_in_errors(ours: Sample, stated: Stated) -> float:
+    """Return ours - the paper's, over the standard error of that difference.
+
+    Where the paper tells no scatter, over our own standard error alone; NaN where there is none,
+    as of a single run.
+    """
+    squares = [error**2 for error in (ours.error, stated.error) if not math.isnan(error)]
+    # One run beside a paper's range: how far it would fall from it by chance is not known.
+    if math.isnan(ours.error) or sum(squares) == 0:
+        return math.nan
+    return (ours.mean - stated.value) / math.sqrt(sum(squares))
+
+
+def grouped(
+    results: Iterable[Result], key: Callable[[Result], Hashable]
+) -> dict[Any, list[Result]]:
+    """Return the results by a key, in the order in which the keys first appear."""
+    groups: dict[Any, list[Result]] = {}
+    for result in results:
+        groups.setdefault(key(result), []).append(result)
+    return groups
+
+
+def by_variables(names: Sequence[str]) -> Callable[[Result], tuple[Any, ...]]:
+    """Return a key: a result's deck and its values of some variables."""
+    return lambda result: (result.record["deck"], *map(result.variables.get, names))
+
+
+def by_value(name: str) -> Callable[[Result], float]:
+    """Return a key: a result's value of a variable that is a number."""
+    return lambda result: float(result.variables[name])
+
+
+def varying(results: Sequence[Result]) -> list[str]:
+    """Return the parameters, other than repeats, that are not the same in all results."""
+    names = dict.fromkeys(name for result in results for name in result.variables)
+    return [
+        name
+        for name in names
+        if name not in REPEATS and len({result.variables.get(name) for result in results}) > 1
+    ]
+
+
+def matching(results: Iterable[Result], **wanted: float | str) -> list[Result]:
+    """Return the results whose variables have these values, numbers up to round-off."""
+    return [
+        result
+        for result in results
+        if all(_equal(result.variables.get(name), value) for name, value in wanted.items())
+    ]
+
+
+def _equal(value: object, wanted: float | str) -> bool:
+    if isinstance(value, int | float) and isinstance(wanted, int | float):
+        return math.isclose(value, wanted, rel_tol=1e-9)
+    return value == wanted
+
+
+def mean_curve(
+    curves: Sequence[tuple[FloatArray, FloatArray]],
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Return the mean of curves: x, mean y, and its standard error; None of a single curve.
+
+    Others than the first are read at the x of the first by linear interpolation, NaN beyond their
+    ends.
+    """
+    x = curves[0][0]
+    rows = np.array([np.interp(x, *curve, left=np.nan, right=np.nan) for curve in curves])
+    mean: FloatArray = rows.mean(axis=0)
+    if len(rows) == 1:
+        return x, mean, None
+    return x, mean, rows.std(axis=0, ddof=1) / math.sqrt(len(rows))
+
+
+def root_mean_square_difference(
+    one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray]
+) -> float:
+    """Return that of two curves (x, y) where they overlap, at the x of the first; NaN if nowhere.
+
+    The second is read by linear interpolation.
+    """
+    x, y = one
+    apart = y - np.interp(x, *other, left=np.nan, right=np.nan)
+    apart = apart[~np.isnan(apart)]
+    return float(np.sqrt(np.mean(apart**2))) if len(apart) else math.nan
+
+
+def mean_distribution(distributions: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray | None]:
+    """Return the mean share of each number and its standard error; short ones end with zeros."""
+    length = max(len(one) for one in distributions)
+    rows = np.array([np.pad(one, (0, length - len(one))) for one in distributions])
+    mean: FloatArray = rows.mean(axis=0)
+    if len(rows) == 1:
+        return mean, None
+    return mean, rows.std(axis=0, ddof=1) / math.sqrt(len(rows))
+
+
+def computing_seconds(results: Iterable[Result]) -> float:
+    """Return the wall times of the runs, each times its ranks."""
+    return float(sum(result.record["wall_seconds"] * result.record["ranks"] for result in results))
+
+
+def peak(x: Sequence[float], y: Sequence[float]) -> float:
+    """Return where a parabola through the largest value and its neighbours is largest.
+
+    The x of the largest value where that one is the first or the last.
+    """
+    best = int(np.argmax(y))
+    if not 0 < best < len(y) - 1:
+        return float(x[best])
+    near = slice(best - 1, best + 2)
+    # About the middle one, which keeps the numbers small.
+    a, b, _ = np.polyfit(np.asarray(x[near]) - x[best], np.asarray(y[near]), 2)
+    return float(x[best] - b / (2 * a)) if a < 0 else float(x[best])
