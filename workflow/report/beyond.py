@@ -29,12 +29,11 @@ from .spheres import section, step_pictures
 from .statistics import (
     Sample,
     Stated,
-    by_variables,
     difference_in_errors,
     grouped,
+    labelled,
     mean_curve,
     numbers,
-    varying,
 )
 
 # A share of crystalline particles above this is no random packing.
@@ -334,14 +333,8 @@ def _dots(groups: dict[tuple[object, ...], list[Result]], name: str) -> Curve:
 def _checks(data: Data) -> Section:
     rows = []
     for study in data.studies.values():
-        names = varying(study.results)
-        groups = grouped(study.results, by_variables(names))
-        for (deck, *values), group in groups.items():
-            parameters = ", ".join(
-                f"{name} = {_word(value)}"
-                for name, value in zip(names, values, strict=True)
-                if value is not None
-            )
+        for label, group in labelled(study.results).items():
+            deck = str(group[0].record["deck"])
             tolerance = float(group[0].variables.get("tolerance", math.nan))
             overlap = max((_overlap(r) for r in group), default=math.nan)
             allowed = ALLOWED_OF_BODIES if deck != "spheres" and "response" not in deck else 1.0
@@ -350,8 +343,7 @@ def _checks(data: Data) -> Section:
             rows.append(
                 cells(
                     study.name,
-                    deck,
-                    parameters or DASH,
+                    label,
                     len(group),
                     as_short(tolerance),
                     as_short(overlap),
@@ -368,8 +360,7 @@ def _checks(data: Data) -> Section:
                 "Largest overlap at any step of any run, and how well contacts are resolved",
                 (
                     "study",
-                    "deck",
-                    "parameters",
+                    "case",
                     "runs",
                     "ε / r",
                     "largest overlap / r",
@@ -394,7 +385,3 @@ def _checks(data: Data) -> Section:
 def _overlap(result: Result) -> float:
     whole = result.number("largest_overlap_of_all_steps")
     return whole if not math.isnan(whole) else result.number("largest_overlap")
-
-
-def _word(value: object) -> str:
-    return as_short(float(value)) if isinstance(value, int | float) else str(value)

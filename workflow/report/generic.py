@@ -8,14 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..store import Result, StoredStudy
-from .blocks import Block, Section, Table, as_sample, as_short, cells, missing
+from .blocks import Block, Section, Table, as_sample, cells, missing
 from .data import profiles, series
 from .figures import Curve, Figure, Panel, Pictures, curve
 from .spheres import step_pictures
 from .statistics import (
+    as_value,
     by_value,
     by_variables,
     grouped,
+    labelled,
     mean_curve,
     mean_distribution,
     numbers,
@@ -39,23 +41,12 @@ COLUMNS = (
 
 def study_section(study: StoredStudy) -> Section:
     """Return the section of a study that is none of the paper's."""
-    names = varying(study.results)
-    groups = {
-        ", ".join(
-            [key[0]]
-            + [
-                f"{name} = {_word(value)}"
-                for name, value in zip(names, key[1:], strict=True)
-                if value is not None
-            ]
-        ): group
-        for key, group in grouped(study.results, by_variables(names)).items()
-    }
+    groups = labelled(study.results)
     anchor = f"study-{re.sub(r'[^a-z0-9]+', '-', study.name.lower())}"
     blocks: list[Block] = []
     if groups:
         blocks.append(_table(groups))
-        blocks += _against(study, names, anchor)
+        blocks += _against(study, varying(study.results), anchor)
         blocks += _evolution(groups, anchor)
         blocks += _distributions(groups, anchor)
         blocks += _profiles(groups, anchor)
@@ -114,7 +105,7 @@ def _against(study: StoredStudy, names: Sequence[str], anchor: str) -> list[Bloc
             label = ", ".join(
                 [key[0]]
                 + [
-                    f"{other} = {_word(value)}"
+                    f"{other} = {as_value(value)}"
                     for other, value in zip(others, key[1:], strict=True)
                     if value is not None
                 ]
@@ -207,7 +198,3 @@ def _profiles(groups: dict[str, list[Result]], anchor: str) -> list[Block]:
 def _left_out(curves: Sequence[Curve]) -> str:
     more = len(curves) - MOST_CURVES
     return f" {more} more cases are in the table only." if more > 0 else ""
-
-
-def _word(value: object) -> str:
-    return as_short(float(value)) if isinstance(value, int | float) else str(value)

@@ -14,8 +14,9 @@ from ..store import Result
 
 FloatArray = NDArray[np.float64]
 
-# Parameters that do not change what is measured: cases that differ in these alone are repeats.
-REPEATS = frozenset({"seed"})
+# Parameters that do not change the packing but by chance: cases that differ in these alone are
+# repeats.
+REPEATS = frozenset({"seed", "dump_every"})
 # Above this many standard errors a difference is marked.
 LARGE = 2.0
 
@@ -122,6 +123,28 @@ def varying(results: Sequence[Result]) -> list[str]:
         for name in names
         if name not in REPEATS and len({result.variables.get(name) for result in results}) > 1
     ]
+
+
+def as_value(value: object) -> str:
+    """Write a parameter: a number with its own digits, or a word."""
+    return f"{value:,.10g}" if isinstance(value, int | float) else str(value)
+
+
+def labelled(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """Return the results of the same parameters together, by what is not the same in all.
+
+    The label names the deck, where there are several, and what varies among the runs of that deck.
+    """
+    decks = grouped(results, lambda result: str(result.record["deck"]))
+    groups: dict[str, list[Result]] = {}
+    for deck, runs in decks.items():
+        names = varying(runs)
+        for (_, *values), group in grouped(runs, by_variables(names)).items():
+            words = [f"{n} = {as_value(v)}" for n, v in zip(names, values, strict=True)]
+            if len(decks) > 1 or not words:
+                words.insert(0, deck)
+            groups[", ".join(words)] = group
+    return groups
 
 
 def matching(results: Iterable[Result], **wanted: float | str) -> list[Result]:

@@ -1,0 +1,552 @@
+"""`inelastic report` on made-up results whose numbers have a known outcome."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import math
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure as Canvas
+from PIL import Image
+
+from lammps_inelastic.analysis import InputError
+from lammps_inelastic.analysis.plots import (
+    STYLES,
+    draw_dimer,
+    draw_dimer_section,
+    plot_distribution,
+    plot_wall_profile,
+)
+from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.report.blocks import Comparison, Table, as_short, as_text
+from lammps_inelastic.workflow.report.data import Data, paper_numbers, read_data
+from lammps_inelastic.workflow.report.paper import all_sections
+from lammps_inelastic.workflow.report.statistics import (
+    Sample,
+    Stated,
+    difference_in_errors,
+    mean_curve,
+    mean_distribution,
+    peak,
+    root_mean_square_difference,
+    sample,
+)
+from lammps_inelastic.workflow.reproduce_command import STUDIES
+from lammps_inelastic.workflow.store import Result, StoredStudy, write_studies
+
+ANCHORS = {
+    "summary",
+    "figure-4",
+    "figure-5",
+    "table-1",
+    "agitated",
+    "table-2",
+    *(f"figure-{number}" for number in range(6, 15)),
+    "anisotropy",
+    "structure",
+    "forces",
+    "response",
+    "protocol",
+    "checks",
+    "provenance",
+}
+# Elements without an end.
+VOID = {"meta", "img", "br", "hr", "link", "input"}
+
+
+def png(colour="red"):
+    buffer = io.BytesIO()
+    image = Image.new("RGB", (40, 30), "white")
+    image.paste(colour, (15, 10, 25, 20))
+    image.save(buffer, format="PNG")
+    return buffer.getvalue()
+
+
+def result(deck="spheres", pictures=(), before=None, wall_seconds=30.0, **given):
+    """Return a result; names of schema.py with a slash as __ are values, others variables."""
+    values = {
+        name.replace("__", "/"): np.asarray(value, dtype=float)
+        for name, value in given.items()
+        if "__" in name
+    }
+    variables = {
+        "particles": 1000,
+        "diameter": 0.11,
+        "tolerance": 0.0005,
+        "dt": 0.01,
+        "random_force": 30.0,
+        "drag": 0.5,
+        "seed": 1,
+        "steps_agitated": 400,
+        "steps_settling": 800,
+    } | {name: value for name, value in given.items() if "__" not in name}
+    values.setdefault("numbers/resolution", np.asarray(0.005))
+    words = "_".join(f"{name}={value}" for name, value in variables.items())
+    record = {
+        "case": f"{deck}_{words}",
+        "deck": deck,
+        "fingerprint": "0",
+        "stages": [
+            {
+                "deck": deck,
+                "text": f"# deck {deck}\nvariable gravity equal 9.81\n",
+                "folder": ".",
+                "values": {},
+                "variables": variables,
+            }
+        ],
+        "commands": [],
+        "ranks": 2,
+        "started": "2026-01-02T03:04:05+00:00",
+        "wall_seconds": wall_seconds,
+        "versions": {"python": "3.11", "lammps": "2025"},
+    }
+    return Result(values, {name: png() for name in pictures}, record, "{}", before)
+
+
+def measured(phi=0.63, z=6.0, **given):
+    """Return a result with some of everything in it."""
+    distance = np.linspace(0.5, 9.5, 10) * 0.1
+    diameter = given.get("diameter", 0.11)
+    shares = np.zeros(13)
+    shares[5:8] = 0.25, 0.5, 0.25
+    aspect = given.get("aspect_ratio", 0.0)
+    ratio = {"numbers__a_x": 1.08, "numbers__a_y": 0.8, "numbers__a_z": 1.09} if aspect else {}
+    return result(
+        **{
+            "numbers__packing_fraction": phi,
+            "numbers__coordination_number": z,
+            "numbers__coordination_number_agitated": z - 0.4,
+            "numbers__neighbours": z - 1 if aspect else z,
+            "numbers__particles_in_box": 100,
+            "numbers__largest_overlap_of_all_steps": 0.0004,
+            "numbers__rattlers": 0.02,
+            "numbers__fabric_x": 0.34,
+            "numbers__fabric_y": 0.33,
+            "numbers__fabric_z": 0.33,
+            "numbers__q4": 0.14,
+            "numbers__q6": 0.4,
+            "numbers__crystalline": 0.01,
+            "distribution__contacts": shares,
+            "distribution__neighbours": shares,
+            "profile__distance": distance * diameter,
+            "profile__packing_fraction": 0.6 + 0.1 * np.cos(distance),
+            "structure__distance": distance * diameter,
+            "structure__radial_distribution": distance,
+            "forces__ratio": distance,
+            "forces__density": np.exp(-distance),
+            "evolution__step": np.arange(0, 1300, 100),
+            "evolution__packing_fraction": np.where(np.arange(13) < 3, 0.3, phi),
+            "evolution__coordination_number": np.where(np.arange(13) < 3, np.nan, z),
+            "evolution__centre_height": np.linspace(1, 0.5, 13),
+        }
+        | ({f"{name}_error": 0.01 for name in ratio} | {"numbers__a_isotropic": 1.0} | ratio)
+        | given
+    )
+
+
+def study(name, results, title=None, text="title = 'x'\n"):
+    return StoredStudy(name, title or f"Study {name}", text, results)
+
+
+def whole_paper():
+    """Return all studies of the paper, in miniature."""
+    table_1 = [
+        measured(phi=phi, tolerance=tolerance, random_force=force, seed=seed)
+        for tolerance, force in ((0.005, 30.0), (0.0005, 30.0), (0.0005, 0.0), (0.00005, 30.0))
+        for seed, phi in enumerate((0.62, 0.63, 0.64), 1)
+    ]
+    table_2 = [measured(seed=seed) for seed in (1, 2)]
+    table_2 += [measured(particles=10_000, diameter=0.052, seed=seed) for seed in (1, 2)]
+    table_2.append(measured(particles=100_000, diameter=0.024, tolerance=0.005))
+    falling = ("00000000", "00000100", "00000200", "00001270")
+    dimers = [measured(seed=seed) for seed in (1, 2)] + [
+        measured(phi=phi, z=9.9, deck="dimers", aspect_ratio=aspect, seed=seed)
+        for aspect, phi in ((1.1, 0.68), (1.5, 0.71), (1.6, 0.7), (1.8, 0.69), (1.95, 0.66))
+        for seed in (1, 2)
+    ]
+    response = [
+        measured(deck="spheres+response", change="walls", pictures=falling, before=measured()),
+        measured(deck="spheres+response", change="tilt", angle=20, before=measured(z=6.1)),
+    ]
+    protocol = [
+        measured(phi=phi, z=phi * 10, seed=seed, **other)
+        for other in ({}, {"random_force": 10.0}, {"drag": 1.0}, {"dt": 0.005})
+        for seed, phi in enumerate((0.62, 0.63, 0.64), 1)
+    ]
+    return [
+        study("table-1", table_1),
+        study("table-2", table_2),
+        study("figure-4", [measured(pictures=falling)]),
+        study("figure-8", [measured(pictures=("network",))]),
+        study("dimers", dimers),
+        study("figure-10", [measured(deck="dimers", aspect_ratio=1.5, pictures=falling)]),
+        study("response", response),
+        study("protocol", protocol),
+    ]
+
+
+def own_study():
+    return study(
+        "friction",
+        [
+            measured(phi=0.6 + 0.01 * size, particles=1000 * size, seed=seed, pictures=("network",))
+            for size in (1, 2, 3)
+            for seed in (1, 2)
+        ],
+        title="Size & shape",
+    )
+
+
+class Page(HTMLParser):
+    """What a page links to and shows; fails where its elements do not match."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.links, self.sources, self.opened, self.text = [], [], [], [], ""
+        self.feed(text)
+        self.close()
+        assert self.opened == []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if tag not in VOID:
+            self.opened.append(tag)
+        assert tag not in {"script", "link", "iframe", "object"}
+        if "id" in values:
+            self.ids.append(values["id"])
+        if "href" in values:
+            self.links.append(values["href"])
+        if "src" in values:
+            assert values["alt"]
+            self.sources.append(values["src"])
+
+    def handle_endtag(self, tag):
+        assert self.opened.pop() == tag
+
+    def handle_data(self, data):
+        if self.opened[-1:] != ["style"]:
+            self.text += data
+        else:
+            # Nothing is loaded from anywhere.
+            assert "url(" not in data
+            assert "@import" not in data
+
+
+def write(path, *studies):
+    write_studies(path, studies)
+    return path
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory):
+    """Return a folder with the page of all studies and one more, and with their figures."""
+    folder = tmp_path_factory.mktemp("report")
+    file = write(folder / "all.h5", *whole_paper(), own_study())
+    arguments = ["--out", str(folder / "r.html"), "--figures", str(folder / "figures")]
+    assert main(["report", str(file), *arguments]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(full):
+    return Page((full / "r.html").read_text(encoding="utf-8"))
+
+
+def test_every_section_is_there_and_in_the_contents(page):
+    wanted = ANCHORS | {"study-friction"}
+    assert wanted <= set(page.ids)
+    assert {f"#{anchor}" for anchor in wanted} <= set(page.links)
+    assert len(page.ids) == len(set(page.ids))
+    assert "not run yet" not in page.text.lower()
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    assert all(link.startswith("#") for link in page.links)
+    assert all(source.startswith("data:image/") for source in page.sources)
+    assert {link[1:] for link in page.links} <= set(page.ids)
+
+
+def test_pictures_can_be_decoded(page):
+    kinds = {"svg+xml": 0, "png": 0}
+    for source in page.sources:
+        head, data = source.split(",", 1)
+        kind = head.removeprefix("data:image/").removesuffix(";base64")
+        kinds[kind] += 1
+        content = base64.b64decode(data, validate=True)
+        if kind == "png":
+            Image.open(io.BytesIO(content)).verify()
+        else:
+            assert b"</svg>" in content
+    # Three series of four pictures, the network, and a network each of the own study's cases.
+    assert kinds["png"] == 3 * 4 + 1 + 3
+    assert kinds["svg+xml"] >= 15
+
+
+def test_words_of_a_study_do_not_become_elements(page):
+    assert "Size & shape (friction)" in page.text
+
+
+def test_how_to_repeat_is_said(page):
+    assert "inelastic run table-1.toml --out DIR" in page.text
+    assert "inelastic run friction.toml --out DIR" in page.text
+    assert "inelastic report DIR/friction.h5" in page.text
+    assert "2026-01-02" in page.text
+    assert "# deck dimers" in page.text
+
+
+def test_computing_time_counts_ranks(page):
+    # 12 cases of 30 s with two ranks.
+    assert "12.0 min" in page.text
+
+
+def test_what_the_paper_does_not_state(page):
+    for word in ("9.81", "largest random acceleration, per direction (random_force)", "drag per"):
+        assert word in page.text
+
+
+def test_each_figure_as_pdf_png_and_csv(full):
+    figures = full / "figures"
+    names = {path.stem for path in figures.iterdir()}
+    assert {f"figure-{number}" for number in range(4, 15)} <= names
+    for name in names:
+        assert (figures / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        Image.open(figures / f"{name}.png").verify()
+        # Figure 9 is a drawing: it has no numbers.
+        assert (figures / f"{name}.csv").exists() == (name != "figure-9")
+
+
+def read_csv(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_numbers_of_a_figure(full):
+    rows = read_csv(full / "figures" / "figure-11.csv")
+    raw = {float(r["aspect ratio L/d"]): r for r in rows if r["curve"] == "raw"}
+    assert list(raw) == [1.0, 1.1, 1.5, 1.6, 1.8, 1.95]
+    assert float(raw[1.5]["packing fraction"]) == 0.71
+    assert float(raw[1.5]["standard error of packing fraction"]) == 0
+
+
+def test_evolution_has_both_panels_in_one_file(full):
+    rows = read_csv(full / "figures" / "figure-5.csv")
+    # Two runs of 13 frames, twice: packing fraction, and contacts, not known in three frames.
+    assert len(rows) == 4 * 13
+    assert sum(row["packing fraction"] != "" for row in rows) == 2 * 13
+    assert sum(row["coordination number"] != "" for row in rows) == 2 * 10
+
+
+@pytest.fixture(scope="module")
+def sections():
+    """Return the sections of the whole paper by their anchors."""
+    studies = {one.name: one for one in whole_paper()}
+    found = all_sections(Data(studies, paper_numbers()), ["all.h5"])
+    return {section.anchor: section for section in found}
+
+
+def test_every_row_has_a_cell_for_each_column(sections):
+    for section in sections.values():
+        for block in section.blocks:
+            if isinstance(block, Table):
+                assert {len(row) for row in block.rows} == {len(block.head)}, block.caption
+
+
+def test_comparison_with_a_series(sections):
+    first = sections["table-1"].comparisons[0]
+    # 62, 63 and 64 %: standard deviation 1, standard error 1 / sqrt(3); the paper's 63.39 and
+    # 0.41 / 3.
+    wanted = (63 - 63.39) / math.sqrt(1 / 3 + (0.41 / 3) ** 2)
+    assert first.difference == pytest.approx(wanted, rel=1e-9)  # round-off
+    assert not first.is_large
+    assert first.note == "3 runs, not 9"
+
+
+def test_comparison_in_our_errors_alone():
+    one = Comparison("phi", Stated(63.2), Sample(63.8, 0.4, 4))
+    assert one.difference == pytest.approx(3.0, rel=1e-9)  # round-off
+    assert one.is_large
+
+
+def test_single_run_has_no_difference():
+    assert math.isnan(difference_in_errors(Sample(6.1, math.nan, 1), Stated(6.0)))
+    assert math.isnan(difference_in_errors(Sample(6.1, math.nan, 1), Stated(6.0, 0.05)))
+
+
+def test_large_difference_is_marked(tmp_path, capsys):
+    runs = [measured(z=z, seed=seed) for seed, z in enumerate((6.9, 7.0, 7.1), 1)]
+    file = write(tmp_path / "a.h5", study("table-1", runs))
+    assert main(["report", str(file), "--out", str(tmp_path / "r.html")]) == 0
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    # (7 - 5.97) / sqrt(0.01 / 3 + (0.12 / 3)^2) = 14.7
+    assert '<td class="marked">+14.7</td>' in text
+    # z; z at rest less z while agitated is 0.4 in each run: no scatter, no difference. The packing
+    # fractions are alike too, but the paper's scatter.
+    assert "1 of 2 differences" in capsys.readouterr().out
+
+
+def test_anisotropy_is_compared_with_the_consistent_aspect_ratio(sections):
+    whats = [one.what for one in sections["anisotropy"].comparisons]
+    assert whats == [f"a_{axis} over isotropic, L/d = 1.8" for axis in "xyz"]
+    x = sections["anisotropy"].comparisons[0]
+    # 0.0260 / 0.0240
+    assert x.stated.value == pytest.approx(1.0833, abs=1e-4)  # as many digits as are written
+    assert x.ours.mean == 1.08
+
+
+def test_table_2_takes_paper_and_ours_of_one_size(sections):
+    whats = {one.what: one for one in sections["table-2"].comparisons}
+    assert whats["φ, 10,000 spheres"].ours.n == 2
+    assert math.isnan(whats["φ, 100,000 spheres"].difference)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_any_single_study_is_enough(tmp_path, name):
+    (one,) = (each for each in whole_paper() if each.name == name)
+    data = read_data([write(tmp_path / "a.h5", one)])
+    sections = {section.anchor: section for section in all_sections(data, ["a.h5"])}
+    assert set(sections) == ANCHORS - {"summary"}
+    assert any(section.is_missing for section in sections.values())
+    own = "table-2" if name == "table-2" else name
+    own = "figure-11" if name == "dimers" else own
+    assert not sections[own].is_missing
+
+
+def test_studies_without_any_result(tmp_path):
+    file = write(tmp_path / "a.h5", *(study(name, []) for name in STUDIES), study("own", []))
+    out = tmp_path / "r.html"
+    assert main(["report", str(file), "--out", str(out)]) == 0
+    page = Page(out.read_text(encoding="utf-8"))
+    assert ANCHORS - {"summary"} <= set(page.ids)
+    # Figure 9 and the two sections on the report itself need no runs.
+    assert "To make it: inelastic run dimers --out DIR" in page.text
+    assert "To make it: inelastic run own.toml --out DIR" in page.text
+
+
+def test_result_with_nothing_but_its_record(tmp_path):
+    bare = [study(name, [result(), result(seed=2)]) for name in (*STUDIES, "own")]
+    file = write(tmp_path / "a.h5", *bare)
+    assert main(["report", str(file), "--out", str(tmp_path / "r.html")]) == 0
+
+
+def test_own_study_alone_has_no_sections_of_the_paper(tmp_path):
+    data = read_data([write(tmp_path / "a.h5", own_study())])
+    sections = all_sections(data, ["a.h5"])
+    assert [section.anchor for section in sections] == ["study-friction", "provenance"]
+    table = sections[0].blocks[0]
+    assert [row[0].text for row in table.rows] == [
+        "particles = 1,000",
+        "particles = 2,000",
+        "particles = 3,000",
+    ]
+    assert table.rows[0][1].text == "2"
+
+
+def test_parts_of_a_study_in_several_files(tmp_path):
+    one = write(tmp_path / "1.h5", study("own", [measured(seed=1), measured(seed=2)]))
+    other = write(tmp_path / "2.h5", study("own", [measured(seed=2), measured(seed=3)]))
+    data = read_data([one, other])
+    assert len(data.studies["own"].results) == 3
+
+
+def test_two_studies_of_one_name_are_refused(tmp_path, capsys):
+    one = write(tmp_path / "1.h5", study("own", [measured()]))
+    other = write(tmp_path / "2.h5", study("own", [measured()], text="title = 'y'\n"))
+    assert main(["report", str(one), str(other), "--out", str(tmp_path / "r.html")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "r.html").exists()
+
+
+@pytest.mark.parametrize("content", [None, b"no HDF5"])
+def test_file_that_is_no_study_file(tmp_path, capsys, content):
+    path = tmp_path / "a.h5"
+    if content is not None:
+        path.write_bytes(content)
+    assert main(["report", str(path), "--out", str(tmp_path / "r.html")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"inelastic: {path}: not a file of studies")
+    assert error.count("\n") == 1
+    assert not (tmp_path / "r.html").exists()
+
+
+def test_statistics_by_hand():
+    values = sample([1.0, 2.0, 3.0, math.nan])
+    assert (values.mean, values.std, values.n) == (2.0, 1.0, 3)
+    assert values.error == 1 / math.sqrt(3)
+    x, y = np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0])
+    # The other one begins at 1 and is 0.5 higher there and at 2.
+    other = np.array([1.0, 2.0]), np.array([1.5, 2.5])
+    assert root_mean_square_difference((x, y), other) == 0.5
+    assert math.isnan(root_mean_square_difference((x, y), (x + 10, y)))
+    _, mean, error = mean_curve([(x, y), (x, y + 2)])
+    assert mean.tolist() == [1, 2, 3]
+    # Standard deviation sqrt(2), over sqrt(2).
+    assert error == pytest.approx([1, 1, 1], rel=1e-12)  # round-off
+    shares, _ = mean_distribution([np.array([0.0, 1.0]), np.array([0.0, 0.0, 1.0])])
+    assert shares.tolist() == [0, 0.5, 0.5]
+
+
+def test_peak_of_a_parabola():
+    x = [1.0, 1.3, 1.5, 2.0]
+    # Exact for a parabola, but for round-off.
+    assert peak(x, [-((v - 1.42) ** 2) for v in x]) == pytest.approx(1.42, abs=1e-9)
+    assert peak([1, 2, 3], [3, 2, 1]) == 1
+
+
+def test_numbers_as_text():
+    assert as_text(-0.001, 2) == "0.00"
+    assert as_text(-1.5, 1) == "\N{MINUS SIGN}1.5"
+    assert as_text(math.nan, 2) == "\N{EN DASH}"
+    assert [as_short(v) for v in (5e-05, 0.11, 12345.0, 0.0)] == ["0.00005", "0.11", "12345", "0"]
+
+
+def test_paper_numbers_are_in_the_package():
+    paper = paper_numbers()
+    assert [row["z"]["mean"] for row in paper["table1"]] == [6.18, 5.97, 5.99, 5.93]
+
+
+def axis():
+    return Canvas().subplots()
+
+
+def test_curves_differ_in_more_than_colour():
+    assert len({style.line for style in STYLES}) == len(STYLES)
+    assert len({style.marker for style in STYLES}) == len(STYLES)
+
+
+def test_plots_return_their_axis_and_name_it():
+    ax = axis()
+    assert plot_wall_profile(ax, [0.5, 1.5], [0.1, 0.6], errors=[0.1, 0.1], label="a") is ax
+    assert ax.get_xlabel() == "distance from the wall / d"
+    ax = plot_distribution(axis(), [0, 0, 0.5, 0.5, 0, 0, 0])
+    # The numbers with particles, and one on either side.
+    assert ax.lines[0].get_xdata().tolist() == [1, 2, 3, 4]
+    with pytest.raises(InputError):
+        plot_distribution(axis(), [0, 0])
+
+
+def test_neck_touches_the_rolling_sphere():
+    ax = draw_dimer_section(axis(), 1.8)
+    upper = max(ax.patches[:2], key=lambda patch: patch.get_xy()[:, 1].max()).get_xy()
+    low, high = (
+        upper[np.abs(upper[:, 0]) < 0.01, 1].min(),
+        upper[np.abs(upper[:, 0]) < 0.01, 1].max(),
+    )
+    # At the waist: up to the rolling sphere, down to where the two spheres cut each other. The
+    # outline has a point every 0.007, and the section is steep there.
+    assert high == pytest.approx(math.sqrt(1 - 0.16) - 0.5, abs=1e-3)
+    assert low == pytest.approx(math.sqrt(0.25 - 0.16), abs=1e-2)
+
+
+def test_dimer_is_as_long_as_it_is_said_to_be():
+    image = draw_dimer(axis(), 1.5, pixels=400).images[0]
+    seen = np.flatnonzero(image.get_array()[..., 3].max(axis=0) > 0.5)
+    left, right, *_ = image.get_extent()
+    # Two pixels.
+    assert (seen[-1] - seen[0] + 1) * (right - left) / 400 == pytest.approx(1.5, abs=0.012)
+    with pytest.raises(InputError):
+        draw_dimer(axis(), 2.1)
