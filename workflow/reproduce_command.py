@@ -8,6 +8,7 @@ from typing import Any
 
 from .folder import Folder
 from .launch import Options
+from .report_command import write_report
 from .store import write_studies
 from .study import read_study
 from .study_commands import (
@@ -83,4 +84,5 @@ def run(options: argparse.Namespace) -> int:
     store = folder.root / STORE
     write_studies(store, [gathered(study, folder) for study in studies])
     print(f"results: {store}")
+    write_report([store], folder.root / REPORT, folder.root / FIGURES)
     return 1 if failed else 0
