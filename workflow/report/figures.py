@@ -12,6 +12,7 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -184,6 +185,12 @@ class Figure:
         # The text of an SVG file holds the date otherwise, and a PDF file too.
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}[form]
         with matplotlib.rc_context(RC):
+            self._canvas.savefig(target, format=form, dpi=DPI, metadata=metadata)
+
+    @cached_property
+    def _canvas(self) -> Canvas:
+        """The figure as it is drawn, once for all formats."""
+        with matplotlib.rc_context(RC):
             count = max(len(self.panels), len(self.drawing))
             rows = [] if _fits(self.panels) else _legend(self.panels, count)
             height = HEIGHT + sum(1 + label.count("\n") for label in rows) * LEGEND_ROW
@@ -204,7 +211,10 @@ class Figure:
                 for ax in axes:
                     if len(ax.get_legend_handles_labels()[1]) > 1:
                         ax.legend(loc="best")
-            canvas.savefig(target, format=form, dpi=DPI, metadata=metadata)
+            # The layout takes longer than the drawing: it is made once.
+            canvas.draw_without_rendering()
+            canvas.set_layout_engine("none")
+        return canvas
 
 
 @dataclass(frozen=True, eq=False)

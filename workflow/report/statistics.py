@@ -127,7 +127,11 @@ def varying(results: Sequence[Result]) -> list[str]:
 
 def as_value(value: object) -> str:
     """Write a parameter: a number with its own digits, or a word."""
-    return f"{value:,.10g}" if isinstance(value, int | float) else str(value)
+    if not isinstance(value, int | float):
+        return str(value)
+    # Not 5e-05.
+    small = 0 < abs(value) < 1e-3
+    return f"{value:.10f}".rstrip("0") if small else f"{value:,.10g}"
 
 
 def labelled(results: Sequence[Result]) -> dict[str, list[Result]]:
