@@ -1,0 +1,275 @@
+"""Whole studies of 30 spheres: run as processes, killed, run again, in an MPI job."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from few_spheres import TINY, write_data
+from lammps_inelastic.workflow.folder import Folder
+from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.schema import SCHEMA
+from lammps_inelastic.workflow.study import read_study
+from study_run import inelastic, killed_when, numbers_of, processes_in, same, wait_for
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """Return the folder of a study of two cases that was run without trouble."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    study = folder / "few.toml"
+    study.write_text(TINY.replace("{seeds}", "[1, 2]"))
+    done = inelastic("run", study, "--out", folder / "out", "--at-once", 2)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "few: 2 done" in done.stdout
+    return folder
+
+
+def one_case(folder, seed=1):
+    path = folder / "few.toml"
+    path.write_text(TINY.replace("{seeds}", f"{seed}"))
+    return path
+
+
+def of_case(numbers, case):
+    """The numbers of one case in a study's file."""
+    start = f"few/cases/{case.name}/"
+    return {name.removeprefix(start): v for name, v in numbers.items() if name.startswith(start)}
+
+
+def equals_undisturbed(undisturbed, study_path, out):
+    (case,) = read_study(study_path).cases
+    wanted = of_case(numbers_of(undisturbed / "out" / "few.h5"), case)
+    assert wanted
+    return same(of_case(numbers_of(out / "few.h5"), case), wanted)
+
+
+def test_every_dataset_is_in_the_schema(undisturbed):
+    with h5py.File(undisturbed / "out" / "few.h5") as file:
+        cases = file["few/cases"]
+        assert len(cases) == 2
+        for case in cases.values():
+            found = {}
+            case.visititems(
+                lambda name, item, found=found: found.update(
+                    {name: item} if isinstance(item, h5py.Dataset) else {}
+                )
+            )
+            assert "numbers/packing_fraction" in found
+            for name, dataset in found.items():
+                assert dataset.attrs["unit"] == SCHEMA[name].unit
+                assert dataset.attrs["meaning"] == SCHEMA[name].meaning
+                assert (dataset.ndim == 0) == (SCHEMA[name].shape == "")
+            record = json.loads(case.attrs["record"])
+            assert record["stages"][0]["variables"]["seed"] in (1, 2)
+
+
+def test_the_summary_is_a_table(undisturbed):
+    pandas = pytest.importorskip("pandas")
+    with h5py.File(undisturbed / "out" / "few.h5") as file:
+        table = pandas.DataFrame({name: v[()] for name, v in file["few/summary"].items()})
+    assert table["seed"].tolist() == [1, 2]
+    assert table["particles"].tolist() == table["particles_measured"].tolist() == [30, 30]
+    assert table["packing_fraction"].between(0.2, 0.7).all()
+
+
+def test_nothing_is_left_to_do(undisturbed, capsys):
+    out = undisturbed / "out"
+    before = numbers_of(out / "few.h5")
+    assert main(["run", str(undisturbed / "few.toml"), "--out", str(out)]) == 0
+    assert "few: 2 there before" in capsys.readouterr().out
+    assert same(before, numbers_of(out / "few.h5"))
+
+
+def test_status_tells_whole_names(undisturbed, capsys):
+    path, out = undisturbed / "few.toml", undisturbed / "out"
+    assert main(["status", str(path), "--out", str(out)]) == 0
+    output = capsys.readouterr().out
+    assert all(case.name in output for case in read_study(path).cases)
+    assert "few: 2 measured" in output
+
+
+def test_a_broken_result_is_measured_again(undisturbed, capsys):
+    path, out = undisturbed / "few.toml", undisturbed / "out"
+    before = numbers_of(out / "few.h5")
+    study = read_study(path)
+    result = Folder(out).result(study, study.cases[0])
+    result.write_bytes(result.read_bytes()[:1000])
+    assert main(["collect", str(path), "--out", str(out), "--file", str(out / "one.h5")]) == 0
+    assert "few: 1 of 2 cases" in capsys.readouterr().out
+    assert len(numbers_of(out / "one.h5")["few/summary/case"]) == 1
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    assert "few: 1 done, 1 there before" in capsys.readouterr().out
+    assert same(before, numbers_of(out / "few.h5"))
+
+
+@pytest.mark.parametrize("moment", ["part", "dump", "finished", "result"])
+def test_killed_and_run_again(undisturbed, tmp_path, moment, capsys):
+    path, out = one_case(tmp_path), tmp_path / "out"
+    study = read_study(path)
+    folder, (case,) = Folder(out), study.cases
+    there = {
+        "part": folder.part(case).is_dir,
+        "dump": (folder.part(case) / "particles.lammpsdump").exists,
+        "finished": folder.case(case).is_dir,
+        "result": lambda: folder.result(study, case).parent.is_dir(),
+    }[moment]
+    # On a slow machine the moment may have passed: then the next one.
+    killed_when(
+        lambda: there() or folder.case(case).is_dir(), "run", path, "--out", out, by=signal.SIGKILL
+    )
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    assert equals_undisturbed(undisturbed, path, out)
+    assert not list(out.glob("cases/*.part"))
+    assert not list(out.glob("cases/*.failed"))
+
+
+SLOW = 'title = "slow"\ndeck = "slow.in"\n'
+
+
+@pytest.fixture
+def slow(tmp_path):
+    """Return a study of a deck that never ends."""
+    (tmp_path / "slow.in").write_text("variable x index 1\nprint 'here'\nshell sleep 1000\n")
+    path = tmp_path / "slow.toml"
+    path.write_text(SLOW)
+    return path
+
+
+def test_sigterm_kills_what_runs(slow, tmp_path):
+    out = tmp_path / "out"
+    status = killed_when(
+        lambda: len(processes_in(out)) > 1, "run", slow, "--out", out, by=signal.SIGTERM
+    )
+    assert status == 130
+    wait_for(lambda: not processes_in(out))
+
+
+def test_what_a_killed_workflow_leaves_is_stopped(slow, tmp_path, capsys):
+    out = tmp_path / "out"
+    killed_when(lambda: len(processes_in(out)) > 1, "run", slow, "--out", out)
+    orphans = processes_in(out)
+    assert orphans
+    assert main(["run", str(slow), "--out", str(out), "--timeout", "0.5"]) == 1
+    assert "FAILED (timed out after 0.5 s)" in capsys.readouterr().out
+    wait_for(lambda: not processes_in(out))
+
+
+def test_failures_do_not_stop_the_others(tmp_path, capsys):
+    decks = {
+        "wrong": "print 'so far so good'\nnonsense 5\n",
+        "quits": "print 'bad input'\nif '1 > 0' then 'quit 1'\n",
+        "slow": "shell sleep 1000\n",
+        "killed": f"shell exec sh {tmp_path}/die.sh\nshell sleep 1000\n",
+    }
+    (tmp_path / "die.sh").write_text("kill -9 $PPID\n")
+    for name, text in decks.items():
+        (tmp_path / f"{name}.in").write_text(f"variable x index 1\n{text}")
+    path = tmp_path / "bad.toml"
+    rows = "".join(f"[[rows]]\ndeck = '{name}.in'\n" for name in decks)
+    path.write_text(f"title = 'bad'\ndeck = 'wrong.in'\n{rows}")
+    out = tmp_path / "out"
+    assert main(["run", str(path), "--out", str(out), "--timeout", "3"]) == 1
+    output = capsys.readouterr().out
+    assert "bad: 4 failed" in output
+    assert "ERROR: Unknown command: nonsense 5" in output
+    assert "bad input" in output
+    assert main(["status", str(path), "--out", str(out)]) == 0
+    table = [line.split() for line in capsys.readouterr().out.splitlines()]
+    reasons = {line[1].rpartition("_")[0]: " ".join(line[3:]) for line in table if len(line) > 3}
+    assert reasons["wrong"] == reasons["quits"] == "exit status 1"
+    assert reasons["slow"] == "timed out after 3 s"
+    assert reasons["killed"] == "killed by SIGKILL"
+    wait_for(lambda: not processes_in(out))
+
+
+def test_somebody_else_runs_it(undisturbed, tmp_path, capsys):
+    path, out = one_case(tmp_path), tmp_path / "out"
+    (case,) = read_study(path).cases
+    with Folder(out).lock(case) as mine:
+        assert mine
+        assert main(["run", str(path), "--out", str(out)]) == 0
+    assert "few: 1 run by somebody else" in capsys.readouterr().out
+
+
+def test_starts_from_a_data_file(tmp_path, capsys):
+    write_data(tmp_path / "my.data", diameter=0.2)
+    path = tmp_path / "few.toml"
+    text = TINY.replace("{seeds}", "1").replace("[outputs]", "start = 'my.data'\n[outputs]")
+    path.write_text(text)
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
+    numbers = numbers_of(tmp_path / "out" / "few.h5")
+    # The file says how many there are.
+    assert numbers["few/summary/particles_measured"].tolist() == [27]
+    assert numbers["few/summary/start"].tolist() == [b"my.data"]
+
+
+def test_groups_of_one_rank_give_the_same_numbers(undisturbed, tmp_path):
+    out = tmp_path / "out"
+    done = inelastic("run", undisturbed / "few.toml", "--out", out, "--mpi", ranks=2)
+    assert done.returncode == 0, done.stderr
+    assert "few: 2 done" in done.stdout
+    # The same deck on one rank: LAMMPS takes the same steps in the same order.
+    assert same(numbers_of(out / "few.h5"), numbers_of(undisturbed / "out" / "few.h5"))
+
+
+def test_a_group_of_two_ranks(undisturbed, tmp_path):
+    path, out = one_case(tmp_path), tmp_path / "out"
+    done = inelastic("run", path, "--out", out, "--mpi", "--ranks", 2, ranks=2)
+    assert done.returncode == 0, done.stderr
+    (case,) = read_study(path).cases
+    alone = of_case(numbers_of(undisturbed / "out" / "few.h5"), case)
+    together = of_case(numbers_of(out / "few.h5"), case)
+    assert together.keys() == alone.keys()
+    # Two ranks add the same numbers in another order, and a packing that is shaken amplifies the
+    # last digit: only what does not depend on the spheres' places is equal.
+    for name in ("numbers/particles", "numbers/steps", "evolution/step"):
+        assert np.array_equal(together[name], alone[name])
+
+
+def test_an_error_on_one_rank_ends_the_job(tmp_path):
+    (tmp_path / "out").write_text("a file")
+    start = time.monotonic()
+    done = inelastic(
+        "run", one_case(tmp_path), "--out", tmp_path / "out", "--mpi", "--ranks", 2, ranks=2
+    )
+    assert done.returncode != 0
+    assert "Not a directory" in done.stderr
+    # A job that hangs is given up much later.
+    assert time.monotonic() - start < 60
+
+
+@pytest.mark.parametrize("timeout", ["0.3", "1.4"])
+def test_in_a_job_a_run_that_is_cut_short_is_late(tmp_path, timeout):
+    path = one_case(tmp_path)
+    path.write_text(path.read_text().replace("steps_settling = 60", "steps_settling = 1000000"))
+    done = inelastic("run", path, "--out", tmp_path / "out", "--mpi", "--timeout", timeout, ranks=1)
+    assert done.returncode == 1
+    assert f"timed out after {timeout} s" in done.stdout
+    assert not list((tmp_path / "out" / "cases").glob("*/finished.json"))
+
+
+def test_a_look_does_not_keep_a_run_from_its_case(tmp_path):
+    (case,) = read_study(one_case(tmp_path)).cases
+    folder = Folder(tmp_path / "out")
+    looks = threading.Event()
+
+    def look():
+        with folder.lock(case) as mine:
+            assert mine
+            looks.set()
+            # Longer than `status` takes.
+            time.sleep(0.02)
+
+    looker = threading.Thread(target=look)
+    looker.start()
+    looks.wait()
+    with folder.lock(case) as mine:
+        assert mine
+    looker.join()
