@@ -24,6 +24,7 @@ from .slurm import job_script
 from .store import StoredStudy, read_result, write_studies
 from .study import Case, Study, read_study
 
+WIDEST = 10_000
 SHIPPED = Path(str(files("lammps_inelastic.inputs") / "studies"))
 
 
@@ -201,10 +202,6 @@ def adopt_results(study: Study, folder: Folder, source: Path) -> int:
 
 def _print_status(study: Study, folder: Folder) -> None:
     table = Table("", "case", "state", "", title=Text(study.title), title_justify="left", box=None)
-    # A name is there to be copied: a line may be longer than the terminal is wide.
-    for column in table.columns:
-        column.no_wrap = True
-        column.overflow = "ignore"
     states: Counter[str] = Counter()
     other = 0
     for number, case in enumerate(study.cases, 1):
@@ -220,8 +217,8 @@ def _print_status(study: Study, folder: Folder) -> None:
                 other += 1
                 note += ", by another version of the deck"
         table.add_row(str(number), Text(case.name), state, Text(note))
-    console = Console(highlight=False)
-    console.print(table, width=max(console.width, console.measure(table).maximum), crop=False)
+    # A name is there to be copied, whole: a line may be longer than the terminal is wide.
+    Console(highlight=False, width=WIDEST).print(table)
     print(f"{study.name}: " + ", ".join(f"{count} {state}" for state, count in states.items()))
     if other:
         print(
