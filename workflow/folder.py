@@ -33,6 +33,8 @@ State = Literal["measured", "finished", "running", "cut off", "failed", "missing
 
 FINISHED, FAILED = "finished.json", "failed.json"
 PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
+# In the environment of every process that runs a case: a user's shell in its folder is left alone.
+MARK = "INELASTIC_CASE"
 # How long a killed process may take to go.
 PATIENCE = 10.0
 # How long after one attempt at a lock comes the next [seconds].
@@ -138,20 +140,34 @@ class Folder:
         self.part(case).rename(self.case(case))
         shutil.rmtree(self.failure(case), ignore_errors=True)
 
-    def fail(self, case: Case, reason: str) -> list[str]:
-        """Put a failed run aside; return the last lines of its output."""
+    def fail(self, case: Case, reason: str, job: str = "") -> list[str]:
+        """Put a failed run aside; return the last lines of its output.
+
+        Parameters
+        ----------
+        case : whose run it was
+        reason : in words
+        job : the MPI job that it was a part of, in which it is not tried again
+        """
         failure = self.failure(case)
         shutil.rmtree(failure, ignore_errors=True)
         self.part(case).rename(failure)
         lines = last_lines(failure / "lmp.out")
-        write_json(failure / FAILED, {"reason": reason, "last_lines": lines})
+        write_json(failure / FAILED, {"reason": reason, "job": job, "last_lines": lines})
         return lines
 
     def reason(self, case: Case) -> str:
         """Say why the last run failed."""
+        return self._of_failure(case, "reason")
+
+    def failed_in(self, case: Case, job: str) -> bool:
+        """Whether the last run failed as a part of this MPI job."""
+        return self._of_failure(case, "job") == job
+
+    def _of_failure(self, case: Case, what: str) -> str:
         try:
-            return str(json.loads((self.failure(case) / FAILED).read_text())["reason"])
-        except (OSError, ValueError, KeyError):
+            return str(json.loads((self.failure(case) / FAILED).read_text())[what])
+        except (OSError, ValueError, KeyError, TypeError):
             return "unknown"
 
 
@@ -211,8 +227,9 @@ def _processes_in(folder: Path) -> Iterator[int]:
             continue
         try:
             where = os.readlink(entry / "cwd")
+            ours = MARK.encode() in (entry / "environ").read_bytes()
             # A killed process that nobody has waited for yet still has an entry, without a folder.
         except OSError:
             continue
-        if where == inside or where.startswith(inside + "/"):
+        if ours and (where == inside or where.startswith(inside + "/")):
             yield int(entry.name)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from .folder import Folder, last_lines
+from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record
 from .study import Case, Stage, Study
@@ -82,9 +82,10 @@ def run_study(
         try:
             while waiting or jobs:
                 while waiting and len(jobs) < options.at_once:
-                    job = _Job(study, waiting.pop(0), folder, options)
-                    if job.begin(outcome, display):
-                        jobs.append(job)
+                    # Among the jobs before it starts anything that would have to be stopped.
+                    jobs.append(_Job(study, waiting.pop(0), folder, options))
+                    if not jobs[-1].begin(outcome, display):
+                        jobs.pop()
                 jobs = [job for job in jobs if job.goes_on(outcome, display)]
                 time.sleep(POLL)
         finally:
@@ -150,7 +151,7 @@ class _Job:
                 return False
             lines = last_lines(self._folder.case(self._case) / MEASURED)
             reason = lines[-1] if lines else exit_reason(code)
-            outcome.failed[name] = f"cannot be measured: {reason}"
+            outcome.failed[name] = unmeasurable(reason, self._folder.case(self._case))
             display.ended(name, f"CANNOT BE MEASURED: {name}", lines)
             self._held.close()
             return False
@@ -228,6 +229,11 @@ def measuring(study: Study, case: Case, folder: Folder) -> list[str]:
     return [sys.executable, "-m", module, ".", str(target), study.outputs.model_dump_json()]
 
 
+def unmeasurable(reason: str, folder: Path) -> str:
+    """Say why a finished run gives no result, and what to do about it."""
+    return f"cannot be measured: {reason}; delete {folder} to run it again"
+
+
 def measure_finished(study: Study, case: Case, folder: Folder) -> str | None:
     """Measure a finished run, and wait for it; say what went wrong, if anything did."""
     where = folder.case(case)
@@ -291,7 +297,7 @@ def environment() -> dict[str, str]:
     """Return the environment for a process of a case: its lmp first, one thread, no MPI job."""
     variables = {name: v for name, v in os.environ.items() if not _OF_MPI.match(name)}
     variables["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{variables.get('PATH', '')}"
-    return variables | {"OMP_NUM_THREADS": "1"}
+    return variables | {"OMP_NUM_THREADS": "1", MARK: "1"}
 
 
 def kill_group(process: subprocess.Popen[bytes]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -30,7 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return reproduce_command.run(options)
         return study_commands.run_command(options)
     except StudyError as error:
-        for mistake in error.mistakes:
+        # Every rank of an MPI job finds the same mistakes.
+        for mistake in error.mistakes if os.environ.get("PMI_RANK", "0") == "0" else ():
             _complain(mistake)
         return 2
     except (AnalysisError, WorkflowError, OSError) as error:

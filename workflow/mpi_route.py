@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
 import time
+import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,14 +23,15 @@ from mpi4py import MPI
 
 from .errors import WorkflowError
 from .folder import Folder
-from .launch import Options, Outcome, measure_finished, missing_file, prepare_stage
+from .launch import Options, Outcome, measure_finished, missing_file, prepare_stage, unmeasurable
 from .progress import Display
 from .provenance import run_record
 from .study import Case, Study
 
 # A deck that refuses its parameters quits. That would end the process, and all other cases with
 # it; an unknown command ends the deck only.
-QUIT, REFUSED = '"quit 1"', '"the_deck_has_refused"'
+_QUIT = re.compile(r"\bquit\b(?:\s+(\d+))?")
+REFUSED, ENDED = "the_deck_has_refused", "the_deck_has_ended"
 # What LAMMPS prints when its timer ends a run.
 CUT_SHORT = "Wall time limit reached"
 # Ranks that wait do not keep their cores busy.
@@ -51,11 +54,12 @@ def run_in_job(
         )
     group = _Group(world.Split(world.rank // options.ranks, world.rank))
     outcome = Outcome()
+    job = world.bcast(uuid.uuid4().hex)
     for case in cases:
         if group.leads:
             try:
                 with folder.lock(case) as mine:
-                    _lead(mine, study, case, folder, options, group, outcome, display)
+                    _lead(mine, study, case, folder, options, group, outcome, display, job)
             except Exception as error:
                 if world.size > 1:
                     # Such as a full disk. The other ranks would wait for this one for ever.
@@ -101,9 +105,10 @@ def _lead(
     group: _Group,
     outcome: Outcome,
     display: Display,
+    job: str,
 ) -> None:
     """Do with a case what is to be done, and keep the books."""
-    if not mine or folder.is_measured(study, case):
+    if not mine or folder.is_measured(study, case) or folder.failed_in(case, job):
         (outcome.kept if mine else outcome.elsewhere).append(case.name)
         group.agree(NOTHING)
         return
@@ -119,7 +124,7 @@ def _lead(
         reason = _run(case, part, options, group)
         seconds = time.time() - began
         if reason is not None:
-            lines = folder.fail(case, reason)
+            lines = folder.fail(case, reason, job)
             outcome.failed[case.name] = reason
             display.ended(case.name, f"FAILED ({reason}): {case.name}", lines)
             return
@@ -131,7 +136,7 @@ def _lead(
         outcome.measured.append(case.name)
         display.ended(case.name, f"done in {time.time() - began:.0f} s: {case.name}")
     else:
-        outcome.failed[case.name] = f"cannot be measured: {reason}"
+        outcome.failed[case.name] = unmeasurable(reason, folder.case(case))
         display.ended(case.name, f"CANNOT BE MEASURED ({reason}): {case.name}")
 
 
@@ -151,7 +156,7 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
             try:
                 if options.timeout is not None:
                     engine.command(f"timer timeout {math.ceil(options.timeout)} every 10")
-                engine.commands_string(text.replace(QUIT, REFUSED))
+                engine.commands_string(_without_quit(text))
             except MPIAbortException as error:
                 if group.ranks.size > 1:
                     # The other ranks of the group wait for this one for ever.
@@ -160,7 +165,10 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
                 return _last(error)
             # LAMMPS's own errors have no class of their own, and come on all ranks.
             except Exception as error:
-                return _last(error)
+                if REFUSED in str(error):
+                    return "exit status 1"
+                if ENDED not in str(error):
+                    return _last(error)
             finally:
                 engine.close()
                 if group.leads:
@@ -179,6 +187,11 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
     finally:
         os.chdir(home)
     return None
+
+
+def _without_quit(text: str) -> str:
+    """Put an unknown command in the place of each `quit`."""
+    return _QUIT.sub(lambda quit: REFUSED if int(quit.group(1) or 0) else ENDED, text)
 
 
 def _last(error: Exception) -> str:

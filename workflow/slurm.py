@@ -37,7 +37,7 @@ def job_script(study: Study, path: Path, folder: Folder, ranks: int, time: str) 
     return "\n".join(
         [
             "#!/bin/bash",
-            f"#SBATCH --job-name={study.name}",
+            f"#SBATCH --job-name={'-'.join(study.name.split())}",
             f"#SBATCH --array={_ranges(left)}",
             f"#SBATCH --ntasks={ranks}",
             "#SBATCH --nodes=1",

@@ -72,7 +72,7 @@ class ProfileOutput(_Table):
     axis: Literal["x", "y", "z"] = "x"
     thickness: Annotated[float, Field(gt=0, le=1)] = 0.1
     reach: Annotated[float, Field(gt=0)] = 0.25
-    points: Annotated[int, Field(ge=1)] = 100_000
+    points: Annotated[int, Field(ge=1, strict=True)] = 100_000
 
 
 class Outputs(_Table):
@@ -91,7 +91,7 @@ class Outputs(_Table):
     """
 
     box: Bounds = PAPER_BOX
-    points: Annotated[int, Field(ge=1)] = 1_000_000
+    points: Annotated[int, Field(ge=1, strict=True)] = 1_000_000
     evolution: bool = True
     profile: ProfileOutput | None = None
     structure: bool = True
@@ -332,7 +332,11 @@ def _decks(name: Any, folder: Path) -> list[Deck]:
     names = name if isinstance(name, list) else [name]
     if not names or not all(isinstance(each, str) for each in names):
         raise WorkflowError(f"a deck is a name, or a list of names, not {name!r}")
-    return [find_deck(each, folder) for each in names]
+    decks = [find_deck(each, folder) for each in names]
+    # Each writes to a folder of its name.
+    if len({deck.name for deck in decks}) < len(decks):
+        raise WorkflowError(f"{names!r} names a deck twice; each may be there once")
+    return decks
 
 
 def _decks_of(file: _StudyFile, folder: Path) -> list[Deck]:

@@ -16,9 +16,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from .errors import WorkflowError
-from .folder import Folder
-from .launch import Options, Outcome, run_study
+from .errors import StudyError, WorkflowError
+from .folder import Folder, last_lines
+from .launch import MEASURED, Options, Outcome, run_study
 from .progress import Display
 from .slurm import job_script
 from .store import StoredStudy, read_result, write_studies
@@ -91,7 +91,19 @@ def add_parsers(commands: argparse._SubParsersAction[Any]) -> None:
 
 def run_command(options: argparse.Namespace) -> int:
     """Run one of these subcommands; return its exit status."""
-    studies = [read_study(_found(path)) for path in options.studies]
+    if options.command == "slurm" and len(options.studies) > 1:
+        raise WorkflowError("slurm: one study at a time")
+    studies: list[Study] = []
+    mistakes: list[str] = []
+    for path in options.studies:
+        try:
+            studies.append(read_study(_found(path)))
+        except StudyError as error:
+            mistakes += error.mistakes
+    if mistakes:
+        raise StudyError(mistakes)
+    if len({study.name for study in studies}) < len(studies):
+        raise WorkflowError("two studies have the same file name; it is the name of their results")
     if options.command == "validate":
         for study, path in zip(studies, options.studies, strict=True):
             print(f"{path}: fine, {_cases(study.cases)}")
@@ -110,8 +122,7 @@ def run_command(options: argparse.Namespace) -> int:
         print(f"written: {file}")
         return 0
     if options.command == "slurm":
-        (study,) = studies if len(studies) == 1 else _one_study()
-        print(job_script(study, _found(options.studies[0]), folder, options.ranks, options.time))
+        print(job_script(studies[0], _found(options.studies[0]), folder, options.ranks, options.time))
         return 0
     return _run(options, studies, folder)
 
@@ -210,6 +221,8 @@ def _print_status(study: Study, folder: Folder) -> None:
         note = ""
         if state == "failed":
             note = folder.reason(case)
+        elif state == "finished" and (lines := last_lines(folder.case(case) / MEASURED)):
+            note = f"cannot be measured: {lines[-1]}"
         elif state == "measured":
             record = read_result(folder.result(study, case)).record
             note = f"{record['wall_seconds']:.0f} s"
@@ -251,13 +264,12 @@ def _found(path: Path) -> Path:
 
 def at_once(options: argparse.Namespace) -> int:
     """Return how many cases may run at a time: as asked, or as the cores allow."""
+    cores = len(os.sched_getaffinity(0))
+    if options.ranks > cores and not getattr(options, "mpi", False):
+        raise WorkflowError(f"--ranks {options.ranks}: each rank needs one of the {cores} cores")
     if options.at_once is not None:
         return int(options.at_once)
-    return max(1, len(os.sched_getaffinity(0)) // int(options.ranks))
-
-
-def _one_study() -> tuple[Study]:
-    raise WorkflowError("slurm: one study at a time")
+    return max(1, cores // int(options.ranks))
 
 
 def _cases(cases: Sequence[Case]) -> str:
