@@ -298,7 +298,10 @@ def _labels(panel: Panel) -> list[str]:
 def _fits(panels: Sequence[Panel]) -> bool:
     """Say whether the legends are small enough to stand within the axes."""
     return all(
-        len(labels) <= MOST_INSIDE and max(map(len, labels)) <= LONGEST_INSIDE
+        len(labels) <= MOST_INSIDE
+        and max(map(len, labels)) <= LONGEST_INSIDE
+        # Error bars of many curves leave no room.
+        and sum(one.kind == "points" for one in panel.curves) <= 2
         for panel in panels
         if len(labels := _labels(panel)) > 1
     )
