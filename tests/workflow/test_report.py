@@ -401,6 +401,19 @@ def test_large_difference_is_marked():
     assert (z.text, z.marked) == ("+14.7", True)
 
 
+def test_solvers_are_not_mixed():
+    runs = [
+        measured(z=z, tolerance=0.005, solver=solver, seed=seed)
+        for solver, z in (("apgd", 5.8), ("uzawa", 6.2))
+        for seed in (1, 2)
+    ]
+    section = sections_of(study("table-1", runs))["table-1"]
+    assert {one.what: one.ours.mean for one in section.comparisons if one.what[0] == "z"} == {
+        "z, ε = 0.005 r, with random force": 5.8,
+        "z, ε = 0.005 r, with random force, uzawa": 6.2,
+    }
+
+
 def test_anisotropy_is_compared_with_the_consistent_aspect_ratio(sections):
     whats = [one.what for one in sections["anisotropy"].comparisons]
     assert whats == [f"a_{axis} over isotropic, L/d = 1.8" for axis in "xyz"]

@@ -18,6 +18,8 @@ from .statistics import FloatArray, grouped, matching
 
 # Decks in whose results a particle is a sphere.
 SPHERES = "spheres"
+# The decks' words for the solvers: our own, and the paper's.
+OUR_SOLVER, PAPER_SOLVER = "apgd", "uzawa"
 # Of the paper where it states no other, radii.
 USUAL_TOLERANCE = 0.0005
 
@@ -120,6 +122,11 @@ def nearest_size(results: Sequence[Result], wanted: int) -> list[Result]:
 def count_of(results: Sequence[Result]) -> int:
     """Return the number of particles that the results were asked to have."""
     return int(results[0].variables.get("particles", results[0].number("particles")))
+
+
+def solver_of(result: Result) -> str:
+    """Return the solver of a run; results older than the choice are of our own."""
+    return str(result.variables.get("solver", OUR_SOLVER))
 
 
 def unlike(results: Sequence[Result], particles: int, runs: int = 0) -> str:
