@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from .contacts import ContactFrame
@@ -16,6 +16,9 @@ from .errors import InputError
 from .geometry import FloatArray, IntArray, as_box, particles_inside
 from .packing import packing_fraction
 from .particles import ParticleFrame
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Positions (n, 3), radii (n,) and a box (3, 2) to a packing fraction.
 PackingFractionOf = Callable[[ArrayLike, ArrayLike, ArrayLike], float]

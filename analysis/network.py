@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import networkx
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from numpy.typing import ArrayLike
 
 from .bodies import Particles, group_spheres
 from .coordination import contact_sides
 from .errors import InputError
 from .geometry import FloatArray, as_positions
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PALETTE = "viridis"
 # Of the line of the mean force, in points.
@@ -100,6 +99,11 @@ def draw_network(
         in the paper
     palette : name of a colour map of matplotlib
     """
+    # Here and not above: what draws takes a second to import, which counting need not wait for.
+    from matplotlib.collections import LineCollection
+    from mpl_toolkits.mplot3d import Axes3D
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
     if not (up in (0, 1, 2) and across in (0, 1, 2) and up != across):
         raise InputError(f"up and across must be two of the axes 0, 1, 2, not {up} and {across}")
     nodes = [node for node in graph if node >= 0]

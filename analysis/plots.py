@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
 from .errors import InputError
 from .geometry import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -229,6 +230,8 @@ def draw_dimer_section(ax: Axes, aspect_ratio: float) -> Axes:
     ax : to draw on; its scale becomes diameters
     aspect_ratio : length over diameter, above 1 and up to 2
     """
+    from matplotlib.patches import Circle
+
     half = _half_distance(aspect_ratio)
     if half == 0:
         raise InputError("a dimer of aspect ratio 1 is a sphere: it has no neck")

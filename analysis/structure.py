@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, as_box, as_positions, particles_inside
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Order of a sphere's twelve neighbours in the two densest crystals: Steinhardt, Nelson and
 # Ronchetti, Physical Review B 28 (1983) 784.

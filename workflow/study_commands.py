@@ -122,7 +122,9 @@ def run_command(options: argparse.Namespace) -> int:
         print(f"written: {file}")
         return 0
     if options.command == "slurm":
-        print(job_script(studies[0], _found(options.studies[0]), folder, options.ranks, options.time))
+        print(
+            job_script(studies[0], _found(options.studies[0]), folder, options.ranks, options.time)
+        )
         return 0
     return _run(options, studies, folder)
 
