@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
 
 from lammps_inelastic.workflow.errors import WorkflowError
+from lammps_inelastic.workflow.schema import SCHEMA
 from lammps_inelastic.workflow.store import (
     Result,
     StoredStudy,
@@ -82,3 +86,13 @@ def test_another_version_is_said(tmp_path):
         file.attrs["schema_version"] = 99
     with pytest.raises(WorkflowError, match="schema version 99"):
         read_result(path)
+
+
+def test_the_document_lists_the_schema():
+    """workflow/README.md has a line for each dataset, as the schema says it."""
+    document = (Path(__file__).parents[2] / "workflow" / "README.md").read_text()
+    rows = [line for line in document.splitlines() if re.match(r"\| `\w+/\w+` \|", line)]
+    assert rows == [
+        f"| `{name}` | {entry.shape} | {entry.unit} | {entry.meaning} |"
+        for name, entry in SCHEMA.items()
+    ]
