@@ -1,5 +1,6 @@
 # make run      set up, pour 1,000 spheres, print what came out
 # make test     set up, check style and types, run the tests
+# make report   set up, write the report of the paper's studies from the results kept here
 # make validate set up, check the physics (minutes)
 # make bench    set up, measure iterations and times
 # make tables   set up, print the measured tables of the documentation (an hour)
@@ -14,11 +15,14 @@ SOURCES := $(shell find src_fix inputs workflow analysis -type f -not -path '*/_
 # The environment's mpicxx and mpiexec come before any of the system's.
 export PATH := $(abspath $(BIN)):$(PATH)
 
-.PHONY: run test validate tables bench setup clean
+.PHONY: run report test validate tables bench setup clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
 	inelastic look out
+
+report: setup
+	inelastic reproduce --stored-only --out paper
 
 test: setup
 	ruff check .
