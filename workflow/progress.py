@@ -22,8 +22,14 @@ class Display:
     A log gets one line when a case starts, one when it ends, and one a minute in between.
     """
 
-    def __init__(self, cases: int, console: Console | None = None) -> None:
-        """Show nothing yet."""
+    def __init__(self, cases: int | None, console: Console | None = None) -> None:
+        """Show nothing yet.
+
+        Parameters
+        ----------
+        cases : number of cases; None where several displays share them, as in an MPI job
+        console : where to show it; None: on the standard output
+        """
         self._console = console or Console(stderr=False, soft_wrap=True, highlight=False)
         self._cases = cases
         self._done = 0
@@ -31,7 +37,7 @@ class Display:
         self._steps: dict[str, tuple[int, int]] = {}
         self._tasks: dict[str, TaskID] = {}
         self._progress: Progress | None = None
-        if self._console.is_terminal:
+        if self._console.is_terminal and cases is not None:
             self._progress = Progress(
                 TextColumn("{task.description}"),
                 BarColumn(),
@@ -85,7 +91,7 @@ class Display:
         """A case is done or has failed; `more` are lines of its log."""
         self._done += 1
         self._remove(case)
-        self.say(f"[{self._done}/{self._cases}] {line}")
+        self.say(line if self._cases is None else f"[{self._done}/{self._cases}] {line}")
         for text in more:
             self.say(f"    {text}")
         if self._progress:
@@ -99,4 +105,4 @@ class Display:
 
 
 def _short(name: str, length: int = 60) -> str:
-    return name if len(name) <= length else f"{name[: length - 12]}...{name[-9:]}"
+    return name if len(name) <= length else f"{name[:18]}...{name[21 - length :]}"

@@ -157,7 +157,7 @@ def run_one(
 ) -> Outcome:
     """Run the cases of a study, gather its results, and say what became of them."""
     first = True
-    with Display(len(cases)) as display:
+    with Display(None if in_job else len(cases)) as display:
         if in_job:
             from mpi4py import MPI
 
