@@ -217,8 +217,9 @@ class _Job:
         self._looked = time.monotonic()
         stage = self._case.stages[self._stage]
         steps = steps_of(stage)
-        log = self._folder.part(self._case) / self._case.folder_of(stage) / "log.lammps"
-        if steps and (step := step_of(log)) is not None:
+        # Not the log: a deck that opens another one has it buffered.
+        output = self._folder.part(self._case) / "lmp.out"
+        if steps and (step := step_of(output)) is not None:
             display.stepped(self._case.name, min(step, steps), steps)
 
 
@@ -284,9 +285,9 @@ def steps_of(stage: Stage) -> int:
     return sum(step for step in steps if isinstance(step, int))
 
 
-def step_of(log: Path) -> int | None:
-    """Return the step of a log's last line of thermo output."""
-    for line in reversed(last_lines(log, 40)):
+def step_of(output: Path) -> int | None:
+    """Return the step in LAMMPS's last line of thermo output."""
+    for line in reversed(last_lines(output, 40)):
         word, _, rest = line.strip().partition(" ")
         if word.isdigit() and rest.strip()[:1] in "-0123456789":
             return int(word)

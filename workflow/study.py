@@ -219,7 +219,7 @@ class Case:
     def commands(self, ranks: int = 1) -> list[list[str]]:
         """The commands that run the stages in the case's folder.
 
-        The log is not buffered, so that one can see how far a run has come.
+        The output is not buffered, so that one can see how far a run has come.
         """
         commands = []
         before = None
