@@ -224,7 +224,7 @@ def test_colours_are_the_contacts_of_bodies(dimers, monkeypatch):
     def remember(path, positions, radii, container, contacts, *, contacts_per_colour):
         drawn["contacts"], drawn["contacts_per_colour"] = contacts.tolist(), contacts_per_colour
 
-    monkeypatch.setattr("lammps_inelastic.workflow.main.draw_packing", remember)
+    monkeypatch.setattr("lammps_inelastic.workflow.look_command.draw_packing", remember)
     assert main(["look", str(dimers), *MIDDLE]) == 0
     # Of the last frame, sphere by sphere in the order of the ids.
     assert drawn == {"contacts": [4, 7, 7, 4] * 2, "contacts_per_colour": 2}
