@@ -177,8 +177,9 @@ def plot_wall_profile(
     plot_curve(ax, scaled, values, errors=errors, label=label, number=number)
     ax.set_xlabel("distance from the wall / d")
     ax.set_ylabel("packing fraction")
-    ax.set_xlim(left=0)
-    ax.set_ylim(bottom=0)
+    # Still to be scaled by the curves that come after this one.
+    ax.set_xlim(left=0, auto=True)
+    ax.set_ylim(bottom=0, auto=True)
     return ax
 
 

@@ -37,14 +37,12 @@ from lammps_inelastic.analysis import (
 
 from .folder import CONTACTS as CONTACT_DUMP
 from .folder import PARTICLES as PARTICLE_DUMP
+from .measure import contacts_per_colour
 from .study import PAPER_BOX
 
 PICTURE = "packing.png"
 
 NO_WALLS = "the box is not fixed: give --container or --walls"
-
-# A body in a packing has about ten contacts and more, a sphere about six.
-CONTACTS_PER_COLOUR_OF_BODIES = 2
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -226,7 +224,7 @@ def run(options: argparse.Namespace) -> int:
                 frame.radii,
                 frame.box if walls is None else walls,
                 counts[-1].particles[particles.index],
-                contacts_per_colour=CONTACTS_PER_COLOUR_OF_BODIES if particles.composite else 1,
+                contacts_per_colour=contacts_per_colour(frame),
             )
         # The numbers do not need the picture: they are printed, and what failed is said last.
         except PictureError as error:

@@ -356,7 +356,13 @@ def _pictures(dump: ParticleDump, folder: Path, outputs: Outputs) -> dict[str, b
             index = int(np.argmin(np.abs(np.array(dump.steps) - wanted)))
             frame = dump[index]
             spheres = frame.positions, frame.radii
-            draw_packing(target, *spheres, frame.box, contacts_per_particle(frame))
+            draw_packing(
+                target,
+                *spheres,
+                frame.box,
+                contacts_per_particle(frame),
+                contacts_per_colour=contacts_per_colour(frame),
+            )
             pictures[f"{frame.step:08d}"] = _small(target)
         if outputs.network:
             frame = dump[-1]
@@ -381,6 +387,11 @@ def contacts_per_particle(frame: ParticleFrame) -> NDArray[np.int64] | None:
     index = frame.particles.index
     sums = np.bincount(index, weights=frame.contacts)
     return sums[index].astype(np.int64)
+
+
+def contacts_per_colour(frame: ParticleFrame) -> int:
+    """Return how many numbers of contacts share a colour: a body has ten and more, a sphere six."""
+    return 2 if frame.particles.composite else 1
 
 
 def _last_contacts(path: Path) -> ContactFrame:
