@@ -28,6 +28,7 @@ STUDIES = (
     "figure-8",
     "dimers",
     "figure-10",
+    "dimers-agitation",
     "response",
     "protocol",
 )
