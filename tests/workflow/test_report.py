@@ -50,6 +50,7 @@ ANCHORS = {
     "table-2",
     *(f"figure-{number}" for number in range(6, 15)),
     "anisotropy",
+    "dimers-agitation",
     "structure",
     "forces",
     "response",
@@ -172,6 +173,11 @@ def whole_paper():
         for aspect, phi in ((1.1, 0.68), (1.5, 0.71), (1.6, 0.7), (1.8, 0.69), (1.95, 0.66))
         for seed in (1, 2)
     ]
+    shaken = [
+        measured(deck="dimers", aspect_ratio=1.8, random_force=force, seed=seed)
+        for force in (0, 30.0, 200.0)
+        for seed in (1, 2)
+    ]
     response = [
         measured(deck="spheres+response", change="walls", pictures=falling, before=measured()),
         measured(deck="spheres+response", change="tilt", angle=20, before=measured(z=6.1)),
@@ -188,6 +194,7 @@ def whole_paper():
         study("figure-8", [measured(pictures=("network",))]),
         study("dimers", dimers),
         study("figure-10", [measured(deck="dimers", aspect_ratio=1.5, pictures=falling)]),
+        study("dimers-agitation", shaken),
         study("response", response),
         study("protocol", protocol),
     ]

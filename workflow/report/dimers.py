@@ -32,6 +32,7 @@ from .statistics import (
     FloatArray,
     Sample,
     Stated,
+    by_value,
     grouped,
     mean_curve,
     mean_distribution,
@@ -53,6 +54,7 @@ def dimers_sections(data: Data) -> list[Section]:
         _figure_9(),
         _figure_10(data),
         _anisotropy(data, groups),
+        _agitation(data),
         _figure_11(data, groups),
         _figure_12(data, groups),
         _figure_13(data, groups),
@@ -221,6 +223,77 @@ def _anisotropy(data: Data, groups: ByAspect) -> Section:
             ),
         ]
     return section("anisotropy", "Orientation of dimers", blocks, comparisons, ("dimers",))
+
+
+def _agitation(data: Data) -> Section:
+    """Show the study of the random force, which the paper does not state, beside its numbers."""
+    results = [r for r in data.results("dimers-agitation") if "random_force" in r.variables]
+    groups = dict(sorted(grouped(results, by_value("random_force")).items()))
+    stated = data.paper["dimers"]["anisotropy"]
+    blocks: list[Block] = []
+    if groups:
+        ratios = {axis: [_components(group, axis) for group in groups.values()] for axis in "xyz"}
+        rows = [
+            cells(
+                as_short(force),
+                len(group),
+                *(f"{as_text(r.mean, 3)} ± {as_text(r.error, 3)}" for r in lie),
+                as_sample(numbers(group, "packing_fraction").scaled(100), 2),
+                as_sample(numbers(group, "coordination_number"), 3),
+            )
+            for (force, group), *lie in zip(groups.items(), *ratios.values(), strict=True)
+        ]
+        aspect = results[0].variables.get("aspect_ratio", math.nan)
+        blocks = [
+            Figure(
+                "dimers-agitation",
+                f"As above for {count_of(results):,} dimers of L/d = {as_short(aspect)}, against "
+                "the largest random acceleration of a sphere. Lines: the paper's numbers.",
+                [
+                    Panel(
+                        "random force",
+                        "a / isotropic a",
+                        [
+                            curve(
+                                f"a_{axis}",
+                                list(groups),
+                                [ratio.mean for ratio in of_axis],
+                                [ratio.error for ratio in of_axis],
+                                "points",
+                            )
+                            for axis, of_axis in ratios.items()
+                        ],
+                        references=[
+                            (f"a_{axis}, paper", stated[f"a_{axis}"] / stated["isotropic"])
+                            for axis in "xyz"
+                        ],
+                    )
+                ],
+            ),
+            Table(
+                "Orientation of dimers against the random force",
+                (
+                    "random force",
+                    "runs",
+                    *tuple(f"a_{axis} / isotropic" for axis in "xyz"),
+                    "φ [%]",
+                    "z",
+                ),
+                rows,
+                ("± standard error; φ and z: mean ± standard deviation (standard error).",),
+            ),
+            Text(
+                "The paper does not say how strong its random force is: compare where its numbers "
+                "lie with how ours change."
+            ),
+        ]
+    return section(
+        "dimers-agitation",
+        "Orientation of dimers and the random force",
+        blocks,
+        (),
+        ("dimers-agitation",),
+    )
 
 
 def _against(label: str, groups: ByAspect, name: str, kind: Any = "points") -> Curve:
