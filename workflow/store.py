@@ -124,7 +124,12 @@ def write_studies(path: Path, studies: Sequence[StoredStudy]) -> None:
 
 
 def read_studies(path: Path) -> list[StoredStudy]:
-    """Read a file that `write_studies` wrote."""
+    """Read a file that `write_studies` wrote.
+
+    Raises WorkflowError if it is none.
+    """
+    if not path.is_file():
+        raise WorkflowError(f"{path}: no such file")
     try:
         with h5py.File(path) as file:
             _check_version(file, path)

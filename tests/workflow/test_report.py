@@ -488,14 +488,16 @@ def test_two_studies_of_one_name_are_refused(tmp_path, capsys):
     assert not (tmp_path / "r.html").exists()
 
 
-@pytest.mark.parametrize("content", [None, b"no HDF5"])
-def test_file_that_is_no_study_file(tmp_path, capsys, content):
+@pytest.mark.parametrize(
+    ("content", "named"), [(None, "no such file"), (b"no HDF5", "not a file of studies")]
+)
+def test_file_that_is_no_study_file(tmp_path, capsys, content, named):
     path = tmp_path / "a.h5"
     if content is not None:
         path.write_bytes(content)
     assert main(["report", str(path), "--out", str(tmp_path / "r.html")]) == 2
     error = capsys.readouterr().err
-    assert error.startswith(f"inelastic: {path}: not a file of studies")
+    assert error.startswith(f"inelastic: {path}: {named}")
     assert error.count("\n") == 1
     assert not (tmp_path / "r.html").exists()
 
