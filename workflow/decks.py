@@ -73,6 +73,7 @@ RULES: Mapping[str, Rule] = {
     "diameter": _numbers("between 0 and 1", lambda value: 0 < value < 1),
     "aspect_ratio": _numbers("above 1 and up to 2", lambda value: 1 < value <= 2),
     "tolerance": _POSITIVE,
+    "tolerance_agitated": _POSITIVE,
     "tolerance_measuring": _POSITIVE,
     "dt": _POSITIVE,
     "steps_agitated": _integers(0),
