@@ -5,12 +5,14 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..decks import SHIPPED, Value, find_deck
 from ..errors import WorkflowError
 from ..reproduce_command import STUDIES as OF_THE_PAPER
 from ..store import Result, StoredStudy, read_studies
@@ -64,10 +66,29 @@ def read_data(paths: Iterable[Path]) -> Data:
             # A case that is there twice was run twice: the first one counts.
             cases = {result.case: result for result in [*study.results, *known.results]}
             studies[study.name] = replace(known, results=list(cases.values()))
+    for name, study in studies.items():
+        studies[name] = replace(study, results=[_completed(result) for result in study.results])
     # Those of the paper first, in its order: a file has them in that of the alphabet.
     order = [name for name in OF_THE_PAPER if name in studies]
     order += [name for name in studies if name not in OF_THE_PAPER]
     return Data({name: studies[name] for name in order}, paper_numbers())
+
+
+def _completed(result: Result) -> Result:
+    """Return a result that has all variables of today's decks, so that it groups with newer ones.
+
+    A deck had no such choice before it had the variable: it did what the default does.
+    """
+    stages = [
+        {**stage, "variables": {**_defaults(stage["deck"]), **stage["variables"]}}
+        for stage in result.record["stages"]
+    ]
+    return replace(result, record={**result.record, "stages": stages})
+
+
+@cache
+def _defaults(deck: str) -> Mapping[str, Value]:
+    return find_deck(deck, Path()).parameters if deck in SHIPPED else {}
 
 
 def profile(result: Result) -> tuple[FloatArray, FloatArray] | None:
@@ -125,7 +146,7 @@ def count_of(results: Sequence[Result]) -> int:
 
 
 def solver_of(result: Result) -> str:
-    """Return the solver of a run; results older than the choice are of our own."""
+    """Return the solver of a run; a deck that does not say it uses our own."""
     return str(result.variables.get("solver", OUR_SOLVER))
 
 
