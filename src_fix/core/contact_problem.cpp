@@ -6,10 +6,11 @@
 
 namespace inelastic {
 
-void ContactProblem::resize(int number_of_particles)
+void ContactProblem::resize(int owned_particles, int copies)
 {
-  particles = number_of_particles;
-  const std::size_t slots = static_cast<std::size_t>(number_of_particles) + 1;
+  owned = owned_particles;
+  particles = owned_particles + copies;
+  const std::size_t slots = static_cast<std::size_t>(particles) + 1;
   predicted_velocity.resize(3 * slots);
   inverse_mass.resize(slots);
   std::fill_n(predicted_velocity.end() - 3, 3, 0.0);
@@ -87,7 +88,7 @@ void GapOperator::velocity_change(const ContactProblem &problem, const double *i
   double *const change = change_.data();
   std::fill(change_.begin(), change_.end(), 0.0);
   scatter_impulses(problem.contacts, impulse, change);
-  host.sum_over_copies(change);
+  host.sum_over_copies(change, 3);
   auto divide_by_mass = [&](std::size_t i) {
     const double w = problem.inverse_mass[i];
     change[3 * i] *= w;

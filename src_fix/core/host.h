@@ -9,11 +9,13 @@ namespace inelastic {
 
 class Host {
  public:
-  // Per-particle vectors (3 doubles each, owned particles first, then copies of particles that
-  // other ranks own): add the copies' values to their owners, then give every copy its owner's sum.
-  virtual void sum_over_copies(double *per_particle) = 0;
+  // Per-particle vectors (3 numbers each, the next particle's `stride` numbers further; owned
+  // particles first, then copies of particles that other ranks own): add the copies' values to their
+  // owners, then give every copy its owner's sum.
+  virtual void sum_over_copies(double *per_particle, int stride) = 0;
+  virtual void sum_over_copies(float *per_particle, int stride) = 0;
 
-  // Per-particle vectors: give every copy its owner's value. For those who set up a problem: the
+  // Per-particle vectors (3 doubles each): give every copy its owner's value. For those who set up a problem: the
   // copies need predicted velocities too.
   virtual void share_with_copies(double *per_particle) = 0;
 
@@ -26,7 +28,8 @@ class Host {
 
 class SerialHost final : public Host {
  public:
-  void sum_over_copies(double *) override {}
+  void sum_over_copies(double *, int) override {}
+  void sum_over_copies(float *, int) override {}
   void share_with_copies(double *) override {}
   void reduce(double *, int, double *, int) override {}
 };

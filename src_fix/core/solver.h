@@ -42,34 +42,6 @@ class Solver {
   virtual SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) = 0;
 };
 
-// Accelerated projected gradient on the dual (Nesterov 1983; restarts after O'Donoghue and Candes,
-// Found. Comput. Math. 15 (2015) 715), in impulses scaled so that A has a unit diagonal. The step
-// 1/L follows the curvature met on the way, which costs no extra product with A; L is remembered
-// from one call to the next.
-class AcceleratedProjectedGradient final : public Solver {
- public:
-  SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
-
- private:
-  struct Advance {
-    double uphill;            // > 0: the momentum points uphill
-    double change_squared;    // squared norm of the change of the scaled impulses
-  };
-  struct Outcome {
-    double curved;    // change . A change
-    Residual residual;
-  };
-  Advance advance_impulses(std::size_t count, double momentum, double step);
-  Outcome compare(std::size_t count) const;
-
-  GapOperator gap_operator_;
-  // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
-  double curvature_ = 0.0;
-  std::vector<double> diagonal_;    // of A
-  std::vector<double> impulse_, impulse_before_, impulse_next_;
-  std::vector<double> gap_, gap_before_, gap_next_;
-};
-
 // The paper's solver: projected gradient with a fixed step from zero impulses, which stops on
 // feasibility alone. The step is 1 over the largest eigenvalue of A, from power iteration that is
 // not counted among the iterations.

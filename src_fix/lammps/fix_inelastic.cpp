@@ -90,7 +90,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
     wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
     run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0),
-    run_shortened_(0), exchanged_(nullptr), exchanging_memory_(false)
+    run_shortened_(0), exchanged_(nullptr), exchanged_single_(nullptr), exchanged_stride_(3),
+    exchanging_memory_(false)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -458,7 +459,7 @@ void FixInelastic::predict(double kick_steps)
   const int *const mask = atom->mask;
   kick_ = kick_steps * update->dt;
   problem_.timestep = update->dt;
-  problem_.resize(nall);
+  problem_.resize(nlocal, atom->nghost);
   for (int i = 0; i < nall; ++i) {
     const bool moves = (mask[i] & groupbit) && !(mask[i] & frozen_bit_);
     problem_.inverse_mass[i] = moves ? 1.0 / mass(i) : 0.0;
@@ -1255,8 +1256,8 @@ void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
   size_local_rows = row;
   share_virial();
 
-  sum_over_copies(contact_force_.data());
-  sum_over_copies(contact_count_.data());
+  sum_over_copies(contact_force_.data(), 3);
+  sum_over_copies(contact_count_.data(), 3);
   for (int i = 0; i < nlocal; ++i) {
     array_atom[i][0] = contact_count_[3 * i];
     array_atom[i][1] = contact_count_[3 * i + 1];
@@ -1297,8 +1298,8 @@ void FixInelastic::tally_virial(int i, int j, const double *v)
 void FixInelastic::share_virial()
 {
   if (!vflag_atom) return;
-  sum_over_copies(virial_diagonal_.data());
-  sum_over_copies(virial_off_diagonal_.data());
+  sum_over_copies(virial_diagonal_.data(), 3);
+  sum_over_copies(virial_off_diagonal_.data(), 3);
   for (int i = 0; i < atom->nlocal; ++i)
     for (int k = 0; k < 3; ++k) {
       vatom[i][k] += virial_diagonal_[3 * i + k];
@@ -1405,18 +1406,30 @@ int FixInelastic::unpack_exchange(int i, double *buffer)
 bool FixInelastic::has_copies() const
 { return comm->nprocs > 1 || atom->nghost > 0; }
 
-void FixInelastic::sum_over_copies(double *per_particle)
+void FixInelastic::sum_over_copies(double *per_particle, int stride)
 {
   if (!has_copies()) return;
   exchanged_ = per_particle;
+  exchanged_stride_ = stride;
   comm->reverse_comm(this, 3);
   comm->forward_comm(this);
+}
+
+void FixInelastic::sum_over_copies(float *per_particle, int stride)
+{
+  if (!has_copies()) return;
+  exchanged_single_ = per_particle;
+  exchanged_stride_ = stride;
+  comm->reverse_comm(this, 3);
+  comm->forward_comm(this);
+  exchanged_single_ = nullptr;
 }
 
 void FixInelastic::share_with_copies(double *per_particle)
 {
   if (!has_copies()) return;
   exchanged_ = per_particle;
+  exchanged_stride_ = 3;
   comm->forward_comm(this);
 }
 
@@ -1435,12 +1448,25 @@ void FixInelastic::reduce(double *sums, int number_of_sums, double *maxima, int 
 
 int FixInelastic::pack_forward_comm(int n, int *list, double *buffer, int, int *)
 {
-  for (int k = 0; k < n; ++k) std::copy_n(exchanged_ + 3 * list[k], 3, buffer + 3 * k);
+  const int stride = exchanged_stride_;
+  for (int k = 0; k < n; ++k)
+    if (exchanged_single_)
+      std::copy_n(exchanged_single_ + stride * list[k], 3, buffer + 3 * k);
+    else
+      std::copy_n(exchanged_ + stride * list[k], 3, buffer + 3 * k);
   return 3 * n;
 }
 
 void FixInelastic::unpack_forward_comm(int n, int first, double *buffer)
-{ std::copy_n(buffer, 3 * n, exchanged_ + 3 * first); }
+{
+  const int stride = exchanged_stride_;
+  for (int k = 0; k < n; ++k)
+    for (int d = 0; d < 3; ++d)
+      if (exchanged_single_)
+        exchanged_single_[stride * (first + k) + d] = static_cast<float>(buffer[3 * k + d]);
+      else
+        exchanged_[stride * (first + k) + d] = buffer[3 * k + d];
+}
 
 int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
 {
@@ -1449,7 +1475,12 @@ int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
     for (int k = 0; k < n; ++k) memory_.pack(first + k, buffer + k * SIZE, SHARED_PARTNERS);
     return n * SIZE;
   }
-  std::copy_n(exchanged_ + 3 * first, 3 * n, buffer);
+  const int stride = exchanged_stride_;
+  for (int k = 0; k < n; ++k)
+    if (exchanged_single_)
+      std::copy_n(exchanged_single_ + stride * (first + k), 3, buffer + 3 * k);
+    else
+      std::copy_n(exchanged_ + stride * (first + k), 3, buffer + 3 * k);
   return 3 * n;
 }
 
@@ -1460,8 +1491,13 @@ void FixInelastic::unpack_reverse_comm(int n, int *list, double *buffer)
     for (int k = 0; k < n; ++k) memory_.unpack(list[k], buffer + k * SIZE);
     return;
   }
+  const int stride = exchanged_stride_;
   for (int k = 0; k < n; ++k)
-    for (int d = 0; d < 3; ++d) exchanged_[3 * list[k] + d] += buffer[3 * k + d];
+    for (int d = 0; d < 3; ++d)
+      if (exchanged_single_)
+        exchanged_single_[stride * list[k] + d] += static_cast<float>(buffer[3 * k + d]);
+      else
+        exchanged_[stride * list[k] + d] += buffer[3 * k + d];
 }
 
 /* ----------------------------------------------------------------------

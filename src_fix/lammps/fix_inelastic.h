@@ -162,11 +162,15 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   // Communication
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
-  double *exchanged_;    // the per-particle vectors that pack and unpack work on
+  // The per-particle vectors that pack and unpack work on, in one precision or the other
+  double *exchanged_;
+  float *exchanged_single_;
+  int exchanged_stride_;
   bool exchanging_memory_;
 
   // Host
-  void sum_over_copies(double *) override;
+  void sum_over_copies(double *, int) override;
+  void sum_over_copies(float *, int) override;
   void share_with_copies(double *) override;
   void reduce(double *, int, double *, int) override;
   bool has_copies() const;

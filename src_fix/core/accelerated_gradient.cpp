@@ -1,0 +1,538 @@
+#include "accelerated_gradient.h"
+
+#include "vectorise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace inelastic {
+
+namespace {
+
+  // Constraints are worked on in blocks, which stay in the fastest cache, and within a block in
+  // streams: neighbours in the list have a particle in common, and a sum that was just written is
+  // slow to read again.
+  constexpr std::size_t BLOCK = 256;
+  constexpr std::size_t STREAMS = 8;
+
+  // x, y, z and a fourth number, so that one instruction works on all.
+  template <typename Real> struct alignas(4 * sizeof(Real)) Vector {
+    typedef Real Lanes __attribute__((vector_size(4 * sizeof(Real))));
+    Lanes lanes;
+  };
+
+  struct Ends {
+    int first, second;
+  };
+
+  // One iteration's pass over the constraints. Lengths are in units of Scales::length, velocities
+  // in those of length / h, impulses in those of Scales::impulse.
+  template <typename Real> struct Pass {
+    std::size_t count;
+    const Ends *ends;
+    const Vector<Real> *normal;    // and the gap without impulses
+    const Real *diagonal;
+    const Real *impulse;
+    Real *impulse_before;           // replaced by the next ones
+    Real *gap_before;               // at the end of the step, of the impulses before; replaced
+    const Vector<Real> *velocity;    // change of it, where the momentum leads to; the fourth is 0
+    Vector<Real> *sum;    // of the next impulses; zero before; the fourth has no meaning
+    Real momentum;
+    Real step;
+  };
+
+  struct Passed {
+    double uphill = 0.0;            // > 0: the momentum points uphill
+    double change_squared = 0.0;    // squared norm of the change of the scaled impulses
+    // Of the impulses that the pass started from:
+    double least_gap = 0.0;
+    double most_under_force = 0.0;    // largest gap where an impulse acts
+  };
+
+  template <typename Real>
+  inline __attribute__((always_inline)) void scatter(const Pass<Real> &pass, std::size_t begin,
+                                                     std::size_t end, const Real *impulse)
+  {
+    for (std::size_t c = begin; c < end; ++c) {
+      const auto push = pass.normal[c].lanes * impulse[c];
+      pass.sum[pass.ends[c].first].lanes += push;
+      pass.sum[pass.ends[c].second].lanes -= push;
+    }
+  }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) Passed advance(const Pass<Real> &pass)
+  {
+    Passed passed;
+    Real gap[BLOCK];
+    for (std::size_t begin = 0; begin < pass.count; begin += BLOCK) {
+      const std::size_t end = std::min(begin + BLOCK, pass.count);
+      for (std::size_t c = begin; c < end; ++c) {
+        const auto normal = pass.normal[c].lanes;
+        const auto along = normal *
+            (pass.velocity[pass.ends[c].first].lanes - pass.velocity[pass.ends[c].second].lanes);
+        gap[c - begin] = normal[3] + (along[0] + along[1] + along[2]);
+      }
+      Real uphill = 0, change_squared = 0, least = 0, most = 0;
+      const Real *const impulse = pass.impulse + begin;
+      Real *const next = pass.impulse_before + begin;
+      const Real *const diagonal = pass.diagonal + begin;
+      Real *const gap_before = pass.gap_before + begin;
+      const Real momentum = pass.momentum, step = pass.step;
+      const Real share = 1 / (1 + momentum);
+      const std::size_t size = end - begin;
+#pragma omp simd simdlen(16) reduction(+ : uphill, change_squared) reduction(min : least) reduction(max : most)
+      for (std::size_t k = 0; k < size; ++k) {
+        const Real ahead = impulse[k] + momentum * (impulse[k] - next[k]);
+        const Real free = ahead - step * gap[k] / diagonal[k];
+        const Real value = free > 0 ? free : 0;
+        const Real change = value - impulse[k];
+        uphill += (ahead - value) * change * diagonal[k];
+        change_squared += change * change * diagonal[k];
+        // The gap ahead is as far from that of these impulses as the impulses ahead are from them.
+        const Real here = (gap[k] + momentum * gap_before[k]) * share;
+        const Real under_force = impulse[k] > 0 ? here : 0;
+        least = here < least ? here : least;
+        most = under_force > most ? under_force : most;
+        gap_before[k] = here;
+        next[k] = value;
+      }
+      passed.uphill += uphill;
+      passed.change_squared += change_squared;
+      passed.least_gap = std::min(passed.least_gap, static_cast<double>(least));
+      passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
+      scatter(pass, begin, end, pass.impulse_before);
+    }
+    return passed;
+  }
+
+  INELASTIC_CLONES Passed advance_single(const Pass<float> &pass)
+  { return advance(pass); }
+  INELASTIC_CLONES Passed advance_double(const Pass<double> &pass)
+  { return advance(pass); }
+  inline Passed pass_over(const Pass<float> &pass)
+  { return advance_single(pass); }
+  inline Passed pass_over(const Pass<double> &pass)
+  { return advance_double(pass); }
+
+  // One iteration's pass over the particles: from sums of impulses to velocities, and ahead.
+  template <typename Real> struct Move {
+    std::size_t count;
+    const Real *inverse_mass;    // 1 in bodies, where `sum` is a change of velocity already
+    const Real *mass;            // 0 where the change does not count: copies, frozen, in bodies
+    Vector<Real> *sum;           // left at zero
+    Vector<Real> *velocity;
+    Vector<Real> *ahead;
+    Real momentum;
+  };
+
+  // Returns change . A change of free particles.
+  template <typename Real>
+  inline __attribute__((always_inline)) double move(const Move<Real> &m)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    constexpr std::size_t CHUNK = 1024;    // of what is added in the precision of Real
+    double curved = 0.0;
+    for (std::size_t begin = 0; begin < m.count; begin += CHUNK) {
+      const std::size_t end = std::min(begin + CHUNK, m.count);
+      Lanes part = {0, 0, 0, 0};
+      for (std::size_t i = begin; i < end; ++i) {
+        const Real w = m.inverse_mass[i];
+        const Lanes next = m.sum[i].lanes * Lanes{w, w, w, 0};
+        const Lanes change = next - m.velocity[i].lanes;
+        part += change * change * m.mass[i];
+        m.ahead[i].lanes = next + change * m.momentum;
+        m.velocity[i].lanes = next;
+        m.sum[i].lanes = Lanes{0, 0, 0, 0};
+      }
+      curved += static_cast<double>(part[0]) + part[1] + part[2];
+    }
+    return curved;
+  }
+
+  INELASTIC_CLONES double move_single(const Move<float> &m)
+  { return move(m); }
+  INELASTIC_CLONES double move_double(const Move<double> &m)
+  { return move(m); }
+  inline double move_all(const Move<float> &m)
+  { return move_single(m); }
+  inline double move_all(const Move<double> &m)
+  { return move_double(m); }
+
+  // Rigid bodies (rigid_bodies.h) in the units of an iteration; arms in units of their own.
+  template <typename Real> struct Body {
+    int first, last_original, end;    // of its members
+    Real inverse_mass;
+    Vector<Real> inverse_inertia[3];    // its columns
+  };
+
+  template <typename Real> struct Member {
+    Vector<Real> arm;
+    Vector<Real> sum;    // of the impulses before
+    int particle;
+    bool counts;    // owned
+  };
+
+  // y, z, x: one instruction.
+  template <typename Lanes> inline __attribute__((always_inline)) void rotate(Lanes &a)
+  { a = Lanes{a[1], a[2], a[0], a[3]}; }
+
+  template <typename Lanes>
+  inline __attribute__((always_inline)) void add_cross(const Lanes &a, const Lanes &b, Lanes &sum)
+  {
+    Lanes a_rotated = a, b_rotated = b;
+    rotate(a_rotated);
+    rotate(b_rotated);
+    Lanes cross = a * b_rotated - a_rotated * b;
+    rotate(cross);
+    sum += cross;
+  }
+
+  // Sums of impulses become changes of velocity. Returns change . A change.
+  template <typename Real>
+  inline __attribute__((always_inline)) double turn(const std::vector<Body<Real>> &bodies,
+                                                    Member<Real> *members, Vector<Real> *sum,
+                                                    const Vector<Real> *velocity)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    double curved = 0.0;
+    for (const Body<Real> &body : bodies) {
+      Lanes total = {0, 0, 0, 0}, moment = {0, 0, 0, 0};
+      for (int k = body.first; k < body.last_original; ++k) {
+        const Lanes push = sum[members[k].particle].lanes;
+        total += push;
+        add_cross(members[k].arm.lanes, push, moment);
+      }
+      const Lanes spin = body.inverse_inertia[0].lanes * moment[0] +
+          body.inverse_inertia[1].lanes * moment[1] + body.inverse_inertia[2].lanes * moment[2];
+      const Lanes slide = total * body.inverse_mass;
+      Lanes part = {0, 0, 0, 0};
+      for (int k = body.first; k < body.end; ++k) {
+        Member<Real> &member = members[k];
+        Lanes &at = sum[member.particle].lanes;
+        Lanes next = slide;
+        add_cross(spin, member.arm.lanes, next);
+        if (member.counts) part += (at - member.sum.lanes) * (next - velocity[member.particle].lanes);
+        member.sum.lanes = at;
+        at = next;
+      }
+      curved += part[0] + part[1] + part[2];
+    }
+    return curved;
+  }
+
+  INELASTIC_CLONES double turn_single(const std::vector<Body<float>> &bodies,
+                                      Member<float> *members, Vector<float> *sum,
+                                      const Vector<float> *velocity)
+  { return turn(bodies, members, sum, velocity); }
+  INELASTIC_CLONES double turn_double(const std::vector<Body<double>> &bodies,
+                                      Member<double> *members, Vector<double> *sum,
+                                      const Vector<double> *velocity)
+  { return turn(bodies, members, sum, velocity); }
+  inline double turn_all(const std::vector<Body<float>> &bodies, Member<float> *members,
+                         Vector<float> *sum, const Vector<float> *velocity)
+  { return turn_single(bodies, members, sum, velocity); }
+  inline double turn_all(const std::vector<Body<double>> &bodies, Member<double> *members,
+                         Vector<double> *sum, const Vector<double> *velocity)
+  { return turn_double(bodies, members, sum, velocity); }
+
+}    // namespace
+
+// Powers of two, so that a scene in other units takes the same steps bit by bit.
+struct AcceleratedProjectedGradient::Scales {
+  double length;
+  double impulse;
+};
+
+template <typename Real> class AcceleratedProjectedGradient::Iterations {
+ public:
+  void prepare(const ContactProblem &problem, const std::vector<double> &free_gap,
+               const std::vector<double> &diagonal, const Scales &scales, Host &host)
+  {
+    const ContactSet &contacts = problem.contacts;
+    const std::size_t count = contacts.size();
+    interleave(count);
+    ends_.resize(count);
+    normal_.resize(count);
+    diagonal_.resize(count);
+    impulse_.resize(count);
+    const double per_length = 1.0 / scales.length;
+    const double per_impulse = 1.0 / scales.impulse;
+    const double diagonal_unit = scales.impulse / scales.length;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t c = source_[k];
+      const double *const n = &contacts.normal[3 * c];
+      ends_[k] = {contacts.first[c], contacts.second[c]};
+      normal_[k].lanes = typename Vector<Real>::Lanes{
+          static_cast<Real>(n[0]), static_cast<Real>(n[1]), static_cast<Real>(n[2]),
+          static_cast<Real>(free_gap[c] * per_length)};
+      diagonal_[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
+      impulse_[k] = static_cast<Real>(contacts.impulse[c] * per_impulse);
+    }
+    impulse_before_ = impulse_;
+    gap_before_.assign(count, 0);
+
+    const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
+    const double mobility_unit = problem.timestep * diagonal_unit;
+    inverse_mass_.resize(particles);
+    mass_.resize(particles);
+    for (std::size_t i = 0; i < particles; ++i) {
+      const double inverse = problem.inverse_mass[i] * mobility_unit;
+      const bool counts = inverse > 0.0 && i < static_cast<std::size_t>(problem.owned);
+      inverse_mass_[i] = static_cast<Real>(inverse);
+      mass_[i] = static_cast<Real>(counts ? 1.0 / inverse : 0.0);
+    }
+    add_bodies(problem, mobility_unit);
+    sum_.assign(particles, Vector<Real>{});
+    velocity_.assign(particles, Vector<Real>{});
+    ahead_.assign(particles, Vector<Real>{});
+    const Pass<Real> pass = passing(0.0, 0.0);
+    scatter(pass, 0, count, pass.impulse);
+    finish(host, 0.0);
+  }
+
+  Passed advance(double momentum, double step)
+  {
+    const Passed passed = pass_over(passing(momentum, step));
+    impulse_.swap(impulse_before_);
+    return passed;
+  }
+
+  // Ends an iteration: velocities of the impulses, and where this momentum leads to. Returns change
+  // . A change, on this rank.
+  double finish(Host &host, double momentum)
+  {
+    host.sum_over_copies(reinterpret_cast<Real *>(sum_.data()), 4);
+    const double turned =
+        bodies_.empty() ? 0.0 : turn_all(bodies_, members_.data(), sum_.data(), velocity_.data());
+    return turned + move_all({velocity_.size(), inverse_mass_.data(), mass_.data(), sum_.data(),
+                     velocity_.data(), ahead_.data(), static_cast<Real>(momentum)});
+  }
+
+  // Writes the impulses, or those that the last iteration started from.
+  void impulses(const Scales &scales, std::vector<double> &impulse) const
+  { unpack(impulse_, scales, impulse); }
+  void impulses_before(const Scales &scales, std::vector<double> &impulse) const
+  { unpack(impulse_before_, scales, impulse); }
+
+ private:
+  Pass<Real> passing(double momentum, double step)
+  {
+    return {ends_.size(),
+            ends_.data(),
+            normal_.data(),
+            diagonal_.data(),
+            impulse_.data(),
+            impulse_before_.data(),
+            gap_before_.data(),
+            ahead_.data(),
+            sum_.data(),
+            static_cast<Real>(momentum),
+            static_cast<Real>(step)};
+  }
+
+  void add_bodies(const ContactProblem &problem, double mobility_unit)
+  {
+    const RigidBodies &rigid = problem.bodies;
+    bodies_.resize(rigid.size());
+    members_.resize(rigid.member.size());
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      Body<Real> &body = bodies_[b];
+      body.first = rigid.start[b];
+      body.last_original = rigid.start[b] + rigid.originals[b];
+      body.end = rigid.start[b + 1];
+      body.inverse_mass = static_cast<Real>(rigid.inverse_mass[b] * mobility_unit);
+      double reach = 0.0;
+      for (int k = 3 * body.first; k < 3 * body.end; ++k)
+        reach = std::max(reach, std::abs(rigid.arm[k]));
+      const double unit = reach > 0.0 ? std::exp2(std::ilogb(reach)) : 1.0;
+      const double *const a = &rigid.inverse_inertia[6 * b];
+      const double inertia_unit = mobility_unit * unit * unit;
+      const int columns[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
+      for (int d = 0; d < 3; ++d)
+        body.inverse_inertia[d].lanes =
+            typename Vector<Real>::Lanes{static_cast<Real>(a[columns[d][0]] * inertia_unit),
+                                         static_cast<Real>(a[columns[d][1]] * inertia_unit),
+                                         static_cast<Real>(a[columns[d][2]] * inertia_unit), 0};
+      for (int k = body.first; k < body.end; ++k) {
+        Member<Real> &member = members_[k];
+        const double *const arm = &rigid.arm[3 * k];
+        member.arm.lanes = typename Vector<Real>::Lanes{static_cast<Real>(arm[0] / unit),
+                                                        static_cast<Real>(arm[1] / unit),
+                                                        static_cast<Real>(arm[2] / unit), 0};
+        member.sum = Vector<Real>{};
+        member.particle = rigid.member[k];
+        member.counts = member.particle < problem.owned;
+        inverse_mass_[member.particle] = 1;
+        mass_[member.particle] = 0;
+      }
+    }
+  }
+
+  void unpack(const std::vector<Real> &packed, const Scales &scales,
+              std::vector<double> &impulse) const
+  {
+    for (std::size_t k = 0; k < packed.size(); ++k)
+      impulse[source_[k]] = scales.impulse * static_cast<double>(packed[k]);
+  }
+
+  void interleave(std::size_t count)
+  {
+    source_.clear();
+    for (std::size_t begin = 0; begin < count; begin += BLOCK) {
+      const std::size_t size = std::min(BLOCK, count - begin);
+      const std::size_t length = (size + STREAMS - 1) / STREAMS;
+      for (std::size_t k = 0; k < length; ++k)
+        for (std::size_t place = k; place < size; place += length) source_.push_back(begin + place);
+    }
+  }
+
+  std::vector<std::size_t> source_;    // of each constraint: its place in the problem
+  std::vector<Ends> ends_;
+  std::vector<Vector<Real>> normal_;
+  std::vector<Real> diagonal_, impulse_, impulse_before_, gap_before_;
+  std::vector<Real> inverse_mass_, mass_;
+  std::vector<Vector<Real>> sum_, velocity_, ahead_;
+  std::vector<Body<Real>> bodies_;
+  std::vector<Member<Real>> members_;
+};
+
+AcceleratedProjectedGradient::AcceleratedProjectedGradient() = default;
+AcceleratedProjectedGradient::~AcceleratedProjectedGradient() = default;
+
+Residual AcceleratedProjectedGradient::judge(const ContactProblem &problem, Host &host)
+{
+  const std::vector<double> &impulse = problem.contacts.impulse;
+  gap_.resize(impulse.size());
+  gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
+  const Residual mine = residual(gap_.data(), impulse.data(), impulse.size());
+  double maxima[2] = {mine.feasibility, mine.complementarity};
+  host.reduce(nullptr, 0, maxima, 2);
+  return {maxima[0], maxima[1]};
+}
+
+template <typename Real>
+void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, ContactProblem &problem,
+                                           const SolverLimits &limits, const Scales &scales,
+                                           Host &host, SolverResult &result)
+{
+  // L is raised with a margin when a step shows it too small.
+  constexpr double MARGIN = 1.05;
+  // A residual within the tolerance that double precision does not confirm: round-off shows.
+  constexpr long MOST_FAILURES = 4;
+
+  iterations.prepare(problem, gap_operator_.free_gap(), diagonal_, scales, host);
+  const double tolerance = limits.tolerance / scales.length;
+  double momentum_time = 1.0;
+  double momentum = 0.0;
+  double curved = 0.0, change_squared = 0.0;    // of the iteration before
+  long next_check = 0;
+  long failures = 0;
+  while (result.iterations < limits.max_iterations) {
+    const Passed passed = iterations.advance(momentum, 1.0 / curvature_);
+    ++result.iterations;
+    double sums[3] = {passed.uphill, passed.change_squared, curved};
+    double maxima[2] = {-passed.least_gap, passed.most_under_force};
+    host.reduce(sums, 3, maxima, 2);
+    if (!std::isfinite(sums[2])) return;
+    if (sums[2] > curvature_ * change_squared && change_squared > 0.0)
+      curvature_ = MARGIN * sums[2] / change_squared;
+    change_squared = sums[1];
+
+    if (std::max(maxima[0], maxima[1]) <= tolerance && result.iterations >= next_check) {
+      iterations.impulses_before(scales, problem.contacts.impulse);
+      result.residual = judge(problem, host);
+      result.converged = result.residual.feasibility <= limits.tolerance &&
+          result.residual.complementarity <= limits.tolerance;
+      if (result.converged) return;
+      if (++failures == MOST_FAILURES && sizeof(Real) < sizeof(double)) return;
+      next_check = result.iterations + failures;
+    }
+
+    if (sums[0] > 0.0) {
+      momentum = 0.0;
+      momentum_time = 1.0;
+    } else {
+      const double next_time = 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * momentum_time * momentum_time));
+      momentum = (momentum_time - 1.0) / next_time;
+      momentum_time = next_time;
+    }
+    curved = iterations.finish(host, momentum);
+    if (curved > curvature_ * change_squared && change_squared > 0.0)
+      curvature_ = MARGIN * curved / change_squared;
+  }
+  iterations.impulses(scales, problem.contacts.impulse);
+  result.residual = judge(problem, host);
+}
+
+SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
+                                                 const SolverLimits &limits, Host &host)
+{
+  // L is let down a little between calls, so that it can follow a packing that becomes less
+  // connected.
+  constexpr double RELAXATION = 0.998;
+  constexpr double LEAST_SCALE = 0.9, MOST_SCALE = 1.1;
+  constexpr double FIRST_CURVATURE =
+      2.0;    // of a few contacts; a first step far too long costs more
+  constexpr double SINGLE_SUFFICES = 3.0e5;
+
+  ContactSet &contacts = problem.contacts;
+  const std::size_t count = contacts.size();
+  gap_operator_.prepare(problem);
+
+  diagonal_.resize(count);
+  for (std::size_t c = 0; c < count; ++c) {
+    const double *const n = &contacts.normal[3 * c];
+    diagonal_[c] = problem.timestep *
+        (problem.mobility(contacts.first[c], n) + problem.mobility(contacts.second[c], n));
+    contacts.impulse[c] = std::max(0.0, contacts.impulse[c]);
+  }
+
+  gap_.resize(count);
+  gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
+  SolverResult result;
+  result.residual = residual(gap_.data(), contacts.impulse.data(), count);
+  double along = 0.0, along_free = 0.0, largest = 0.0, largest_diagonal = 0.0;
+  const std::vector<double> &free_gap = gap_operator_.free_gap();
+  for (std::size_t c = 0; c < count; ++c) {
+    along += contacts.impulse[c] * gap_[c];
+    along_free += contacts.impulse[c] * free_gap[c];
+    largest = std::max({largest, std::abs(free_gap[c]), contacts.impulse[c] * diagonal_[c]});
+    largest_diagonal = std::max(largest_diagonal, diagonal_[c]);
+  }
+  double sums[2] = {along, along_free};
+  double maxima[4] = {result.residual.feasibility, result.residual.complementarity, largest,
+                      largest_diagonal};
+  host.reduce(sums, 2, maxima, 4);
+  result.residual = {maxima[0], maxima[1]};
+  result.converged = result.residual.feasibility <= limits.tolerance &&
+      result.residual.complementarity <= limits.tolerance;
+  if (result.converged || !std::isfinite(result.residual.feasibility)) return result;
+
+  // The guess is first made as large as the dual function likes it along its own direction, which
+  // costs no product since w is affine: with b = w(0), the minimum over s of the dual at s lambda
+  // is at s = -lambda.b / lambda.(w - b). Measured to save a tenth of the iterations, within these
+  // bounds.
+  const double curved_along = sums[0] - sums[1];
+  if (curved_along > 0.0) {
+    const double scale = std::clamp(-sums[1] / curved_along, LEAST_SCALE, MOST_SCALE);
+    for (double &impulse : contacts.impulse) impulse *= scale;
+  }
+  curvature_ = curvature_ == 0.0 ? FIRST_CURVATURE : std::max(1.0, RELAXATION * curvature_);
+
+  Scales scales;
+  scales.length = std::exp2(std::ilogb(maxima[2]));
+  scales.impulse = scales.length / std::exp2(std::ilogb(maxima[3]));
+  if (maxima[2] < SINGLE_SUFFICES * limits.tolerance) {
+    if (!single_) single_ = std::make_unique<Iterations<float>>();
+    iterate(*single_, problem, limits, scales, host, result);
+  }
+  if (!result.converged && result.iterations < limits.max_iterations) {
+    if (!double_) double_ = std::make_unique<Iterations<double>>();
+    iterate(*double_, problem, limits, scales, host, result);
+  }
+  return result;
+}
+
+}    // namespace inelastic
