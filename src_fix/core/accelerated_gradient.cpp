@@ -16,6 +16,12 @@ namespace {
   constexpr std::size_t BLOCK = 256;
   constexpr std::size_t STREAMS = 8;
 
+  constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
+                                 std::numeric_limits<double>::infinity()};
+
+  bool within(const Residual &residual, const SolverLimits &limits)
+  { return std::max(residual.feasibility, residual.complementarity) <= limits.tolerance; }
+
   // x, y, z and a fourth number, so that one instruction works on all.
   template <typename Real> struct alignas(4 * sizeof(Real)) Vector {
     typedef Real Lanes __attribute__((vector_size(4 * sizeof(Real))));
@@ -401,7 +407,8 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
 AcceleratedProjectedGradient::AcceleratedProjectedGradient() = default;
 AcceleratedProjectedGradient::~AcceleratedProjectedGradient() = default;
 
-Residual AcceleratedProjectedGradient::judge(const ContactProblem &problem, Host &host)
+void AcceleratedProjectedGradient::judge(const ContactProblem &problem, const SolverLimits &limits,
+                                         Host &host, SolverResult &result)
 {
   const std::vector<double> &impulse = problem.contacts.impulse;
   gap_.resize(impulse.size());
@@ -409,7 +416,8 @@ Residual AcceleratedProjectedGradient::judge(const ContactProblem &problem, Host
   const Residual mine = residual(gap_.data(), impulse.data(), impulse.size());
   double maxima[2] = {mine.feasibility, mine.complementarity};
   host.reduce(nullptr, 0, maxima, 2);
-  return {maxima[0], maxima[1]};
+  result.residual = {maxima[0], maxima[1]};
+  result.converged = within(result.residual, limits);
 }
 
 template <typename Real>
@@ -435,16 +443,17 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
     double sums[3] = {passed.uphill, passed.change_squared, curved};
     double maxima[2] = {-passed.least_gap, passed.most_under_force};
     host.reduce(sums, 3, maxima, 2);
-    if (!std::isfinite(sums[2])) return;
+    if (!std::isfinite(sums[2])) {
+      result.residual = UNSOLVED;
+      return;
+    }
     if (sums[2] > curvature_ * change_squared && change_squared > 0.0)
       curvature_ = MARGIN * sums[2] / change_squared;
     change_squared = sums[1];
 
     if (std::max(maxima[0], maxima[1]) <= tolerance && result.iterations >= next_check) {
       iterations.impulses_before(scales, problem.contacts.impulse);
-      result.residual = judge(problem, host);
-      result.converged = result.residual.feasibility <= limits.tolerance &&
-          result.residual.complementarity <= limits.tolerance;
+      judge(problem, limits, host, result);
       if (result.converged) return;
       if (++failures == MOST_FAILURES && sizeof(Real) < sizeof(double)) return;
       next_check = result.iterations + failures;
@@ -463,7 +472,7 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
       curvature_ = MARGIN * curved / change_squared;
   }
   iterations.impulses(scales, problem.contacts.impulse);
-  result.residual = judge(problem, host);
+  judge(problem, limits, host, result);
 }
 
 SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
@@ -506,8 +515,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
                       largest_diagonal};
   host.reduce(sums, 2, maxima, 4);
   result.residual = {maxima[0], maxima[1]};
-  result.converged = result.residual.feasibility <= limits.tolerance &&
-      result.residual.complementarity <= limits.tolerance;
+  result.converged = within(result.residual, limits);
   if (result.converged || !std::isfinite(result.residual.feasibility)) return result;
 
   // The guess is first made as large as the dual function likes it along its own direction, which

@@ -31,8 +31,9 @@ class AcceleratedProjectedGradient final : public Solver {
   void iterate(Iterations<Real> &iterations, ContactProblem &problem, const SolverLimits &limits,
                const Scales &scales, Host &host, SolverResult &result);
 
-  // Residual of the impulses in `problem`, over all ranks.
-  Residual judge(const ContactProblem &problem, Host &host);
+  // Residual of the impulses in `problem`, over all ranks, and whether it is within the limits.
+  void judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
+             SolverResult &result);
 
   GapOperator gap_operator_;
   // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
