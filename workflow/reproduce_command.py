@@ -23,6 +23,7 @@ from .study_commands import (
 # In the order of the paper.
 STUDIES = (
     "table-1",
+    "more-seeds",
     "table-2",
     "figure-4",
     "figure-8",

@@ -98,6 +98,7 @@ class Comparison:
     decimals : that are shown
     unit : behind both; empty for a pure number
     note : what is not as in the paper
+    why : where a large difference comes from, as far as it is known
     """
 
     what: str
@@ -106,6 +107,7 @@ class Comparison:
     decimals: int = 2
     unit: str = ""
     note: str = ""
+    why: str = ""
 
     @property
     def difference(self) -> float:

@@ -80,14 +80,15 @@ def _completed(result: Result) -> Result:
     A deck had no such choice before it had the variable: it did what the default does.
     """
     stages = [
-        {**stage, "variables": {**_defaults(stage["deck"]), **stage["variables"]}}
+        {**stage, "variables": {**deck_defaults(stage["deck"]), **stage["variables"]}}
         for stage in result.record["stages"]
     ]
     return replace(result, record={**result.record, "stages": stages})
 
 
 @cache
-def _defaults(deck: str) -> Mapping[str, Value]:
+def deck_defaults(deck: str) -> Mapping[str, Value]:
+    """Return the variables of one of our decks with their defaults; of another deck, none."""
     return find_deck(deck, Path()).parameters if deck in SHIPPED else {}
 
 

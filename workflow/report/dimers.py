@@ -158,6 +158,7 @@ def _anisotropy(data: Data, groups: ByAspect) -> Section:
                     3,
                     "",
                     f"paper prints L/d = {printed}; the numbers are those of {consistent}",
+                    "it depends on the random force: see the section on it",
                 )
                 for axis, ratio in zip("xyz", ratios, strict=True)
             ]

@@ -79,7 +79,7 @@ def summarise(sections: Sequence[Section]) -> Summary | None:
     return Summary(
         Table(
             "Paper and ours",
-            ("number", "paper", "ours", "runs", "difference [SE]", "not as in the paper"),
+            ("number", "paper", "ours", "runs", "difference [SE]", "not as in the paper, and why"),
             rows,
             (
                 "Ours: mean ± standard deviation (standard error). SE: standard errors, "
@@ -108,5 +108,5 @@ def _row(section: Section, one: Comparison) -> list[Cell]:
         Cell(one.what, link=section.anchor),
         *cells(paper + unit, as_sample(one.ours, one.decimals) + unit, one.ours.n),
         as_difference(one.difference),
-        Cell(one.note or ""),
+        Cell("; ".join(text for text in (one.note, one.why if one.is_large else "") if text)),
     ]
