@@ -164,6 +164,11 @@ def whole_paper():
         for tolerance, force in ((0.005, 30.0), (0.0005, 30.0), (0.0005, 0.0), (0.00005, 30.0))
         for seed, phi in enumerate((0.62, 0.63, 0.64), 1)
     ]
+    more_seeds = [
+        measured(phi=0.632 + 0.001 * (seed % 5), random_force=force, seed=seed)
+        for force in (30.0, 0.0)
+        for seed in range(1, 7)
+    ]
     table_2 = [measured(seed=seed) for seed in (1, 2)]
     table_2 += [measured(particles=10_000, diameter=0.052, seed=seed) for seed in (1, 2)]
     table_2.append(measured(particles=100_000, diameter=0.024, tolerance=0.005))
@@ -189,6 +194,7 @@ def whole_paper():
     ]
     return [
         study("table-1", table_1),
+        study("more-seeds", more_seeds),
         study("table-2", table_2),
         study("figure-4", [measured(pictures=falling)]),
         study("figure-8", [measured(pictures=("network",))]),
@@ -408,6 +414,55 @@ def test_large_difference_is_marked():
     assert (z.text, z.marked) == ("+14.7", True)
 
 
+def test_why_is_said_of_large_differences_alone():
+    runs = [
+        measured(phi=phi, z=5.97, seed=seed) for seed, phi in enumerate((0.62, 0.6322, 0.644), 1)
+    ]
+    far = [measured(phi=0.7 + 0.001 * seed, z=5.97, seed=seed) for seed in (1, 2, 3)]
+    for group, said in ((runs, False), (far, True)):
+        summary = summarise(list(sections_of(study("table-1", group)).values()))
+        phi, z, _ = (row[5].text for row in summary.table.rows)
+        assert ("more seeds" in phi) == said
+        assert "solver" not in z
+
+
+def test_more_seeds_are_compared_as_well():
+    section = sections_of(*whole_paper())["table-1"]
+    more = next(one for one in section.comparisons if "6 seeds" in one.what)
+    # Seeds 1 to 6 of 0.632 + 0.001 (seed mod 5): 0.001 x 11 / 6 above.
+    assert more.ours.mean == pytest.approx(63.2 + 1.1 / 6, rel=1e-12)  # round-off
+
+
+def test_table_2_has_the_scatter_of_table_1(sections):
+    whats = {one.what: one for one in sections["table-2"].comparisons}
+    assert whats["φ, 1,000 spheres"].stated.error == pytest.approx(0.44 / 3, rel=1e-12)  # round-off
+    assert math.isnan(whats["φ, 10,000 spheres"].stated.error)
+
+
+def test_orientation_of_runs_that_agree_by_chance():
+    runs = [measured(deck="dimers", aspect_ratio=1.8, seed=seed) for seed in (1, 2)]
+    x = sections_of(study("dimers", runs))["anisotropy"].comparisons[0]
+    # The runs have the same a_x; 0.01 is what the number of dimers leaves of each.
+    assert x.ours.error == pytest.approx(0.01 / math.sqrt(2), rel=1e-12)  # round-off
+    assert x.stated.error == 0.01
+
+
+def test_overlap_is_compared_with_the_loosest_tolerance():
+    runs = [measured(tolerance_agitated=0.005, numbers__largest_overlap_of_all_steps=0.004)]
+    (table,) = sections_of(study("table-1", runs))["checks"].blocks
+    assert [cell.text for cell in table.rows[0][3:6]] == ["0.005", "0.004", "0.800"]
+    assert not table.rows[0][5].marked
+
+
+def test_results_of_an_older_deck_group_with_newer_ones(tmp_path):
+    old = measured(seed=1)
+    new = measured(seed=2, solver="apgd", tolerance_measuring=0.0001)
+    data = read_data([write(tmp_path / "a.h5", study("own", [old, new]))])
+    first, second = (result.variables for result in data.studies["own"].results)
+    assert first["solver"] == "apgd"
+    assert first | {"seed": 2} == second
+
+
 def test_solvers_are_not_mixed():
     runs = [
         measured(z=z, tolerance=0.005, solver=solver, seed=seed)
@@ -442,7 +497,8 @@ def test_any_single_study_is_enough(name):
     sections = sections_of(one)
     assert set(sections) == ANCHORS - {"summary"}
     assert any(section.is_missing for section in sections.values())
-    assert not sections["figure-11" if name == "dimers" else name].is_missing
+    shown_in = {"dimers": "figure-11", "more-seeds": "table-1"}
+    assert not sections[shown_in.get(name, name)].is_missing
 
 
 def test_studies_without_any_result(tmp_path):

@@ -25,7 +25,7 @@ from .blocks import (
     as_text,
     cells,
 )
-from .data import SPHERES, Data, count_of, profiles, unlike
+from .data import SPHERES, Data, by_size, count_of, profiles, unlike
 from .figures import Curve, Figure, Panel, curve
 from .spheres import section, step_pictures
 from .statistics import (
@@ -117,14 +117,21 @@ def _figure_10(data: Data) -> Section:
 def _components(group: Sequence[Result], axis: str) -> Sample:
     """Return a_x, a_y or a_z over its isotropic value.
 
-    The scatter is that between runs; of a single run, that between its dimers.
+    Its standard error is that between the runs, or that which the number of dimers leaves if this
+    is larger: two runs may agree by chance.
     """
-    found = sample(result.number(f"a_{axis}") / result.number("a_isotropic") for result in group)
-    if found.n != 1:
+    known = [result for result in group if not math.isnan(result.number(f"a_{axis}"))]
+    found = sample(result.number(f"a_{axis}") / result.number("a_isotropic") for result in known)
+    if not known:
         return found
-    (result,) = (r for r in group if not math.isnan(r.number(f"a_{axis}")))
-    # As if of one value whose standard error is known.
-    return Sample(found.mean, result.number(f"a_{axis}_error") / result.number("a_isotropic"), 1)
+    of_dimers = _error_of_a_run(known, axis)
+    std = of_dimers if math.isnan(found.std) else max(found.std, of_dimers)
+    return Sample(found.mean, std, found.n)
+
+
+def _error_of_a_run(group: Sequence[Result], axis: str) -> float:
+    """Return the standard error of one run that comes from its number of dimers."""
+    return numbers(group, f"a_{axis}_error").mean / numbers(group, "a_isotropic").mean
 
 
 def _anisotropy(data: Data, groups: ByAspect) -> Section:
@@ -153,11 +160,12 @@ def _anisotropy(data: Data, groups: ByAspect) -> Section:
             comparisons += [
                 Comparison(
                     f"a_{axis} over isotropic, L/d = {aspect}",
-                    Stated(stated[f"a_{axis}"] / stated["isotropic"]),
+                    Stated(stated[f"a_{axis}"] / stated["isotropic"], _error_of_a_run(group, axis)),
                     ratio,
                     3,
                     "",
-                    f"paper prints L/d = {printed}; the numbers are those of {consistent}",
+                    f"paper prints L/d = {printed}; the numbers are those of {consistent}; its "
+                    "error is taken to be that of one of our runs",
                     "it depends on the random force: see the section on it",
                 )
                 for axis, ratio in zip("xyz", ratios, strict=True)
@@ -213,7 +221,10 @@ def _anisotropy(data: Data, groups: ByAspect) -> Section:
                     *tuple(f"a_{axis} / isotropic" for axis in "xyz"),
                 ),
                 rows,
-                ("± standard error: over the runs, or over the dimers of a single run.",),
+                (
+                    "± standard error: over the runs, or what the number of dimers leaves if that "
+                    "is larger.",
+                ),
             ),
             Text(
                 "Paper: dimers lie down, a_y < a_x = a_z, and more so the longer they are. Its "
@@ -229,13 +240,16 @@ def _anisotropy(data: Data, groups: ByAspect) -> Section:
 def _agitation(data: Data) -> Section:
     """Show the study of the random force, which the paper does not state, beside its numbers."""
     results = [r for r in data.results("dimers-agitation") if "random_force" in r.variables]
-    groups = dict(sorted(grouped(results, by_value("random_force")).items()))
     stated = data.paper["dimers"]["anisotropy"]
     blocks: list[Block] = []
-    if groups:
+    rows = []
+    curves = []
+    for (particles, _), of_size in by_size(results).items():
+        groups = dict(sorted(grouped(of_size, by_value("random_force")).items()))
         ratios = {axis: [_components(group, axis) for group in groups.values()] for axis in "xyz"}
-        rows = [
+        rows += [
             cells(
+                f"{particles:,.0f}",
                 as_short(force),
                 len(group),
                 *(f"{as_text(r.mean, 3)} ± {as_text(r.error, 3)}" for r in lie),
@@ -244,26 +258,28 @@ def _agitation(data: Data) -> Section:
             )
             for (force, group), *lie in zip(groups.items(), *ratios.values(), strict=True)
         ]
+        curves += [
+            curve(
+                f"a_{axis}, {particles:,.0f} dimers",
+                list(groups),
+                [ratio.mean for ratio in of_axis],
+                [ratio.error for ratio in of_axis],
+                "points",
+            )
+            for axis, of_axis in ratios.items()
+        ]
+    if rows:
         aspect = results[0].variables.get("aspect_ratio", math.nan)
         blocks = [
             Figure(
                 "dimers-agitation",
-                f"As above for {count_of(results):,} dimers of L/d = {as_short(aspect)}, against "
-                "the largest random acceleration of a sphere. Lines: the paper's numbers.",
+                f"As above for L/d = {as_short(aspect)}, against the largest random acceleration "
+                "of a sphere. Lines: the paper's numbers.",
                 [
                     Panel(
                         "random force",
                         "a / isotropic a",
-                        [
-                            curve(
-                                f"a_{axis}",
-                                list(groups),
-                                [ratio.mean for ratio in of_axis],
-                                [ratio.error for ratio in of_axis],
-                                "points",
-                            )
-                            for axis, of_axis in ratios.items()
-                        ],
+                        curves,
                         references=[
                             (f"a_{axis}, paper", stated[f"a_{axis}"] / stated["isotropic"])
                             for axis in "xyz"
@@ -274,6 +290,7 @@ def _agitation(data: Data) -> Section:
             Table(
                 "Orientation of dimers against the random force",
                 (
+                    "dimers",
                     "random force",
                     "runs",
                     *tuple(f"a_{axis} / isotropic" for axis in "xyz"),

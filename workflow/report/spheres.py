@@ -246,9 +246,9 @@ def _table_1(data: Data) -> Section:
                 ),
             )
         ]
-        more, more_compared = _more_seeds(data)
-        blocks += more
-        comparisons += more_compared
+    more, more_compared = _more_seeds(data)
+    blocks += more
+    comparisons += more_compared
     return _section(
         "table-1",
         "Table 1: tolerance and random force",
