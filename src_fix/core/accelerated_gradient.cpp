@@ -40,10 +40,10 @@ namespace {
     const Vector<Real> *normal;    // and the gap without impulses
     const Real *diagonal;
     const Real *impulse;
-    Real *impulse_before;           // replaced by the next ones
-    Real *gap_before;               // at the end of the step, of the impulses before; replaced
+    Real *impulse_before;            // replaced by the next ones
+    Real *gap_before;                // at the end of the step, of the impulses before; replaced
     const Vector<Real> *velocity;    // change of it, where the momentum leads to; the fourth is 0
-    Vector<Real> *sum;    // of the next impulses; zero before; the fourth has no meaning
+    Vector<Real> *sum;               // of the next impulses; zero before; the fourth has no meaning
     Real momentum;
     Real step;
   };
@@ -88,7 +88,8 @@ namespace {
       const Real momentum = pass.momentum, step = pass.step;
       const Real share = 1 / (1 + momentum);
       const std::size_t size = end - begin;
-#pragma omp simd simdlen(16) reduction(+ : uphill, change_squared) reduction(min : least) reduction(max : most)
+#pragma omp simd simdlen(16) reduction(+ : uphill, change_squared) reduction(min : least) \
+    reduction(max : most)
       for (std::size_t k = 0; k < size; ++k) {
         const Real ahead = impulse[k] + momentum * (impulse[k] - next[k]);
         const Real free = ahead - step * gap[k] / diagonal[k];
@@ -134,8 +135,7 @@ namespace {
   };
 
   // Returns change . A change of free particles.
-  template <typename Real>
-  inline __attribute__((always_inline)) double move(const Move<Real> &m)
+  template <typename Real> inline __attribute__((always_inline)) double move(const Move<Real> &m)
   {
     using Lanes = typename Vector<Real>::Lanes;
     constexpr std::size_t CHUNK = 1024;    // of what is added in the precision of Real
@@ -219,7 +219,8 @@ namespace {
         Lanes &at = sum[member.particle].lanes;
         Lanes next = slide;
         add_cross(spin, member.arm.lanes, next);
-        if (member.counts) part += (at - member.sum.lanes) * (next - velocity[member.particle].lanes);
+        if (member.counts)
+          part += (at - member.sum.lanes) * (next - velocity[member.particle].lanes);
         member.sum.lanes = at;
         at = next;
       }
@@ -312,8 +313,9 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
     host.sum_over_copies(reinterpret_cast<Real *>(sum_.data()), 4);
     const double turned =
         bodies_.empty() ? 0.0 : turn_all(bodies_, members_.data(), sum_.data(), velocity_.data());
-    return turned + move_all({velocity_.size(), inverse_mass_.data(), mass_.data(), sum_.data(),
-                     velocity_.data(), ahead_.data(), static_cast<Real>(momentum)});
+    return turned +
+        move_all({velocity_.size(), inverse_mass_.data(), mass_.data(), sum_.data(),
+                  velocity_.data(), ahead_.data(), static_cast<Real>(momentum)});
   }
 
   // Writes the impulses, or those that the last iteration started from.
@@ -468,8 +470,6 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
       momentum_time = next_time;
     }
     curved = iterations.finish(host, momentum);
-    if (curved > curvature_ * change_squared && change_squared > 0.0)
-      curvature_ = MARGIN * curved / change_squared;
   }
   iterations.impulses(scales, problem.contacts.impulse);
   judge(problem, limits, host, result);
@@ -484,7 +484,8 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   constexpr double LEAST_SCALE = 0.9, MOST_SCALE = 1.1;
   constexpr double FIRST_CURVATURE =
       2.0;    // of a few contacts; a first step far too long costs more
-  constexpr double SINGLE_SUFFICES = 3.0e5;
+  constexpr double SINGLE_SUFFICES =
+      3.0e5;    // largest length in tolerances; round-off is 1 / 1.7e7
 
   ContactSet &contacts = problem.contacts;
   const std::size_t count = contacts.size();

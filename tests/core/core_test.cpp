@@ -876,10 +876,8 @@ class RankHost final : public Host {
  public:
   RankHost(Ranks &ranks, std::size_t rank) : ranks_(ranks), rank_(rank) {}
 
-  void sum_over_copies(double *per_particle, int stride) override
-  { sum(per_particle, stride); }
-  void sum_over_copies(float *per_particle, int stride) override
-  { sum(per_particle, stride); }
+  void sum_over_copies(double *per_particle, int stride) override { sum(per_particle, stride); }
+  void sum_over_copies(float *per_particle, int stride) override { sum(per_particle, stride); }
 
   void share_with_copies(double *per_particle) override
   {
