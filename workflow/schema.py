@@ -42,7 +42,8 @@ SCHEMA: Mapping[str, Entry] = {
     "numbers/packing_fraction_monte_carlo": _number("1", "the same by random points"),
     "numbers/packing_fraction_monte_carlo_error": _number("1", "its standard error (binomial)"),
     "numbers/packing_fraction_with_necks": _number(
-        "1", "with the volume at the waist of dimers that no sphere can reach, by Monte Carlo"
+        "1",
+        "and the volume at the waist of dimers that no sphere can reach; this part by Monte Carlo",
     ),
     "numbers/packing_fraction_with_necks_error": _number("1", "its standard error (binomial)"),
     "numbers/coordination_number": _number(

@@ -70,6 +70,33 @@ def test_every_dataset_is_in_the_schema(undisturbed):
             assert record["stages"][0]["variables"]["seed"] in (1, 2)
 
 
+def test_what_is_measured_of_dimers(tmp_path, write_study):
+    dimers = TINY.replace('deck = "spheres"', 'deck = "dimers"').replace("{seeds}", "1")
+    # Long enough to land on one another
+    dimers = dimers.replace("settling = 60", "settling = 250").replace(
+        "points = 1000", "points = 20000"
+    )
+    study = write_study(dimers)
+    done = inelastic("run", study, "--out", tmp_path / "out")
+    assert (done.returncode, done.stderr) == (0, "")
+    (case,) = read_study(study).cases
+    found = of_case(numbers_of(tmp_path / "out" / "few.h5"), case)
+    number = {name.removeprefix("numbers/"): float(v) for name, v in found.items() if v.ndim == 0}
+    assert number["particles"] == 30
+    # The necks of dimers of L/d = 1.5 are 1 % of them.
+    necks = number["packing_fraction_with_necks"] / number["packing_fraction"] - 1
+    assert 0.003 < necks < 0.03
+    assert (
+        number["packing_fraction_with_necks_error"] < number["packing_fraction_monte_carlo_error"]
+    )
+    # Two dimers that touch at several places are neighbours once.
+    assert 0 < number["neighbours"] <= number["coordination_number"]
+    assert number["a_x"] ** 2 + number["a_y"] ** 2 + number["a_z"] ** 2 == pytest.approx(
+        3 * number["a_isotropic"] ** 2,
+        rel=1e-6,  # what LAMMPS's integrator leaves of the dimers' length
+    )
+
+
 def test_the_summary_is_a_table(undisturbed):
     pandas = pytest.importorskip("pandas")
     with h5py.File(undisturbed / "out" / "few.h5") as file:
