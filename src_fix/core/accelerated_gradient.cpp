@@ -22,6 +22,14 @@ namespace {
   bool within(const Residual &residual, const SolverLimits &limits)
   { return std::max(residual.feasibility, residual.complementarity) <= limits.tolerance; }
 
+  // Whether round-off, a few 1e-7 of the largest length in single precision, is far below the
+  // tolerance.
+  template <typename Real> bool suffices(double largest, double tolerance)
+  {
+    constexpr double MOST_TOLERANCES = 3.0e5;
+    return sizeof(Real) == sizeof(double) || largest < MOST_TOLERANCES * tolerance;
+  }
+
   // x, y, z and a fourth number, so that one instruction works on all.
   template <typename Real> struct alignas(4 * sizeof(Real)) Vector {
     typedef Real Lanes __attribute__((vector_size(4 * sizeof(Real))));
@@ -50,6 +58,7 @@ namespace {
 
   struct Passed {
     double uphill = 0.0;            // > 0: the momentum points uphill
+    double heaviest = 0.0;          // impulse, as the length that it alone opens its gap by
     double change_squared = 0.0;    // squared norm of the change of the scaled impulses
     // Of the impulses that the pass started from:
     double least_gap = 0.0;
@@ -80,7 +89,7 @@ namespace {
             (pass.velocity[pass.ends[c].first].lanes - pass.velocity[pass.ends[c].second].lanes);
         gap[c - begin] = normal[3] + (along[0] + along[1] + along[2]);
       }
-      Real uphill = 0, change_squared = 0, least = 0, most = 0;
+      Real uphill = 0, change_squared = 0, least = 0, most = 0, heaviest = 0;
       const Real *const impulse = pass.impulse + begin;
       Real *const next = pass.impulse_before + begin;
       const Real *const diagonal = pass.diagonal + begin;
@@ -89,7 +98,7 @@ namespace {
       const Real share = 1 / (1 + momentum);
       const std::size_t size = end - begin;
 #pragma omp simd simdlen(16) reduction(+ : uphill, change_squared) reduction(min : least) \
-    reduction(max : most)
+    reduction(max : most, heaviest)
       for (std::size_t k = 0; k < size; ++k) {
         const Real ahead = impulse[k] + momentum * (impulse[k] - next[k]);
         const Real free = ahead - step * gap[k] / diagonal[k];
@@ -104,11 +113,14 @@ namespace {
         most = under_force > most ? under_force : most;
         gap_before[k] = here;
         next[k] = value;
+        const Real load = value * diagonal[k];
+        heaviest = load > heaviest ? load : heaviest;
       }
       passed.uphill += uphill;
       passed.change_squared += change_squared;
       passed.least_gap = std::min(passed.least_gap, static_cast<double>(least));
       passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
+      passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
       scatter(pass, begin, end, pass.impulse_before);
     }
     return passed;
@@ -443,8 +455,8 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
     const Passed passed = iterations.advance(momentum, 1.0 / curvature_);
     ++result.iterations;
     double sums[3] = {passed.uphill, passed.change_squared, curved};
-    double maxima[2] = {-passed.least_gap, passed.most_under_force};
-    host.reduce(sums, 3, maxima, 2);
+    double maxima[3] = {-passed.least_gap, passed.most_under_force, passed.heaviest};
+    host.reduce(sums, 3, maxima, 3);
     if (!std::isfinite(sums[2])) {
       result.residual = UNSOLVED;
       return;
@@ -459,6 +471,10 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
       if (result.converged) return;
       if (++failures == MOST_FAILURES && sizeof(Real) < sizeof(double)) return;
       next_check = result.iterations + failures;
+    }
+    if (!suffices<Real>(maxima[2], tolerance)) {
+      iterations.impulses(scales, problem.contacts.impulse);
+      return;
     }
 
     if (sums[0] > 0.0) {
@@ -484,8 +500,6 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   constexpr double LEAST_SCALE = 0.9, MOST_SCALE = 1.1;
   constexpr double FIRST_CURVATURE =
       2.0;    // of a few contacts; a first step far too long costs more
-  constexpr double SINGLE_SUFFICES =
-      3.0e5;    // largest length in tolerances; round-off is 1 / 1.7e7
 
   ContactSet &contacts = problem.contacts;
   const std::size_t count = contacts.size();
@@ -533,7 +547,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   Scales scales;
   scales.length = std::exp2(std::ilogb(maxima[2]));
   scales.impulse = scales.length / std::exp2(std::ilogb(maxima[3]));
-  if (maxima[2] < SINGLE_SUFFICES * limits.tolerance) {
+  if (suffices<float>(maxima[2], limits.tolerance)) {
     if (!single_) single_ = std::make_unique<Iterations<float>>();
     iterate(*single_, problem, limits, scales, host, result);
   }
