@@ -61,6 +61,7 @@ namespace {
     double heaviest = 0.0;          // impulse, as the length that it alone opens its gap by
     double change_squared = 0.0;    // squared norm of the change of the scaled impulses
     // Of the impulses that the pass started from:
+    double curved = 0.0;    // their last change . A that change
     double least_gap = 0.0;
     double most_under_force = 0.0;    // largest gap where an impulse acts
   };
@@ -89,7 +90,7 @@ namespace {
             (pass.velocity[pass.ends[c].first].lanes - pass.velocity[pass.ends[c].second].lanes);
         gap[c - begin] = normal[3] + (along[0] + along[1] + along[2]);
       }
-      Real uphill = 0, change_squared = 0, least = 0, most = 0, heaviest = 0;
+      Real uphill = 0, change_squared = 0, curved = 0, least = 0, most = 0, heaviest = 0;
       const Real *const impulse = pass.impulse + begin;
       Real *const next = pass.impulse_before + begin;
       const Real *const diagonal = pass.diagonal + begin;
@@ -97,10 +98,11 @@ namespace {
       const Real momentum = pass.momentum, step = pass.step;
       const Real share = 1 / (1 + momentum);
       const std::size_t size = end - begin;
-#pragma omp simd simdlen(16) reduction(+ : uphill, change_squared) reduction(min : least) \
+#pragma omp simd simdlen(16) reduction(+ : uphill, change_squared, curved) reduction(min : least) \
     reduction(max : most, heaviest)
       for (std::size_t k = 0; k < size; ++k) {
-        const Real ahead = impulse[k] + momentum * (impulse[k] - next[k]);
+        const Real last_change = impulse[k] - next[k];
+        const Real ahead = impulse[k] + momentum * last_change;
         const Real free = ahead - step * gap[k] / diagonal[k];
         const Real value = free > 0 ? free : 0;
         const Real change = value - impulse[k];
@@ -111,6 +113,7 @@ namespace {
         const Real under_force = impulse[k] > 0 ? here : 0;
         least = here < least ? here : least;
         most = under_force > most ? under_force : most;
+        curved += last_change * (here - gap_before[k]);
         gap_before[k] = here;
         next[k] = value;
         const Real load = value * diagonal[k];
@@ -118,6 +121,7 @@ namespace {
       }
       passed.uphill += uphill;
       passed.change_squared += change_squared;
+      passed.curved += curved;
       passed.least_gap = std::min(passed.least_gap, static_cast<double>(least));
       passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
       passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
@@ -139,44 +143,32 @@ namespace {
   template <typename Real> struct Move {
     std::size_t count;
     const Real *inverse_mass;    // 1 in bodies, where `sum` is a change of velocity already
-    const Real *mass;            // 0 where the change does not count: copies, frozen, in bodies
     Vector<Real> *sum;           // left at zero
     Vector<Real> *velocity;
     Vector<Real> *ahead;
     Real momentum;
   };
 
-  // Returns change . A change of free particles.
-  template <typename Real> inline __attribute__((always_inline)) double move(const Move<Real> &m)
+  template <typename Real> inline __attribute__((always_inline)) void move(const Move<Real> &m)
   {
     using Lanes = typename Vector<Real>::Lanes;
-    constexpr std::size_t CHUNK = 1024;    // of what is added in the precision of Real
-    double curved = 0.0;
-    for (std::size_t begin = 0; begin < m.count; begin += CHUNK) {
-      const std::size_t end = std::min(begin + CHUNK, m.count);
-      Lanes part = {0, 0, 0, 0};
-      for (std::size_t i = begin; i < end; ++i) {
-        const Real w = m.inverse_mass[i];
-        const Lanes next = m.sum[i].lanes * Lanes{w, w, w, 0};
-        const Lanes change = next - m.velocity[i].lanes;
-        part += change * change * m.mass[i];
-        m.ahead[i].lanes = next + change * m.momentum;
-        m.velocity[i].lanes = next;
-        m.sum[i].lanes = Lanes{0, 0, 0, 0};
-      }
-      curved += static_cast<double>(part[0]) + part[1] + part[2];
+    for (std::size_t i = 0; i < m.count; ++i) {
+      const Real w = m.inverse_mass[i];
+      const Lanes next = m.sum[i].lanes * Lanes{w, w, w, 0};
+      m.ahead[i].lanes = next + (next - m.velocity[i].lanes) * m.momentum;
+      m.velocity[i].lanes = next;
+      m.sum[i].lanes = Lanes{0, 0, 0, 0};
     }
-    return curved;
   }
 
-  INELASTIC_CLONES double move_single(const Move<float> &m)
-  { return move(m); }
-  INELASTIC_CLONES double move_double(const Move<double> &m)
-  { return move(m); }
-  inline double move_all(const Move<float> &m)
-  { return move_single(m); }
-  inline double move_all(const Move<double> &m)
-  { return move_double(m); }
+  INELASTIC_CLONES void move_single(const Move<float> &m)
+  { move(m); }
+  INELASTIC_CLONES void move_double(const Move<double> &m)
+  { move(m); }
+  inline void move_all(const Move<float> &m)
+  { move_single(m); }
+  inline void move_all(const Move<double> &m)
+  { move_double(m); }
 
   // Rigid bodies (rigid_bodies.h) in the units of an iteration; arms in units of their own.
   template <typename Real> struct Body {
@@ -187,9 +179,7 @@ namespace {
 
   template <typename Real> struct Member {
     Vector<Real> arm;
-    Vector<Real> sum;    // of the impulses before
     int particle;
-    bool counts;    // owned
   };
 
   // y, z, x: one instruction.
@@ -207,14 +197,12 @@ namespace {
     sum += cross;
   }
 
-  // Sums of impulses become changes of velocity. Returns change . A change.
+  // Sums of impulses become changes of velocity.
   template <typename Real>
-  inline __attribute__((always_inline)) double turn(const std::vector<Body<Real>> &bodies,
-                                                    Member<Real> *members, Vector<Real> *sum,
-                                                    const Vector<Real> *velocity)
+  inline __attribute__((always_inline)) void turn(const std::vector<Body<Real>> &bodies,
+                                                  const Member<Real> *members, Vector<Real> *sum)
   {
     using Lanes = typename Vector<Real>::Lanes;
-    double curved = 0.0;
     for (const Body<Real> &body : bodies) {
       Lanes total = {0, 0, 0, 0}, moment = {0, 0, 0, 0};
       for (int k = body.first; k < body.last_original; ++k) {
@@ -225,36 +213,26 @@ namespace {
       const Lanes spin = body.inverse_inertia[0].lanes * moment[0] +
           body.inverse_inertia[1].lanes * moment[1] + body.inverse_inertia[2].lanes * moment[2];
       const Lanes slide = total * body.inverse_mass;
-      Lanes part = {0, 0, 0, 0};
       for (int k = body.first; k < body.end; ++k) {
-        Member<Real> &member = members[k];
-        Lanes &at = sum[member.particle].lanes;
         Lanes next = slide;
-        add_cross(spin, member.arm.lanes, next);
-        if (member.counts)
-          part += (at - member.sum.lanes) * (next - velocity[member.particle].lanes);
-        member.sum.lanes = at;
-        at = next;
+        add_cross(spin, members[k].arm.lanes, next);
+        sum[members[k].particle].lanes = next;
       }
-      curved += part[0] + part[1] + part[2];
     }
-    return curved;
   }
 
-  INELASTIC_CLONES double turn_single(const std::vector<Body<float>> &bodies,
-                                      Member<float> *members, Vector<float> *sum,
-                                      const Vector<float> *velocity)
-  { return turn(bodies, members, sum, velocity); }
-  INELASTIC_CLONES double turn_double(const std::vector<Body<double>> &bodies,
-                                      Member<double> *members, Vector<double> *sum,
-                                      const Vector<double> *velocity)
-  { return turn(bodies, members, sum, velocity); }
-  inline double turn_all(const std::vector<Body<float>> &bodies, Member<float> *members,
-                         Vector<float> *sum, const Vector<float> *velocity)
-  { return turn_single(bodies, members, sum, velocity); }
-  inline double turn_all(const std::vector<Body<double>> &bodies, Member<double> *members,
-                         Vector<double> *sum, const Vector<double> *velocity)
-  { return turn_double(bodies, members, sum, velocity); }
+  INELASTIC_CLONES void turn_single(const std::vector<Body<float>> &bodies,
+                                    const Member<float> *members, Vector<float> *sum)
+  { turn(bodies, members, sum); }
+  INELASTIC_CLONES void turn_double(const std::vector<Body<double>> &bodies,
+                                    const Member<double> *members, Vector<double> *sum)
+  { turn(bodies, members, sum); }
+  inline void turn_all(const std::vector<Body<float>> &bodies, const Member<float> *members,
+                       Vector<float> *sum)
+  { turn_single(bodies, members, sum); }
+  inline void turn_all(const std::vector<Body<double>> &bodies, const Member<double> *members,
+                       Vector<double> *sum)
+  { turn_double(bodies, members, sum); }
 
 }    // namespace
 
@@ -295,13 +273,8 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
     const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
     const double mobility_unit = problem.timestep * diagonal_unit;
     inverse_mass_.resize(particles);
-    mass_.resize(particles);
-    for (std::size_t i = 0; i < particles; ++i) {
-      const double inverse = problem.inverse_mass[i] * mobility_unit;
-      const bool counts = inverse > 0.0 && i < static_cast<std::size_t>(problem.owned);
-      inverse_mass_[i] = static_cast<Real>(inverse);
-      mass_[i] = static_cast<Real>(counts ? 1.0 / inverse : 0.0);
-    }
+    for (std::size_t i = 0; i < particles; ++i)
+      inverse_mass_[i] = static_cast<Real>(problem.inverse_mass[i] * mobility_unit);
     add_bodies(problem, mobility_unit);
     sum_.assign(particles, Vector<Real>{});
     velocity_.assign(particles, Vector<Real>{});
@@ -318,16 +291,13 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
     return passed;
   }
 
-  // Ends an iteration: velocities of the impulses, and where this momentum leads to. Returns change
-  // . A change, on this rank.
-  double finish(Host &host, double momentum)
+  // Ends an iteration: velocities of the impulses, and where this momentum leads to.
+  void finish(Host &host, double momentum)
   {
     host.sum_over_copies(reinterpret_cast<Real *>(sum_.data()), 4);
-    const double turned =
-        bodies_.empty() ? 0.0 : turn_all(bodies_, members_.data(), sum_.data(), velocity_.data());
-    return turned +
-        move_all({velocity_.size(), inverse_mass_.data(), mass_.data(), sum_.data(),
-                  velocity_.data(), ahead_.data(), static_cast<Real>(momentum)});
+    if (!bodies_.empty()) turn_all(bodies_, members_.data(), sum_.data());
+    move_all({velocity_.size(), inverse_mass_.data(), sum_.data(), velocity_.data(), ahead_.data(),
+              static_cast<Real>(momentum)});
   }
 
   // Writes the impulses, or those that the last iteration started from.
@@ -381,11 +351,8 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
         member.arm.lanes = typename Vector<Real>::Lanes{static_cast<Real>(arm[0] / unit),
                                                         static_cast<Real>(arm[1] / unit),
                                                         static_cast<Real>(arm[2] / unit), 0};
-        member.sum = Vector<Real>{};
         member.particle = rigid.member[k];
-        member.counts = member.particle < problem.owned;
         inverse_mass_[member.particle] = 1;
-        mass_[member.particle] = 0;
       }
     }
   }
@@ -412,7 +379,7 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
   std::vector<Ends> ends_;
   std::vector<Vector<Real>> normal_;
   std::vector<Real> diagonal_, impulse_, impulse_before_, gap_before_;
-  std::vector<Real> inverse_mass_, mass_;
+  std::vector<Real> inverse_mass_;
   std::vector<Vector<Real>> sum_, velocity_, ahead_;
   std::vector<Body<Real>> bodies_;
   std::vector<Member<Real>> members_;
@@ -448,13 +415,13 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
   const double tolerance = limits.tolerance / scales.length;
   double momentum_time = 1.0;
   double momentum = 0.0;
-  double curved = 0.0, change_squared = 0.0;    // of the iteration before
+  double change_squared = 0.0;    // of the iteration before
   long next_check = 0;
   long failures = 0;
   while (result.iterations < limits.max_iterations) {
     const Passed passed = iterations.advance(momentum, 1.0 / curvature_);
     ++result.iterations;
-    double sums[3] = {passed.uphill, passed.change_squared, curved};
+    double sums[3] = {passed.uphill, passed.change_squared, passed.curved};
     double maxima[3] = {-passed.least_gap, passed.most_under_force, passed.heaviest};
     host.reduce(sums, 3, maxima, 3);
     if (!std::isfinite(sums[2])) {
@@ -485,7 +452,7 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
       momentum = (momentum_time - 1.0) / next_time;
       momentum_time = next_time;
     }
-    curved = iterations.finish(host, momentum);
+    iterations.finish(host, momentum);
   }
   iterations.impulses(scales, problem.contacts.impulse);
   judge(problem, limits, host, result);

@@ -6,11 +6,10 @@
 
 namespace inelastic {
 
-void ContactProblem::resize(int owned_particles, int copies)
+void ContactProblem::resize(int number_of_particles)
 {
-  owned = owned_particles;
-  particles = owned_particles + copies;
-  const std::size_t slots = static_cast<std::size_t>(particles) + 1;
+  particles = number_of_particles;
+  const std::size_t slots = static_cast<std::size_t>(number_of_particles) + 1;
   predicted_velocity.resize(3 * slots);
   inverse_mass.resize(slots);
   std::fill_n(predicted_velocity.end() - 3, 3, 0.0);

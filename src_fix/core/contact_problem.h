@@ -24,17 +24,16 @@ namespace inelastic {
 
 struct ContactProblem {
   double timestep = 0.0;
-  int particles = 0;    // owned ones, then copies of other ranks' particles
-  int owned = 0;
+  int particles = 0;                         // owned particles and copies of other ranks' particles
   std::vector<double> predicted_velocity;    // 3 per particle, then 3 zeros for the dummy particle
   std::vector<double> inverse_mass;          // per particle, then a zero; zero = frozen; not read
                                              // for particles in bodies
   RigidBodies bodies;                        // empty in a scene of free particles
   ContactSet contacts;
 
-  // Sets the numbers of particles and the dummy particle that stands for every wall.
+  // Sets the number of particles and the dummy particle that stands for every wall.
   // Bodies are as `bodies.clear` and `bodies.add` leave them.
-  void resize(int owned_particles, int copies = 0);
+  void resize(int number_of_particles);
 
   // n . M^-1 n: velocity along a unit vector that a unit impulse along it gives. Zero = frozen.
   double mobility(int particle, const double *direction) const

@@ -459,7 +459,7 @@ void FixInelastic::predict(double kick_steps)
   const int *const mask = atom->mask;
   kick_ = kick_steps * update->dt;
   problem_.timestep = update->dt;
-  problem_.resize(nlocal, atom->nghost);
+  problem_.resize(nall);
   for (int i = 0; i < nall; ++i) {
     const bool moves = (mask[i] & groupbit) && !(mask[i] & frozen_bit_);
     problem_.inverse_mass[i] = moves ? 1.0 / mass(i) : 0.0;

@@ -972,7 +972,6 @@ ContactProblem part_of(const ContactProblem &whole, const Share &share,
                 second == whole.particles ? WALL : here[static_cast<std::size_t>(second)],
                 &whole.contacts.normal[3 * c], whole.contacts.gap[c]);
   }
-  part.owned = share.owned;
   if (!whole.bodies.empty()) part.bodies = bodies_of(whole.bodies, share.particles);
   return part;
 }

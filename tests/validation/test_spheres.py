@@ -11,6 +11,7 @@ import scipy.sparse as sparse
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from lammps_inelastic import core
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
 from pouring import (
     Recorded,
@@ -225,15 +226,34 @@ def reference_projection(problem: Recorded) -> NDArray[np.float64]:
 
 
 def test_projection_against_a_quadratic_programming_library(tight_records: list[Recorded]) -> None:
-    """Falling, impact, at rest: the projected velocities, over every pair and wall."""
+    """Falling, impact, at rest: the projected velocities, over every pair and wall.
+
+    The residual, 2e-10 r here, bounds the error in the norm that the projection minimises. A sphere
+    that its contacts hold weakly along some direction may be far more off on its own (step 123 has
+    such a one): the same problem is solved further, and then every sphere must agree.
+    """
     errors = []
     for problem in tight_records:
         reference = reference_projection(problem)
+        further = core.project(
+            *problem.spheres,
+            timestep=problem.timestep,
+            tolerance=1e-12,
+            max_iterations=1_000_000,
+            impulse=problem.arrays["impulse"],
+        )
+        assert further.converged
         largest = np.linalg.norm(problem.arrays["predicted_velocity"], axis=1).max()
-        error = np.linalg.norm(problem.arrays["velocity"] - reference, axis=1).max() / largest
-        errors.append(error)
-        print(f"step {int(problem.arrays['step'])}: {error:.2e} of the largest predicted velocity")
-    assert max(errors) < 1e-6
+        off = np.linalg.norm(problem.arrays["velocity"] - reference, axis=1) / largest
+        off_further = np.linalg.norm(further.velocity - reference, axis=1) / largest
+        errors.append((np.sqrt(np.mean(off**2)), off_further.max()))
+        print(
+            f"step {int(problem.arrays['step'])}: {errors[-1][0]:.1e} of the largest predicted "
+            f"velocity in the mean, {off.max():.1e} at most, solved further {errors[-1][1]:.1e}"
+        )
+    # What the library leaves is about 1e-7 of the largest velocity.
+    assert max(mean for mean, _ in errors) < 2e-7
+    assert max(most for _, most in errors) < 1e-6
 
 
 def test_kinetic_energy_and_momentum(tmp_path: Path) -> None:
