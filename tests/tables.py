@@ -1,11 +1,9 @@
-"""Prints the measured tables of the README and of the fix's page: `make tables`.
+"""Prints the measured tables of the documentation: `make tables`.
 
-Spheres: `tables.py agitation` shows the packing fraction against the random force, `tables.py
-contacts` the coordination number against time step, tolerance and solver, `tables.py size` against
-the number of spheres. Dimers: `tables.py aspect` shows everything against the aspect ratio,
-`tables.py near` the coordination number of dimers that are almost spheres against the tolerance,
-`tables.py start` a regular start beside a random one, `tables.py inertia` point masses beside solid
-spheres. Every row is nine seeds unless --seeds says otherwise.
+`tables.py contacts` shows the coordination number of spheres against time step, tolerance and
+solver, `tables.py near` that of dimers that are almost spheres against the tolerance, `tables.py
+start` a regular start of dimers beside a random one, `tables.py inertia` point masses beside solid
+spheres. Every row is nine seeds unless --seeds says otherwise. The paper's numbers are studies.
 """
 
 from __future__ import annotations
@@ -63,13 +61,6 @@ def row(packings: list[Packing]) -> str:
     return f"{spread(phi, 2)} | {spread(z, 3)}"
 
 
-def agitation(seeds: int) -> Iterator[str]:
-    yield "| random force / g | packing fraction % | coordination number |"
-    yield "|---|---|---|"
-    for force in (0, 10, 30, 100, 300):
-        yield f"| {force / GRAVITY:.2g} | {row(pour({'random_force': force}, seeds))} |"
-
-
 def contacts(seeds: int) -> Iterator[str]:
     yield "| solver | h | eps / r | eps / (g h^2) | packing fraction % | coordination number |"
     yield "|---|---|---|---|---|---|"
@@ -98,14 +89,6 @@ def contacts(seeds: int) -> Iterator[str]:
                 )
 
 
-def size(seeds: int) -> Iterator[str]:
-    yield "| spheres | diameter | packing fraction % | coordination number |"
-    yield "|---|---|---|---|"
-    for particles, diameter, runs in ((1000, 0.11, seeds), (10000, 0.052, min(2, seeds))):
-        packings = pour({"particles": particles, "diameter": diameter}, runs)
-        yield f"| {particles} | {diameter} | {row(packings)} |"
-
-
 def dimer_row(packings: list[Packing], distance: float) -> str:
     """Give a_x, a_y, a_z in units of what an isotropic packing has."""
     neighbours = [packing.neighbours.mean for packing in packings]
@@ -122,14 +105,6 @@ DIMER_COLUMNS = "packing fraction % | contacts | neighbours | a_x | a_y | a_z |"
 
 def distance(aspect_ratio: float) -> float:
     return (aspect_ratio - 1) * float(str(DIMERS["diameter"]))
-
-
-def aspect(seeds: int) -> Iterator[str]:
-    yield f"| L/d | {DIMER_COLUMNS}"
-    yield "|---|" + "---|" * 6
-    for ratio in (1.01, 1.05, 1.1, 1.3, 1.5, 1.8, 1.95, 2.0):
-        packings = pour(DIMERS | {"aspect_ratio": ratio}, seeds, dimers_deck())
-        yield f"| {ratio} | {dimer_row(packings, distance(ratio))} |"
 
 
 def near(seeds: int) -> Iterator[str]:
@@ -183,10 +158,7 @@ def inertia(seeds: int) -> Iterator[str]:
 
 
 TABLES = {
-    "agitation": agitation,
     "contacts": contacts,
-    "size": size,
-    "aspect": aspect,
     "near": near,
     "start": start,
     "inertia": inertia,

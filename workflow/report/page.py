@@ -99,8 +99,9 @@ def _row(section: Section, one: Comparison) -> list[Cell]:
         paper = f"{as_text(stated.value, 2)} ± {stated.std:g}"
     elif not math.isnan(stated.error):
         # As many decimals as the error has.
-        decimals = len(f"{stated.error:g}".partition(".")[2])
-        paper = f"{as_text(stated.value, decimals)} ± {stated.error:g}"
+        error = f"{stated.error:.2g}"
+        decimals = len(error.partition(".")[2])
+        paper = f"{as_text(stated.value, decimals)} ± {error}"
     else:
         paper = as_short(stated.value)
     unit = f" {one.unit}" if one.unit else ""
