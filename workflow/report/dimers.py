@@ -134,6 +134,26 @@ def _error_of_a_run(group: Sequence[Result], axis: str) -> float:
     return numbers(group, f"a_{axis}_error").mean / numbers(group, "a_isotropic").mean
 
 
+def _compared(
+    stated: Mapping[str, Any], aspect: float, group: Sequence[Result], words: str = ""
+) -> list[Comparison]:
+    """Compare a_x, a_y and a_z of runs with the paper's."""
+    return [
+        Comparison(
+            f"a_{axis} over isotropic, L/d = {as_short(aspect)}{words}",
+            Stated(stated[f"a_{axis}"] / stated["isotropic"], _error_of_a_run(group, axis)),
+            _components(group, axis),
+            3,
+            "",
+            f"paper prints L/d = {stated['stated_aspect_ratio']}; the numbers are those of "
+            f"{stated['consistent_aspect_ratio']}; its error is taken to be that of one of our "
+            "runs",
+            "it depends on the random force: see the section on it",
+        )
+        for axis in "xyz"
+    ]
+
+
 def _anisotropy(data: Data, groups: ByAspect) -> Section:
     stated = data.paper["dimers"]["anisotropy"]
     dimers = {
@@ -157,19 +177,7 @@ def _anisotropy(data: Data, groups: ByAspect) -> Section:
             )
         )
         if aspect == consistent:
-            comparisons += [
-                Comparison(
-                    f"a_{axis} over isotropic, L/d = {aspect}",
-                    Stated(stated[f"a_{axis}"] / stated["isotropic"], _error_of_a_run(group, axis)),
-                    ratio,
-                    3,
-                    "",
-                    f"paper prints L/d = {printed}; the numbers are those of {consistent}; its "
-                    "error is taken to be that of one of our runs",
-                    "it depends on the random force: see the section on it",
-                )
-                for axis, ratio in zip("xyz", ratios, strict=True)
-            ]
+            comparisons += _compared(stated, aspect, group)
     blocks: list[Block] = []
     if rows:
         paper = [stated[f"a_{axis}"] for axis in "xyz"]
@@ -242,10 +250,15 @@ def _agitation(data: Data) -> Section:
     results = [r for r in data.results("dimers-agitation") if "random_force" in r.variables]
     stated = data.paper["dimers"]["anisotropy"]
     blocks: list[Block] = []
+    comparisons: list[Comparison] = []
     rows = []
     curves = []
     for (particles, _), of_size in by_size(results).items():
         groups = dict(sorted(grouped(of_size, by_value("random_force")).items()))
+        if particles == data.paper["dimers"]["count"]:
+            for force, group in groups.items():
+                words = f", random force {as_short(force)}"
+                comparisons += _compared(stated, stated["consistent_aspect_ratio"], group, words)
         ratios = {axis: [_components(group, axis) for group in groups.values()] for axis in "xyz"}
         rows += [
             cells(
@@ -309,7 +322,7 @@ def _agitation(data: Data) -> Section:
         "dimers-agitation",
         "Orientation of dimers and the random force",
         blocks,
-        (),
+        comparisons,
         ("dimers-agitation",),
     )
 
