@@ -15,8 +15,8 @@ class Host {
   virtual void sum_over_copies(double *per_particle, int stride) = 0;
   virtual void sum_over_copies(float *per_particle, int stride) = 0;
 
-  // Per-particle vectors (3 doubles each): give every copy its owner's value. For those who set up a problem: the
-  // copies need predicted velocities too.
+  // Per-particle vectors (3 doubles each): give every copy its owner's value. For those who set up
+  // a problem: the copies need predicted velocities too.
   virtual void share_with_copies(double *per_particle) = 0;
 
   // Global sums and global maxima of a few numbers, in one communication.
