@@ -66,6 +66,7 @@ LARGEST_DISTANCE = 4.0
 BINS_PER_DIAMETER = 50
 FORCE_BINS, LARGEST_FORCE = 50, 5.0
 NETWORK_INCHES, NETWORK_DPI = 7.0, 150
+MOST_PIXELS = 900  # of a picture's longer side
 SEED = 1
 
 Values = dict[str, NDArray[Any]]
@@ -79,17 +80,18 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
     record = json.loads((folder / FINISHED).read_text())
     result: Result | None = None
     for stage in record["stages"]:
-        values, pictures = _measure(folder / stage["folder"], stage, outputs)
+        where = folder / stage["folder"]
+        values = _measure(where, stage, outputs)
+        pictures: dict[str, bytes] = {}
         if stage is record["stages"][-1]:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
+            pictures = _pictures(where, outputs)
         result = Result(values, pictures, record, outputs.measured, before=result)
     assert result is not None
     return result
 
 
-def _measure(
-    folder: Path, stage: Mapping[str, Any], outputs: Outputs
-) -> tuple[Values, dict[str, bytes]]:
+def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values:
     dump = ParticleDump(folder / PARTICLES)
     frame = dump[-1]
     box = np.reshape(np.array(outputs.box), (3, 2))
@@ -118,7 +120,7 @@ def _measure(
     if outputs.profile is not None:
         _profile(frame, particles, box, outputs.profile, values)
     values |= {f"numbers/{name}": np.asarray(value, dtype=float) for name, value in numbers.items()}
-    return values, _pictures(dump, folder, outputs)
+    return values
 
 
 def _exact(particles: Particles) -> bool:
@@ -350,8 +352,11 @@ def _profile(
         values["profile/packing_fraction"] = exact.values
 
 
-def _pictures(dump: ParticleDump, folder: Path, outputs: Outputs) -> dict[str, bytes]:
+def _pictures(folder: Path, outputs: Outputs) -> dict[str, bytes]:
     pictures: dict[str, bytes] = {}
+    if not (outputs.pictures or outputs.network):
+        return pictures
+    dump = ParticleDump(folder / PARTICLES)
     with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
         target = Path(name) / "picture.png"
         for wanted in outputs.pictures:
@@ -375,9 +380,11 @@ def _pictures(dump: ParticleDump, folder: Path, outputs: Outputs) -> dict[str, b
 
 
 def _small(path: Path) -> bytes:
-    """Return a picture with 256 colours, which take a third of the room and look the same."""
+    """Return a picture as results keep it, which are many: of limited size, with 256 colours."""
     with Image.open(path) as picture:
-        few = picture.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT)
+        small = picture.convert("RGB")
+        small.thumbnail((MOST_PIXELS, MOST_PIXELS))
+        few = small.quantize(256, method=Image.Quantize.MEDIANCUT)
         buffer = io.BytesIO()
         few.save(buffer, format="PNG", optimize=True)
     return buffer.getvalue()

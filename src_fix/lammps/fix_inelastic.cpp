@@ -90,8 +90,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
     wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
     run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0),
-    run_shortened_(0), exchanged_(nullptr), exchanged_single_(nullptr), exchanged_stride_(3),
-    exchanging_memory_(false)
+    run_shortened_(0), exchanged_{}, exchanging_memory_(false)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -1407,29 +1406,19 @@ bool FixInelastic::has_copies() const
 { return comm->nprocs > 1 || atom->nghost > 0; }
 
 void FixInelastic::sum_over_copies(double *per_particle, int stride)
-{
-  if (!has_copies()) return;
-  exchanged_ = per_particle;
-  exchanged_stride_ = stride;
-  comm->reverse_comm(this, 3);
-  comm->forward_comm(this);
-}
+{ exchange({per_particle, nullptr, stride}, true); }
 
 void FixInelastic::sum_over_copies(float *per_particle, int stride)
-{
-  if (!has_copies()) return;
-  exchanged_single_ = per_particle;
-  exchanged_stride_ = stride;
-  comm->reverse_comm(this, 3);
-  comm->forward_comm(this);
-  exchanged_single_ = nullptr;
-}
+{ exchange({nullptr, per_particle, stride}, true); }
 
 void FixInelastic::share_with_copies(double *per_particle)
+{ exchange({per_particle, nullptr, 3}, false); }
+
+void FixInelastic::exchange(const Exchanged &vectors, bool sum)
 {
   if (!has_copies()) return;
-  exchanged_ = per_particle;
-  exchanged_stride_ = 3;
+  exchanged_ = vectors;
+  if (sum) comm->reverse_comm(this, 3);
   comm->forward_comm(this);
 }
 
@@ -1448,24 +1437,13 @@ void FixInelastic::reduce(double *sums, int number_of_sums, double *maxima, int 
 
 int FixInelastic::pack_forward_comm(int n, int *list, double *buffer, int, int *)
 {
-  const int stride = exchanged_stride_;
-  for (int k = 0; k < n; ++k)
-    if (exchanged_single_)
-      std::copy_n(exchanged_single_ + stride * list[k], 3, buffer + 3 * k);
-    else
-      std::copy_n(exchanged_ + stride * list[k], 3, buffer + 3 * k);
+  for (int k = 0; k < n; ++k) exchanged_.get(list[k], buffer + 3 * k);
   return 3 * n;
 }
 
 void FixInelastic::unpack_forward_comm(int n, int first, double *buffer)
 {
-  const int stride = exchanged_stride_;
-  for (int k = 0; k < n; ++k)
-    for (int d = 0; d < 3; ++d)
-      if (exchanged_single_)
-        exchanged_single_[stride * (first + k) + d] = static_cast<float>(buffer[3 * k + d]);
-      else
-        exchanged_[stride * (first + k) + d] = buffer[3 * k + d];
+  for (int k = 0; k < n; ++k) exchanged_.set(first + k, buffer + 3 * k);
 }
 
 int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
@@ -1475,12 +1453,7 @@ int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
     for (int k = 0; k < n; ++k) memory_.pack(first + k, buffer + k * SIZE, SHARED_PARTNERS);
     return n * SIZE;
   }
-  const int stride = exchanged_stride_;
-  for (int k = 0; k < n; ++k)
-    if (exchanged_single_)
-      std::copy_n(exchanged_single_ + stride * (first + k), 3, buffer + 3 * k);
-    else
-      std::copy_n(exchanged_ + stride * (first + k), 3, buffer + 3 * k);
+  for (int k = 0; k < n; ++k) exchanged_.get(first + k, buffer + 3 * k);
   return 3 * n;
 }
 
@@ -1491,13 +1464,7 @@ void FixInelastic::unpack_reverse_comm(int n, int *list, double *buffer)
     for (int k = 0; k < n; ++k) memory_.unpack(list[k], buffer + k * SIZE);
     return;
   }
-  const int stride = exchanged_stride_;
-  for (int k = 0; k < n; ++k)
-    for (int d = 0; d < 3; ++d)
-      if (exchanged_single_)
-        exchanged_single_[stride * list[k] + d] += static_cast<float>(buffer[3 * k + d]);
-      else
-        exchanged_[stride * list[k] + d] += buffer[3 * k + d];
+  for (int k = 0; k < n; ++k) exchanged_.add(list[k], buffer + 3 * k);
 }
 
 /* ----------------------------------------------------------------------

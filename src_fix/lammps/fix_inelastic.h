@@ -160,12 +160,36 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   long run_steps_, run_unconverged_, run_shortened_;
 
   // Communication
+  // Per-particle vectors that pack and unpack work on, in one precision or the other.
+  struct Exchanged {
+    double *values;
+    float *single;    // looked at where there are no `values`
+    int stride;       // numbers from one particle to the next
+
+    void get(int i, double *vector) const
+    {
+      for (int d = 0; d < 3; ++d)
+        vector[d] = values ? values[stride * i + d] : single[stride * i + d];
+    }
+    void set(int i, const double *vector) const
+    {
+      for (int d = 0; d < 3; ++d)
+        if (values)
+          values[stride * i + d] = vector[d];
+        else
+          single[stride * i + d] = static_cast<float>(vector[d]);
+    }
+    void add(int i, const double *vector) const
+    {
+      double sum[3];
+      get(i, sum);
+      for (int d = 0; d < 3; ++d) sum[d] += vector[d];
+      set(i, sum);
+    }
+  };
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
-  // The per-particle vectors that pack and unpack work on, in one precision or the other
-  double *exchanged_;
-  float *exchanged_single_;
-  int exchanged_stride_;
+  Exchanged exchanged_;
   bool exchanging_memory_;
 
   // Host
@@ -174,6 +198,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void share_with_copies(double *) override;
   void reduce(double *, int, double *, int) override;
   bool has_copies() const;
+  void exchange(const Exchanged &, bool sum);
 
   // ConstraintSource
   long refine(const std::vector<double> &, inelastic::ContactProblem &) override;

@@ -56,6 +56,11 @@ from .statistics import (
 # Of the final mean, as the paper says of its two curves.
 BAND_OF_PHI, BAND_OF_Z = 0.001, 0.0005
 
+# Columns of Table 1 that `_beside` fills, twice
+BESIDE_EACH_OTHER = (
+    *("φ, paper [%]", "φ, ours [%]", "difference [SE]"),
+    *("z, paper", "z, ours", "difference [SE]"),
+)
 # Of a packing fraction of the nine runs of 1,000 spheres
 CHANCE = "chance in few runs: see Table 1 with more seeds"
 
@@ -190,11 +195,7 @@ def _table_1(data: Data) -> Section:
     seen: set[str] = set()
     for stated in data.paper["table1"]:
         tolerance, force = stated["eps_over_r"], stated["random_force"]
-        matched = [
-            result
-            for result in matching(results, tolerance=tolerance)
-            if (result.variables.get("random_force", 0) > 0) == force
-        ]
+        matched = _of_row(results, stated)
         seen |= {result.case for result in matched}
         for solver, group in (grouped(matched, solver_of) or {OUR_SOLVER: []}).items():
             pair = _of_table_1(stated, solver, group)
@@ -229,12 +230,7 @@ def _table_1(data: Data) -> Section:
                     "random force",
                     "solver",
                     "runs",
-                    "φ, paper [%]",
-                    "φ, ours [%]",
-                    "difference [SE]",
-                    "z, paper",
-                    "z, ours",
-                    "difference [SE]",
+                    *BESIDE_EACH_OTHER,
                     "ε / (g h²)",
                 ),
                 rows,
@@ -262,17 +258,22 @@ def _table_1(data: Data) -> Section:
     )
 
 
+def _of_row(results: Sequence[Result], stated: Mapping[str, Any]) -> list[Result]:
+    """Return the results with the tolerance and the random force of a row of Table 1."""
+    return [
+        result
+        for result in matching(results, tolerance=stated["eps_over_r"])
+        if (result.variables.get("random_force", 0) > 0) == stated["random_force"]
+    ]
+
+
 def _more_seeds(data: Data) -> tuple[list[Block], list[Comparison]]:
     """Compare rows of the paper's Table 1 with more runs of our own than it has."""
     results = data.results("more-seeds")
     rows: list[list[Cell]] = []
     comparisons: list[Comparison] = []
     for stated in data.paper["table1"]:
-        group = [
-            result
-            for result in matching(results, tolerance=stated["eps_over_r"])
-            if (result.variables.get("random_force", 0) > 0) == stated["random_force"]
-        ]
+        group = _of_row(results, stated)
         if not group:
             continue
         pair = _of_table_1(stated, OUR_SOLVER, group, f", {len(group)} seeds")
@@ -289,17 +290,7 @@ def _more_seeds(data: Data) -> tuple[list[Block], list[Comparison]]:
         return [], []
     table = Table(
         "The same with more seeds",
-        (
-            "ε / r",
-            "random force",
-            "runs",
-            "φ, paper [%]",
-            "φ, ours [%]",
-            "difference [SE]",
-            "z, paper",
-            "z, ours",
-            "difference [SE]",
-        ),
+        ("ε / r", "random force", "runs", *BESIDE_EACH_OTHER),
         rows,
         ("The runs of the table above are among these.",),
     )
