@@ -130,14 +130,10 @@ namespace {
     return passed;
   }
 
-  INELASTIC_CLONES Passed advance_single(const Pass<float> &pass)
+  INELASTIC_CLONES Passed pass_over(const Pass<float> &pass)
   { return advance(pass); }
-  INELASTIC_CLONES Passed advance_double(const Pass<double> &pass)
+  INELASTIC_CLONES Passed pass_over(const Pass<double> &pass)
   { return advance(pass); }
-  inline Passed pass_over(const Pass<float> &pass)
-  { return advance_single(pass); }
-  inline Passed pass_over(const Pass<double> &pass)
-  { return advance_double(pass); }
 
   // One iteration's pass over the particles: from sums of impulses to velocities, and ahead.
   template <typename Real> struct Move {
@@ -161,14 +157,10 @@ namespace {
     }
   }
 
-  INELASTIC_CLONES void move_single(const Move<float> &m)
+  INELASTIC_CLONES void move_all(const Move<float> &m)
   { move(m); }
-  INELASTIC_CLONES void move_double(const Move<double> &m)
+  INELASTIC_CLONES void move_all(const Move<double> &m)
   { move(m); }
-  inline void move_all(const Move<float> &m)
-  { move_single(m); }
-  inline void move_all(const Move<double> &m)
-  { move_double(m); }
 
   // Rigid bodies (rigid_bodies.h) in the units of an iteration; arms in units of their own.
   template <typename Real> struct Body {
@@ -221,18 +213,12 @@ namespace {
     }
   }
 
-  INELASTIC_CLONES void turn_single(const std::vector<Body<float>> &bodies,
-                                    const Member<float> *members, Vector<float> *sum)
+  INELASTIC_CLONES void turn_all(const std::vector<Body<float>> &bodies,
+                                 const Member<float> *members, Vector<float> *sum)
   { turn(bodies, members, sum); }
-  INELASTIC_CLONES void turn_double(const std::vector<Body<double>> &bodies,
-                                    const Member<double> *members, Vector<double> *sum)
+  INELASTIC_CLONES void turn_all(const std::vector<Body<double>> &bodies,
+                                 const Member<double> *members, Vector<double> *sum)
   { turn(bodies, members, sum); }
-  inline void turn_all(const std::vector<Body<float>> &bodies, const Member<float> *members,
-                       Vector<float> *sum)
-  { turn_single(bodies, members, sum); }
-  inline void turn_all(const std::vector<Body<double>> &bodies, const Member<double> *members,
-                       Vector<double> *sum)
-  { turn_double(bodies, members, sum); }
 
 }    // namespace
 

@@ -251,14 +251,16 @@ def _agitation(data: Data) -> Section:
     stated = data.paper["dimers"]["anisotropy"]
     blocks: list[Block] = []
     comparisons: list[Comparison] = []
+    consistent = stated["consistent_aspect_ratio"]
+    aspect = results[0].variables.get("aspect_ratio", math.nan) if results else math.nan
     rows = []
     curves = []
     for (particles, _), of_size in by_size(results).items():
         groups = dict(sorted(grouped(of_size, by_value("random_force")).items()))
-        if particles == data.paper["dimers"]["count"]:
+        if particles == data.paper["dimers"]["count"] and aspect == consistent:
             for force, group in groups.items():
                 words = f", random force {as_short(force)}"
-                comparisons += _compared(stated, stated["consistent_aspect_ratio"], group, words)
+                comparisons += _compared(stated, consistent, group, words)
         ratios = {axis: [_components(group, axis) for group in groups.values()] for axis in "xyz"}
         rows += [
             cells(
@@ -282,7 +284,6 @@ def _agitation(data: Data) -> Section:
             for axis, of_axis in ratios.items()
         ]
     if rows:
-        aspect = results[0].variables.get("aspect_ratio", math.nan)
         blocks = [
             Figure(
                 "dimers-agitation",
