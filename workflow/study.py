@@ -271,12 +271,15 @@ def read_study(path: Path) -> Study:
     # A whole number of thousands of digits is a ValueError too.
     except ValueError as error:
         raise StudyError([f"{path}: not TOML: {error}"]) from None
+    mistakes: list[str] = []
     try:
         file = _StudyFile.model_validate(content)
     except ValidationError as error:
-        raise StudyError([f"{path}: {line}" for line in _lines(error)]) from None
-
-    mistakes: list[str] = []
+        mistakes = list(_lines(error))
+        if any(one["loc"][:1] != ("outputs",) for one in error.errors()):
+            raise StudyError([f"{path}: {line}" for line in mistakes]) from None
+        # The parameters are as they should be: their mistakes are to be told at once.
+        file = _StudyFile.model_validate({**content, "outputs": {}})
     cases = tuple(_cases(file, path.parent, mistakes))
     if mistakes:
         # The same mistake shows in every row that it concerns.

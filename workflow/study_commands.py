@@ -260,8 +260,12 @@ def _chosen(study: Study, wanted: Iterable[str] | None) -> list[Case]:
 
 def _found(path: Path) -> Path:
     """Return a study's path: as given, or of a shipped study of that name."""
-    shipped = SHIPPED / f"{path}.toml"
-    return shipped if not path.exists() and shipped.is_file() else path
+    if path.exists():
+        return path
+    shipped = {file.stem: file for file in sorted(SHIPPED.glob("*.toml"))}
+    if str(path) not in shipped:
+        raise WorkflowError(f"no study {path}: it must be a TOML file or {', '.join(shipped)}")
+    return shipped[str(path)]
 
 
 def at_once(options: argparse.Namespace) -> int:

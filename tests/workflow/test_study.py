@@ -94,6 +94,19 @@ def test_no_such_file(tmp_path):
     assert mistakes_of(tmp_path) == ["Is a directory"]
 
 
+def test_mistakes_in_outputs_do_not_hide_others(write_study):
+    path = write_study(HEAD + "[parameters]\nseed = 0\n[outputs]\npoint = 1000\n")
+    keys = [line.split(":")[0] for line in mistakes_of(path)]
+    assert keys == ["outputs.point", "parameters.seed"]
+
+
+def test_study_that_is_neither_a_file_nor_shipped(capsys):
+    assert main(["validate", "table_1"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("inelastic: no study table_1: it must be a TOML file or ")
+    assert "table-1, table-2" in error
+
+
 def test_a_deck_that_is_no_text(write_study, tmp_path):
     (tmp_path / "own.in").write_bytes(b"# caf\xe9\nvariable x index 1\n")
     (line,) = mistakes_of(write_study('title = "t"\ndeck = "own.in"'))
