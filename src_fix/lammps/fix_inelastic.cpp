@@ -90,7 +90,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
     wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
     run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0),
-    run_shortened_(0), exchanged_{}, exchanging_memory_(false)
+    run_shortened_(0), run_constraint_iterations_(0.0), exchanged_{}, exchanging_memory_(false)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -288,6 +288,8 @@ void FixInelastic::init()
   expecting_ = false;
   run_iterations_ = run_largest_overlap_ = run_largest_excess_ = 0.0;
   run_steps_ = run_unconverged_ = run_shortened_ = 0;
+  run_constraint_iterations_ = 0.0;
+  clock_.reset();
 }
 
 void FixInelastic::init_list(int, NeighList *list)
@@ -354,7 +356,12 @@ void FixInelastic::post_run()
       atom->v[i][d] -= state_[i][PUSH_HELD + d];
       state_[i][PUSH_HELD + d] = 0.0;
     }
-  if (comm->me != 0) return;
+  if (comm->me == 0) log_run();
+  log_times();
+}
+
+void FixInelastic::log_run() const
+{
   utils::logmesg(
       lmp,
       "Fix inelastic: {} projections, {:.0f} iterations, largest overlap {:.6g} = {:.4g} "
@@ -373,12 +380,34 @@ void FixInelastic::post_run()
                    run_unconverged_);
 }
 
+// Collective.
+void FixInelastic::log_times() const
+{
+  double mine[PhaseClock::OUTSIDE + 1], sums[PhaseClock::OUTSIDE + 1];
+  for (int phase = 0; phase < PhaseClock::OUTSIDE; ++phase)
+    mine[phase] = clock_.seconds(static_cast<PhaseClock::Phase>(phase));
+  mine[PhaseClock::OUTSIDE] = run_constraint_iterations_;
+  MPI_Reduce(mine, sums, PhaseClock::OUTSIDE + 1, MPI_DOUBLE, MPI_SUM, 0, world);
+  if (comm->me != 0) return;
+  for (double &sum : sums) sum /= comm->nprocs;
+  std::string text = fmt::format(
+      "  seconds: collect {:.3f}, solve {:.3f}, communicate {:.3f}, check {:.3f}, apply {:.3f}",
+      sums[PhaseClock::COLLECT], sums[PhaseClock::SOLVE], sums[PhaseClock::COMMUNICATE],
+      sums[PhaseClock::CHECK], sums[PhaseClock::APPLY]);
+  if (sums[PhaseClock::OUTSIDE] > 0.0)
+    text += fmt::format("; solve takes {:.1f} us an iteration, {:.2f} ns a constraint",
+                        1.0e6 * sums[PhaseClock::SOLVE] / run_iterations_,
+                        1.0e9 * sums[PhaseClock::SOLVE] / sums[PhaseClock::OUTSIDE]);
+  utils::logmesg(lmp, text + "\n");
+}
+
 /* ----------------------------------------------------------------------
    one step
 ------------------------------------------------------------------------- */
 
 void FixInelastic::advance(int vflag, double kick_steps)
 {
+  const PhaseClock::Within within(clock_, PhaseClock::CHECK);
   v_init(vflag);
   if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
   if (expecting_) check_expected();
@@ -399,8 +428,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
     }
     phase_ = Phase::CONTACT;
     collect();
-    result = inelastic::project(problem_, *this, *solver_, {tolerance_, max_iterations_},
-                                MAX_ROUNDS, *this, velocity_);
+    result = project(max_iterations_);
     double maxima[2] = {bad_overlap_ ? 1.0 : 0.0, output_[OVERLAP]};
     reduce(nullptr, 0, maxima, 2);
     bad_overlap_ = maxima[0] > 0.0;
@@ -450,9 +478,20 @@ void FixInelastic::advance(int vflag, double kick_steps)
   expecting_ = true;
 }
 
+inelastic::ProjectionResult FixInelastic::project(long max_iterations)
+{
+  const PhaseClock::Within within(clock_, PhaseClock::SOLVE);
+  const inelastic::ProjectionResult result = inelastic::project(
+      problem_, *this, *solver_, {tolerance_, max_iterations}, MAX_ROUNDS, *this, velocity_);
+  run_constraint_iterations_ +=
+      static_cast<double>(result.iterations) * static_cast<double>(problem_.contacts.size());
+  return result;
+}
+
 // Every other fix and force has done its work: the velocities that the step would end with.
 void FixInelastic::predict(double kick_steps)
 {
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   const int nlocal = atom->nlocal;
   const int nall = nlocal + atom->nghost;
   const int *const mask = atom->mask;
@@ -486,6 +525,7 @@ void FixInelastic::predict(double kick_steps)
 
 void FixInelastic::collect()
 {
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   problem_.contacts.clear();
   origin_.clear();
   wall_constraint_.clear();
@@ -662,6 +702,7 @@ void FixInelastic::take_wall(const RegionWalls::Look &look, const WallView &view
 
 long FixInelastic::refine(const std::vector<double> &velocity, inelastic::ContactProblem &)
 {
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   message_.clear();
   if (rigid_) rigid_->turn(problem_, velocity);
   long added = add_violated_pairs(velocity);
@@ -933,9 +974,8 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
     problem_.contacts.impulse[c] = 0.0;
     if (origin.wall == 0) disentangle(c);
   }
-  const inelastic::ProjectionResult pushed = inelastic::project(
-      problem_, *this, *solver_, {tolerance_, std::max(0L, max_iterations_ - result.iterations)},
-      MAX_ROUNDS, *this, velocity_);
+  const inelastic::ProjectionResult pushed =
+      project(std::max(0L, max_iterations_ - result.iterations));
   result.iterations += pushed.iterations;
   result.converged = result.converged && pushed.converged;
   result.complete = result.complete && pushed.complete;
@@ -998,6 +1038,7 @@ std::uint64_t FixInelastic::pair_of_bodies(int i, int j) const
 
 void FixInelastic::apply_forces(double kick_steps)
 {
+  const PhaseClock::Within within(clock_, PhaseClock::APPLY);
   const double h = problem_.timestep;
   const int *const mask = atom->mask;
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -1194,6 +1235,7 @@ void FixInelastic::shorten_step(double factor)
 
 void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
 {
+  const PhaseClock::Within within(clock_, PhaseClock::APPLY);
   const inelastic::ContactSet &contacts = problem_.contacts;
   const int nlocal = atom->nlocal;
   const double force_per_impulse = 1.0 / (kick_ * force->ftm2v);
@@ -1327,6 +1369,7 @@ double FixInelastic::compute_array(int wall, int direction)
 // show the pair from the other side, and atoms may migrate before it is built.
 void FixInelastic::remember_contacts()
 {
+  const PhaseClock::Within within(clock_, PhaseClock::APPLY);
   const inelastic::ContactSet &contacts = problem_.contacts;
   const double force_per_impulse = 1.0 / (kick_ * force->ftm2v);
   for (int i = 0; i < problem_.particles; ++i) memory_.forget(i);
@@ -1340,6 +1383,7 @@ void FixInelastic::remember_contacts()
     if (!wall) memory_.remember(j, atom->tag[i], strength);
   }
   if (has_copies()) {
+    const PhaseClock::Within communicating(clock_, PhaseClock::COMMUNICATE);
     exchanging_memory_ = true;
     comm->reverse_comm(this, ContactMemory::packed_size(SHARED_PARTNERS));
     exchanging_memory_ = false;
@@ -1417,6 +1461,7 @@ void FixInelastic::share_with_copies(double *per_particle)
 void FixInelastic::exchange(const Exchanged &vectors, bool sum)
 {
   if (!has_copies()) return;
+  const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
   exchanged_ = vectors;
   if (sum) comm->reverse_comm(this, 3);
   comm->forward_comm(this);
@@ -1425,6 +1470,7 @@ void FixInelastic::exchange(const Exchanged &vectors, bool sum)
 void FixInelastic::reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima)
 {
   if (comm->nprocs == 1) return;
+  const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
   Reduced mine{};
   std::copy_n(sums, number_of_sums, mine.sums);
   std::fill_n(mine.maxima, REDUCED_MAXIMA, -EXTREME);
@@ -1476,6 +1522,7 @@ void FixInelastic::fail_together(const std::string &message)
 {
   int speaker = message.empty() ? comm->nprocs : comm->me;
   if (comm->nprocs > 1) {
+    const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
     int mine = speaker;
     MPI_Allreduce(&mine, &speaker, 1, MPI_INT, MPI_MIN, world);
   }

@@ -19,6 +19,7 @@ FixStyle(inelastic,FixInelastic);
 #include "contact_memory.h"
 #include "fix.h"
 #include "host.h"
+#include "phase_clock.h"
 #include "projection.h"
 #include "region_walls.h"
 #include "rigid_motion.h"
@@ -158,6 +159,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   // Summary of a run
   double run_iterations_, run_largest_overlap_, run_largest_excess_;
   long run_steps_, run_unconverged_, run_shortened_;
+  double run_constraint_iterations_;    // constraints of this rank, once for each iteration
+  PhaseClock clock_;
 
   // Communication
   // Per-particle vectors that pack and unpack work on, in one precision or the other.
@@ -208,6 +211,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void check_expected();
   void predict(double kick_steps);
   void collect();
+  inelastic::ProjectionResult project(long max_iterations);
   void push_apart(inelastic::ProjectionResult &);
   void find_entangled();
   bool is_entangled(int i, int j) const;
@@ -216,6 +220,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void apply_forces(double kick_steps);
   void update_outputs(const inelastic::ProjectionResult &);
   void remember_contacts();
+  void log_run() const;
+  void log_times() const;
   void record_problem(const inelastic::ProjectionResult &);
 
   // Constraints
