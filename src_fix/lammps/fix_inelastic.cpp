@@ -1561,7 +1561,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
 void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
 {
   constexpr int PER_ATOM = 17;
-  constexpr int PER_CONTACT = 9;
+  constexpr int PER_CONTACT = 10;
   constexpr int PER_BODY = 8;
   const inelastic::RigidBodies &rigid_bodies = problem_.bodies;
   std::vector<double> atoms, contacts, bodies;
@@ -1594,10 +1594,12 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
     const int j = problem_.contacts.second[c];
     const double *const n = &problem_.contacts.normal[3 * c];
     const Origin &origin = origin_[c];
-    const double partner = origin.wall ? -origin.wall : static_cast<double>(atom->tag[j]);
-    for (const double value : {static_cast<double>(atom->tag[problem_.contacts.first[c]]), partner,
+    const int i = problem_.contacts.first[c];
+    const tagint partner = origin.wall ? -origin.wall : atom->tag[j];
+    const double guess = kick_ * force->ftm2v * memory_.force(i, partner);
+    for (const double value : {static_cast<double>(atom->tag[i]), static_cast<double>(partner),
                                n[0], n[1], n[2], problem_.contacts.gap[c], origin.gap_now,
-                               origin.wall_motion, problem_.contacts.impulse[c]})
+                               origin.wall_motion, problem_.contacts.impulse[c], guess})
       contacts.push_back(value);
   }
   const std::vector<double> all_atoms = gather(atoms);
@@ -1658,6 +1660,7 @@ void FixInelastic::record_problem(const inelastic::ProjectionResult &result)
     file.add("gap_now", contact_column(6, 1));
     file.add("wall_motion", contact_column(7, 1));
     file.add("impulse", contact_column(8, 1));
+    file.add("impulse_guess", contact_column(9, 1));
     const std::string path = utils::star_subst(record_file_, update->ntimestep, 0);
     if (!file.write(path))
       message = fmt::format("cannot write the record {}: {}", path, utils::getsyserror());

@@ -44,6 +44,7 @@ SHAPES = {
     "gap_now": ("m",),
     "wall_motion": ("m",),
     "impulse": ("m",),
+    "impulse_guess": ("m",),
 }
 Record = dict[str, np.ndarray]
 
@@ -137,6 +138,21 @@ def test_what_a_record_holds(ranks: int, tmp_path: Path, lmp: Runner) -> None:
             distance - record["radius"][i] - record["radius"][j],
             abs=1e-15,  # round-off
         )
+
+
+def test_the_guess_is_the_force_of_the_step_before(tmp_path: Path, lmp: Runner) -> None:
+    lmp(pile(tmp_path, "record step*.npz every 1") + "run 61\n")
+    before = load(tmp_path / "step59.npz")
+    known = {
+        (int(a), int(b)): impulse
+        for a, b, impulse in zip(before["id1"], before["id2"], before["impulse"], strict=True)
+    }
+    known |= {(b, a): impulse for (a, b), impulse in known.items()}
+    now = load(tmp_path / "step60.npz")
+    pairs = zip(now["id1"].tolist(), now["id2"].tolist(), strict=True)
+    expected = np.array([known.get(pair, 0.0) for pair in pairs])
+    assert (expected > 0).sum() > 20
+    assert now["impulse_guess"] == pytest.approx(expected, rel=1e-14)  # h / h is not quite 1
 
 
 def projection(record: Record) -> FloatArray:
