@@ -31,23 +31,9 @@ from lammps_inelastic.analysis import (
 BULK = np.array([[0.25, 0.75]] * 3)  # the paper's box
 
 
-def _deck(name: str) -> str:
-    return (files("lammps_inelastic.inputs") / name).read_text()
-
-
-def spheres_deck() -> str:
-    """Text of the installed inputs/spheres.in."""
-    return _deck("spheres.in")
-
-
-def dimers_deck() -> str:
-    """Text of the installed inputs/dimers.in."""
-    return _deck("dimers.in")
-
-
-def clusters_deck() -> str:
-    """Text of the installed inputs/clusters.in."""
-    return _deck("clusters.in")
+def shipped_deck(name: str) -> str:
+    """Text of the installed deck inputs/NAME.in."""
+    return (files("lammps_inelastic.inputs") / f"{name}.in").read_text()
 
 
 def run_deck(folder: Path, deck: str, variables: Mapping[str, object]) -> str:
@@ -181,11 +167,11 @@ def records(folder: Path) -> list[Path]:
     return sorted(folder.glob("problem.*.npz"), key=lambda path: int(path.name.split(".")[1]))
 
 
-def recording(deck: str, every: int) -> str:
-    """Let the deck's contact fix (not the one that prepares the start) record problems."""
-    before, line, after = deck.rpartition("fix             contact all inelastic")
-    command, newline, rest = after.partition("\n")
-    return f"{before}{line}{command} record problem.*.npz every {every}{newline}{rest}"
+def recording(text: str, every: int) -> str:
+    """Let a deck's contact fix (not the one that prepares the start) record problems."""
+    before, command, after = text.rpartition("all inelastic ")
+    tolerance, _, rest = after.partition(" ")
+    return f"{before}{command}{tolerance} record problem.*.npz every {every} {rest}"
 
 
 def measuring_at(deck: str, tolerances: Sequence[float]) -> str:

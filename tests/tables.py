@@ -17,12 +17,11 @@ from pathlib import Path
 
 from pouring import (
     Packing,
-    dimers_deck,
     measure,
     measuring_at,
     projections,
     run_deck,
-    spheres_deck,
+    shipped_deck,
 )
 
 GRAVITY, RADIUS = 9.81, 0.055
@@ -37,7 +36,7 @@ def pour(variables: Mapping[str, object], seeds: int, deck: str | None = None) -
         with tempfile.TemporaryDirectory() as folder:
             run_deck(
                 Path(folder),
-                deck or spheres_deck(),
+                deck or shipped_deck("spheres"),
                 {"dump_every": 100000, "seed": seed, **variables},
             )
             packings.append(measure(Path(folder)))
@@ -65,7 +64,7 @@ def contacts(seeds: int) -> Iterator[str]:
     yield "| solver | h | eps / r | eps / (g h^2) | packing fraction % | coordination number |"
     yield "|---|---|---|---|---|---|"
     for solver in ("apgd", "uzawa"):
-        deck = spheres_deck()
+        deck = shipped_deck("spheres")
         if solver == "uzawa":
             # The packing is made by apgd: Uzawa only measures, over fewer steps.
             deck = deck.replace(
@@ -116,7 +115,7 @@ def near(seeds: int) -> Iterator[str]:
         for seed in range(1, seeds + 1):
             with tempfile.TemporaryDirectory() as name:
                 folder = Path(name)
-                deck = measuring_at(dimers_deck(), tolerances)
+                deck = measuring_at(shipped_deck("dimers"), tolerances)
                 variables = {"aspect_ratio": ratio, "seed": seed, "dump_every": 100000}
                 run_deck(folder, deck, DIMERS | variables)
                 for number, tolerance in enumerate(tolerances):
@@ -136,7 +135,7 @@ def start(seeds: int) -> Iterator[str]:
     for ratio in (1.5, 1.8):
         for arrangement in ("random", "regular"):
             variables = DIMERS | {"aspect_ratio": ratio, "start": arrangement}
-            packings = pour(variables, seeds, dimers_deck())
+            packings = pour(variables, seeds, shipped_deck("dimers"))
             yield f"| {ratio} | {arrangement} | {dimer_row(packings, distance(ratio))} |"
 
 
@@ -150,7 +149,9 @@ def inertia(seeds: int) -> Iterator[str]:
                 with tempfile.TemporaryDirectory() as folder:
                     variables = {"aspect_ratio": ratio, "inertia": kind, "seed": seed}
                     log = run_deck(
-                        Path(folder), dimers_deck(), DIMERS | variables | {"dump_every": 100000}
+                        Path(folder),
+                        shipped_deck("dimers"),
+                        DIMERS | variables | {"dump_every": 100000},
                     )
                     packings.append(measure(Path(folder)))
                     iterations.append(float(sum(run.iterations for run in projections(log))))

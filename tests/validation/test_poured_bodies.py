@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
-from pouring import Packing, clusters_deck, dimers_deck, measure, run_deck
+from pouring import Packing, measure, run_deck, shipped_deck
 
 pytestmark = pytest.mark.validation
 
@@ -32,7 +32,7 @@ def poured(tmp_path_factory: pytest.TempPathFactory):
     def pour(aspect_ratio: float, start: str, seed: int) -> Packing:
         folder = tmp_path_factory.mktemp("dimers")
         variables = {"aspect_ratio": aspect_ratio, "start": start, "seed": seed}
-        run_deck(folder, dimers_deck(), DIMERS | variables)
+        run_deck(folder, shipped_deck("dimers"), DIMERS | variables)
         return measure(folder)
 
     return pour
@@ -86,12 +86,12 @@ def thrown(deck: str) -> str:
 
 
 SCENES = {
-    "dimers 1.05": (dimers_deck(), {"aspect_ratio": 1.05}),
-    "dimers 1.5": (dimers_deck(), {"aspect_ratio": 1.5}),
-    "solid dimers 2": (dimers_deck(), {"aspect_ratio": 2.0, "inertia": "solid"}),
-    "tetrahedra": (clusters_deck(), {}),
-    "dimers 1.5, thrown": (thrown(dimers_deck()), {"aspect_ratio": 1.5}),
-    "tetrahedra, thrown": (thrown(clusters_deck()), {}),
+    "dimers 1.05": (shipped_deck("dimers"), {"aspect_ratio": 1.05}),
+    "dimers 1.5": (shipped_deck("dimers"), {"aspect_ratio": 1.5}),
+    "solid dimers 2": (shipped_deck("dimers"), {"aspect_ratio": 2.0, "inertia": "solid"}),
+    "tetrahedra": (shipped_deck("clusters"), {}),
+    "dimers 1.5, thrown": (thrown(shipped_deck("dimers")), {"aspect_ratio": 1.5}),
+    "tetrahedra, thrown": (thrown(shipped_deck("clusters")), {}),
 }
 
 

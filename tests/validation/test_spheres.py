@@ -20,7 +20,7 @@ from pouring import (
     recording,
     records,
     run_deck,
-    spheres_deck,
+    shipped_deck,
 )
 
 pytestmark = pytest.mark.validation
@@ -42,7 +42,7 @@ def test_table_1(tmp_path: Path) -> None:
     phi, z = [], []
     for seed in range(1, 10):
         folder = tmp_path / str(seed)
-        run_deck(folder, spheres_deck(), {"seed": seed, "dump_every": 1000})
+        run_deck(folder, shipped_deck("spheres"), {"seed": seed, "dump_every": 1000})
         packing = measure(folder)
         phi.append(100 * packing.packing_fraction.value)
         z.append(packing.coordination_number.mean)
@@ -58,7 +58,11 @@ def test_table_1(tmp_path: Path) -> None:
 
 def test_10000_spheres(tmp_path: Path) -> None:
     """10,000 spheres: phi, z, and no sphere without support."""
-    run_deck(tmp_path, spheres_deck(), {"particles": 10000, "diameter": 0.052, "dump_every": 1000})
+    run_deck(
+        tmp_path,
+        shipped_deck("spheres"),
+        {"particles": 10000, "diameter": 0.052, "dump_every": 1000},
+    )
     packing = measure(tmp_path)
     counts = packing.coordination_number
     print(f"phi {100 * packing.packing_fraction.value:.2f}, z {counts.mean:.3f}")
@@ -84,13 +88,13 @@ def in_container(deck: str, container: str, centres: str) -> str:
 
 
 SCENES = {
-    "box": (spheres_deck(), {}, 1.0),
-    "time step of 0.04": (spheres_deck(), {"dt": 0.04}, 1.0),
+    "box": (shipped_deck("spheres"), {}, 1.0),
+    "time step of 0.04": (shipped_deck("spheres"), {"dt": 0.04}, 1.0),
     # The fall from the top ends at about 9.
-    "ten times the speed": (thrown(spheres_deck(), 90.0), {}, 1.0),
+    "ten times the speed": (thrown(shipped_deck("spheres"), 90.0), {}, 1.0),
     "cylinder": (
         in_container(
-            spheres_deck(),
+            shipped_deck("spheres"),
             "region walls cylinder y 0.5 0.5 0.5 0 5 units box",
             "cylinder y 0.5 0.5 0.44 0.06 4.94",
         ),
@@ -100,7 +104,7 @@ SCENES = {
     "moving floor": (
         # Regular steps only, so that the time of a frame is known.
         in_container(
-            spheres_deck()
+            shipped_deck("spheres")
             .replace("shorten yes", "shorten no")
             .replace("neighbor        ${skin} bin", "neighbor 0.4 bin")
             .replace("neighbor        ${skin_bed} bin", "neighbor 0.4 bin"),
@@ -164,7 +168,7 @@ def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
         # The first of the tight steps still undoes the overlaps of the looser tolerance.
         run_deck(
             folder,
-            recording(spheres_deck(), 1),
+            recording(shipped_deck("spheres"), 1),
             {
                 "tolerance_measuring": 2e-10,
                 "dump_every": 1000,
@@ -260,7 +264,7 @@ def test_kinetic_energy_and_momentum(tmp_path: Path) -> None:
     """T(V) <= T(V*) + sum lambda max(0, -gap)/h + residual's share; at every step."""
     run_deck(
         tmp_path,
-        recording(spheres_deck(), 1),
+        recording(shipped_deck("spheres"), 1),
         {
             "dump_every": 1000,
             "steps_agitated": 300,

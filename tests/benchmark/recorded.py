@@ -1,0 +1,190 @@
+"""Recorded contact problems: iterations and times of the solvers, outside LAMMPS.
+
+Starts of spheres and of dimers settle (inputs/settling.in) and their contact problems at three
+moments are kept: the impact, when most of the particles fall onto those that lie; the settling; and
+the rest. Each is solved to several tolerances by the accelerated gradient and by the paper's Uzawa,
+both from zero impulses, and once by the accelerated gradient from the impulses of the step before,
+as it does in a run.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lammps_inelastic import core
+from pouring import Recorded, read_record, recording, records, run_deck, shipped_deck
+
+TOLERANCE = 0.0005  # of the runs that are recorded [radii]
+TOLERANCES = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
+UZAWA_TOLERANCES = (5e-3, 5e-4, 5e-5)  # it takes about ten times as long for each digit
+MOST_ITERATIONS = 1_000_000
+MOMENTS = {"impact": 0.5, "settling": 1.0, "rest": 2.0}  # [time]
+RECORD_EVERY = 5  # steps
+REPEATS = 3
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What settles.
+
+    Attributes
+    ----------
+    particle : spheres or dimers
+    particles : how many
+    diameter : of a sphere, length
+    aspect_ratio : of dimers
+    """
+
+    particle: str
+    particles: int
+    diameter: float
+    aspect_ratio: float | None = None
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        kind = "" if self.aspect_ratio is None else f" of L/d {self.aspect_ratio:g}"
+        return f"{self.particles:,} {self.particle}{kind}"
+
+
+def scenes(particles: int, diameter: float) -> list[Scene]:
+    """Spheres, and dimers near to spheres and far from them."""
+    return [
+        Scene("spheres", particles, diameter),
+        Scene("dimers", particles, diameter, 1.01),
+        Scene("dimers", particles, diameter, 1.5),
+    ]
+
+
+def record(scene: Scene, folder: Path) -> dict[str, Recorded]:
+    """Let a start settle in `folder`; return its problems at the three moments."""
+    values: dict[str, object] = {"particles": scene.particles, "diameter": scene.diameter}
+    if scene.aspect_ratio is not None:
+        values["aspect_ratio"] = scene.aspect_ratio
+    phases = ("agitated", "settling", "tightening", "measuring")
+    run_deck(
+        folder / "start", shipped_deck(scene.particle), values | {f"steps_{p}": 0 for p in phases}
+    )
+    log = run_deck(
+        folder,
+        recording(shipped_deck("settling"), RECORD_EVERY),
+        {
+            "packing": "start/packing.restart",
+            "particle": scene.particle,
+            "diameter": scene.diameter,
+            "tolerance": TOLERANCE,
+            "time_settling": max(MOMENTS.values()),
+        },
+    )
+    times = dict(_times(log))
+    paths = {int(path.name.split(".")[1]): path for path in records(folder)}
+    chosen = {
+        moment: min(paths, key=lambda step: abs(times[step] - when))
+        for moment, when in MOMENTS.items()
+    }
+    return {moment: read_record(paths[step]) for moment, step in chosen.items()}
+
+
+def _times(log: str) -> Iterator[tuple[int, float]]:
+    """Yield step and time of the lines of thermo output."""
+    _, _, rows = log.rpartition("Step")
+    for line in rows.splitlines():
+        words = line.split()
+        if len(words) > 1 and words[0].isdigit():
+            yield int(words[0]), float(words[1])
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Iterations and seconds to a tolerance; None where it was not reached."""
+
+    iterations: int
+    seconds: float
+
+
+def _solve(problem: Recorded, tolerance: float, **options: object) -> Solved | None:
+    def once() -> core.Projection:
+        return core.project(
+            *problem.spheres,
+            **problem.bodies,
+            timestep=problem.timestep,
+            tolerance=tolerance,
+            max_iterations=MOST_ITERATIONS,
+            **options,
+        )
+
+    result, seconds = _timed(once, 1 if options.get("solver") == "uzawa" else REPEATS)
+    return Solved(result.iterations, seconds) if result.converged else None
+
+
+def _timed(call: Callable[[], core.Projection], repeats: int) -> tuple[core.Projection, float]:
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        result = call()
+        seconds.append(time.perf_counter() - start)
+    return result, statistics.median(seconds)
+
+
+def _power_iteration(problem: Recorded) -> float:
+    """Seconds that Uzawa's step size takes, which is not counted as part of it."""
+    a = problem.arrays
+    start = time.perf_counter()
+    core.largest_eigenvalue(
+        a["inverse_mass"],
+        problem.first,
+        problem.second,
+        a["normal"],
+        **problem.bodies,
+        timestep=problem.timestep,
+    )
+    return time.perf_counter() - start
+
+
+def compare(scene: Scene, problems: dict[str, Recorded]) -> tuple[list[float], list[float]]:
+    """Print a line for each problem and tolerance.
+
+    Returns
+    -------
+    How many times as long as the accelerated gradient Uzawa takes at the tolerance of the run, one
+    number a problem: with the accelerated gradient from the last step's impulses, and from zero.
+    """
+    warm_ratios, cold_ratios = [], []
+    for moment, problem in problems.items():
+        radius = float(problem.arrays["radius"].min())
+        contacts = int((problem.arrays["impulse"] > 0).sum())
+        print(
+            f"  {scene.name}, {moment}: {len(problem.first):,} constraints, {contacts:,} contacts",
+            flush=True,
+        )
+        guess: NDArray[np.float64] = problem.arrays["impulse_guess"]
+        step_size = _power_iteration(problem)
+        for tolerance in TOLERANCES:
+            cold = _solve(problem, tolerance * radius)
+            warm = _solve(problem, tolerance * radius, impulse=guess)
+            uzawa = None
+            if tolerance in UZAWA_TOLERANCES:
+                uzawa = _solve(problem, tolerance * radius, solver="uzawa")
+            words = [
+                f"{name} {solved.iterations:6d} in {1e3 * solved.seconds:8.1f} ms"
+                for name, solved in (("warm", warm), ("from zero", cold))
+                if solved is not None
+            ]
+            if uzawa is not None and cold is not None and warm is not None:
+                seconds = uzawa.seconds - step_size
+                words.append(
+                    f"Uzawa {uzawa.iterations:6d} in {1e3 * seconds:8.1f} ms: "
+                    f"{seconds / warm.seconds:.1f} and {seconds / cold.seconds:.1f} times as long"
+                )
+                if tolerance == TOLERANCE:
+                    warm_ratios.append(seconds / warm.seconds)
+                    cold_ratios.append(seconds / cold.seconds)
+            print(f"    {tolerance:g} r: {', '.join(words)}", flush=True)
+    return warm_ratios, cold_ratios
