@@ -19,7 +19,9 @@ from .errors import WorkflowError
 
 Value = int | float | str
 
-SHIPPED = ("spheres", "dimers", "clusters", "response")
+# Lets a start fall until it is at rest; measured in a way of its own.
+SETTLING = "settling"
+SHIPPED = ("spheres", "dimers", "clusters", "response", SETTLING)
 # Set by the workflow itself: where a deck writes, and the packing that the deck before it has left.
 OUT, PACKING = "out", "packing"
 
@@ -79,7 +81,8 @@ RULES: Mapping[str, Rule] = {
     "steps_agitated": _integers(0),
     "steps_settling": _integers(0),
     "steps_tightening": _integers(0),
-    "steps_measuring": _integers(1),
+    # 0: the contacts of the packing as it is.
+    "steps_measuring": _integers(0),
     "steps_changing": _integers(1),
     "random_force": _NOT_NEGATIVE,
     "drag": _NOT_NEGATIVE,
@@ -93,6 +96,11 @@ RULES: Mapping[str, Rule] = {
     "extent": _NOT_NEGATIVE,
     "change": _words("walls", "tilt"),
     "angle": _numbers("from -90 to 90", lambda value: -90 <= value <= 90),
+    "particle": _words("spheres", "dimers"),
+    "contacts": _words("hard", "soft"),
+    "reach": _POSITIVE,
+    "time_settling": _POSITIVE,
+    "time_between": _POSITIVE,
 }
 
 # Variables that name a file, and the words that they may be instead, deck by deck.

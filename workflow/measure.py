@@ -14,7 +14,7 @@ import math
 import re
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,6 @@ from lammps_inelastic.analysis import (
     exact_packing_fraction,
     fabric_tensor,
     force_distribution,
-    iterate_contact_frames,
     largest_pair_overlap,
     measure_evolution,
     packing_fraction,
@@ -55,8 +54,10 @@ from lammps_inelastic.analysis import (
 
 from .errors import WorkflowError
 from .folder import CONTACTS, FINISHED, PARTICLES
+from .settling import contact_frames, is_settling, measure_settling
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
+from .thermo import at_steps, read_thermo
 
 LOG = "log.lammps"
 # For the packing fraction of bodies that cannot be cut exactly, frame by frame.
@@ -85,7 +86,7 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
         pictures: dict[str, bytes] = {}
         if stage is record["stages"][-1]:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
-            pictures = _pictures(where, outputs)
+            pictures = _pictures(where, stage, outputs)
         result = Result(values, pictures, record, outputs.measured, before=result)
     assert result is not None
     return result
@@ -111,12 +112,17 @@ def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values
         numbers["resolution"] = resolution
     values: Values = {}
     if chosen.any():
-        numbers |= _contacts(folder / CONTACTS, frame, chosen, values)
+        touching = contact_frames(folder / CONTACTS, stage, frame)
+        numbers |= _contacts(touching, frame, chosen, values)
         numbers |= _orientation(frame, particles, chosen, box)
         if outputs.structure:
             numbers |= _structure(frame, particles, box, values)
-    if outputs.evolution:
+    if outputs.evolution or is_settling(stage):
         numbers |= _evolution(dump, folder / LOG, stage, box, values)
+    if is_settling(stage):
+        settled = measure_settling(folder / LOG, dump, folder / CONTACTS, stage, values)
+        numbers |= settled[0]
+        values |= settled[1]
     if outputs.profile is not None:
         _profile(frame, particles, box, outputs.profile, values)
     values |= {f"numbers/{name}": np.asarray(value, dtype=float) for name, value in numbers.items()}
@@ -153,7 +159,10 @@ def _are_dimers(particles: Particles) -> bool:
 
 
 def _contacts(
-    path: Path, frame: ParticleFrame, chosen: NDArray[np.bool_], values: Values
+    frames: Iterable[ContactFrame],
+    frame: ParticleFrame,
+    chosen: NDArray[np.bool_],
+    values: Values,
 ) -> dict[str, float]:
     """Measure contacts over all frames, rattlers and forces too."""
     particles = frame.particles
@@ -162,7 +171,7 @@ def _contacts(
     normals: list[NDArray[np.float64]] = []
     loose: list[float] = []
     held: list[float] = []
-    for contacts in iterate_contact_frames(path):
+    for contacts in frames:
         counts.append(contact_counts(contacts.ids, frame.ids, particles))
         inside = contacts_of(chosen, contacts.ids, frame.ids, particles)
         forces.append(contacts.forces[inside])
@@ -257,9 +266,9 @@ def _evolution(
         return packing_fraction(positions, radii, bounds, points=POINTS_PER_FRAME, seed=SEED).value
 
     seen = measure_evolution(dump, box, packing=of_frame)
-    times = _times(log)
+    clock = read_thermo(log, "Time")
     values["evolution/step"] = seen.steps
-    values["evolution/time"] = np.array([times.get(int(step), np.nan) for step in seen.steps])
+    values["evolution/time"] = at_steps(seen.steps, clock["Step"], clock["Time"])
     values["evolution/packing_fraction"] = seen.packing_fraction
     values["evolution/coordination_number"] = seen.coordination
     values["evolution/centre_height"] = seen.height
@@ -271,17 +280,6 @@ def _evolution(
     if not stage["variables"].get("random_force") or not late.any():
         return {}
     return {"coordination_number_agitated": float(np.mean(seen.coordination[late]))}
-
-
-def _times(log: Path) -> dict[int, float]:
-    """Return the time at each step that the log has a line for."""
-    times: dict[int, float] = {}
-    for run in LogFile(str(log)).runs:
-        if "Time" in run:
-            times |= {
-                int(step): float(time) for step, time in zip(run["Step"], run["Time"], strict=True)
-            }
-    return times
 
 
 _SUMMARY = re.compile(
@@ -352,7 +350,7 @@ def _profile(
         values["profile/packing_fraction"] = exact.values
 
 
-def _pictures(folder: Path, outputs: Outputs) -> dict[str, bytes]:
+def _pictures(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> dict[str, bytes]:
     pictures: dict[str, bytes] = {}
     if not (outputs.pictures or outputs.network):
         return pictures
@@ -374,7 +372,8 @@ def _pictures(folder: Path, outputs: Outputs) -> dict[str, bytes]:
             pictures[f"{frame.step:08d}"] = _small(target)
         if outputs.network:
             frame = dump[-1]
-            _draw_network(target, frame, _last_contacts(folder / CONTACTS))
+            *_, contacts = contact_frames(folder / CONTACTS, stage, frame)
+            _draw_network(target, frame, contacts)
             pictures["network"] = _small(target)
     return pictures
 
@@ -402,11 +401,6 @@ def contacts_per_particle(frame: ParticleFrame) -> NDArray[np.int64] | None:
 def contacts_per_colour(frame: ParticleFrame) -> int:
     """Return how many numbers of contacts share a colour: a body has ten and more, a sphere six."""
     return 2 if frame.particles.composite else 1
-
-
-def _last_contacts(path: Path) -> ContactFrame:
-    *_, last = iterate_contact_frames(path)
-    return last
 
 
 def _draw_network(path: Path, frame: ParticleFrame, contacts: ContactFrame) -> None:

@@ -89,8 +89,28 @@ SCHEMA: Mapping[str, Entry] = {
     "numbers/steps": _number("1", "steps of all phases"),
     "numbers/iterations": _number("1", "solver iterations of all steps"),
     "numbers/wall_seconds": _number("s", "wall time of LAMMPS"),
+    "numbers/plateau_time": _number("time", "settling: first frame at rest; NaN if there is none"),
+    "numbers/plateau_seconds": _number("s", "settling: wall time of the steps up to it"),
+    "numbers/plateau_iterations": _number("1", "settling, hard: solver iterations up to it"),
+    "numbers/settling_seconds": _number("s", "settling: wall time of all steps"),
+    "numbers/overlap_at_rest": _number(
+        "radii", "settling: of two particles or with a wall, largest in the frames at rest"
+    ),
+    "numbers/overlap_falling": _number("radii", "settling: the same before, but at the start"),
+    "numbers/complementarity_at_rest": _number(
+        "radii", "settling, hard: largest gap under a force that the solver has left at rest"
+    ),
+    "numbers/drift": _number(
+        "diameters/time", "settling: speed of the centre of mass over the last 0.25 time units"
+    ),
     "distribution/contacts": Entry("(k,)", "1", "share of the particles with 0, 1, ... contacts"),
     "distribution/neighbours": Entry("(k,)", "1", "share with 0, 1, ... neighbours"),
+    "network/ids": Entry(
+        "(m, 2)", "1", "settling: spheres of each contact at the end; the second is -k for wall k"
+    ),
+    "network/forces": Entry(
+        "(m,)", "force", "settling: of each contact; soft: its depth, in units of the stiffness"
+    ),
     "forces/ratio": Entry("(b,)", "1", "contact force over its mean, middle of each bin"),
     "forces/density": Entry("(b,)", "1", "probability density of that ratio"),
     "evolution/step": Entry("(f,)", "steps", "of each frame of the particle dump"),

@@ -427,19 +427,18 @@ def _case(decks: Sequence[Deck], values: dict[str, Value], folder: Path) -> Case
         if name in values and path.is_file():
             inputs[path.name] = path
             values[name] = path.name
-    return Case(
-        tuple(
-            Stage(
-                deck,
-                {
-                    name: values[name]
-                    for name, default in deck.parameters.items()
-                    if name in values and values[name] != default
-                },
-            )
-            for deck in decks
-        ),
-        inputs,
+    return Case(tuple(stage_of(deck, values) for deck in decks), inputs)
+
+
+def stage_of(deck: Deck, values: Mapping[str, Value]) -> Stage:
+    """Return a deck with those of the values that it knows, and that are not its defaults."""
+    return Stage(
+        deck,
+        {
+            name: values[name]
+            for name, default in deck.parameters.items()
+            if name in values and values[name] != default
+        },
     )
 
 

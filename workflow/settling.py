@@ -1,0 +1,180 @@
+"""What is measured of a start that settles (inputs/settling.in): when it is at rest, and how well.
+
+The same numbers for hard and for soft contacts, from the same files as far as both write them: time
+and wall time from the log, overlaps from the positions alone. Soft contacts have no contact dump;
+theirs are the overlaps, each with a force that is proportional to its depth.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lammps_inelastic.analysis import (
+    ContactFrame,
+    ParticleDump,
+    ParticleFrame,
+    contacts_by_distance,
+    iterate_contact_frames,
+    largest_pair_overlap,
+    largest_wall_overlap,
+)
+
+from .decks import SETTLING
+from .thermo import at_steps, read_thermo
+
+FloatArray = NDArray[np.float64]
+
+# At rest: over the time before, packing fraction and height have changed by less than these shares.
+WINDOW = 0.25
+STEADY, STANDING = 1e-3, 1e-2
+
+_LOOP = re.compile(r"^Loop time of (\S+) on \d+ procs for (\d+) steps", re.MULTILINE)
+
+
+def is_settling(stage: Mapping[str, Any]) -> bool:
+    """Whether a stage of a run's record is of the deck that lets a start settle."""
+    return bool(stage["deck"] == SETTLING)
+
+
+def contact_frames(
+    path: Path, stage: Mapping[str, Any], frame: ParticleFrame
+) -> Iterable[ContactFrame]:
+    """Return a stage's contact frames: those of its dump, or the overlaps of soft contacts.
+
+    Parameters
+    ----------
+    path : of the contact dump, which soft contacts do not have
+    stage : of the run's record
+    frame : the last one of the particle dump
+    """
+    if is_settling(stage) and stage["variables"]["contacts"] == "soft":
+        return [overlaps_as_contacts(frame)]
+    return iterate_contact_frames(path)
+
+
+def overlaps_as_contacts(frame: ParticleFrame) -> ContactFrame:
+    """Return all overlaps of spheres with each other and with the box as contacts.
+
+    A contact's force is the depth of the overlap, that is in units of the stiffness.
+    """
+    found = contacts_by_distance(
+        frame.positions, frame.radii, 0.0, frame.particles, walls=frame.box
+    )
+    return ContactFrame(
+        step=frame.step,
+        ids=found.ids(frame.ids),
+        points=found.points,
+        normals=found.normals,
+        gaps=found.gaps,
+        forces=-found.gaps,
+    )
+
+
+def first_at_rest(
+    times: ArrayLike, packing_fraction: ArrayLike, height: ArrayLike, diameter: float
+) -> int | None:
+    """Return the index of the first frame in which a start has come to rest; None if none has.
+
+    Two things hold there. Over the last 0.25 time units the packing fraction in the box has changed
+    by less than 0.1 %. And the packing stands: in the same time the centre of mass has moved by
+    less than 1 % of its fall so far. A steady packing fraction alone says little, because a cloud
+    that falls as a whole keeps its own; but of a free fall the last 0.25 are always more than 1 %
+    (in the first 50 time units). A start that lies already has nowhere to fall: there 1 % of a
+    diameter is allowed.
+
+    Parameters
+    ----------
+    times : (f,), ascending, time
+    packing_fraction : (f,), read between two frames by linear interpolation
+    height : (f,), of the centre of mass, length; likewise
+    diameter : of a sphere, length
+    """
+    when = np.asarray(times, dtype=np.float64)
+    share = np.asarray(packing_fraction, dtype=np.float64)
+    up = np.asarray(height, dtype=np.float64)
+    before = when - WINDOW
+    # A hair of round-off: the frame at 0.25 has the first one before it.
+    known = before >= when[0] - 1e-9
+    steady = np.abs(share - np.interp(before, when, share)) < STEADY * share
+    fall = np.maximum(up[0] - up, diameter)
+    standing = np.abs(up - np.interp(before, when, up)) < STANDING * fall
+    found = np.flatnonzero(known & steady & standing)
+    return int(found[0]) if len(found) else None
+
+
+def measure_settling(
+    log: Path, dump: ParticleDump, contacts: Path, stage: Mapping[str, Any], seen: Mapping[str, Any]
+) -> tuple[dict[str, float], dict[str, NDArray[Any]]]:
+    """Measure how a start has settled.
+
+    Parameters
+    ----------
+    log : of the run
+    dump : of its particles
+    contacts : its contact dump, which soft contacts do not have
+    stage : of the run's record
+    seen : the evolution of the dump: `evolution/time`, `evolution/packing_fraction` and
+        `evolution/centre_height`, (f,) each
+
+    Returns
+    -------
+    The numbers by the names in the schema, without `numbers/`; NaN where the packing has not come
+    to rest. And the contact network of the last frame by the names in the schema.
+    """
+    last = dump[-1]
+    smallest = float(last.radii.min())
+    diameter = 2 * float(last.radii.max())
+    times, height = seen["evolution/time"], seen["evolution/centre_height"]
+    rest = first_at_rest(times, seen["evolution/packing_fraction"], height, diameter)
+    overlaps = np.array([_largest_overlap(frame) for frame in dump]) / smallest
+    loops = _LOOP.findall(log.read_text(errors="replace"))
+    numbers = {
+        "plateau_time": math.nan if rest is None else float(times[rest]),
+        "plateau_seconds": math.nan,
+        "overlap_at_rest": math.nan if rest is None else float(overlaps[rest:].max()),
+        # The start's own overlaps are those of the run that made it.
+        "overlap_falling": float(overlaps[1:rest].max(initial=0.0)),
+        "drift": _drift(times, height) / diameter,
+        "settling_seconds": sum(float(seconds) for seconds, _ in loops),
+        "steps": float(sum(int(steps) for _, steps in loops)),
+    }
+    hard = stage["variables"]["contacts"] == "hard"
+    if hard:
+        numbers |= {"plateau_iterations": math.nan, "complementarity_at_rest": math.nan}
+    if rest is not None:
+        step = dump.steps[rest]
+        clock = read_thermo(log, "CPU")
+        numbers["plateau_seconds"] = float(at_steps([step], clock["Step"], clock["CPU"])[0])
+        if hard:
+            solved = read_thermo(log, "iterations", "complementarity")
+            late = solved["Step"] >= step
+            numbers["plateau_iterations"] = float(
+                solved["iterations"][solved["Step"] <= step].sum()
+            )
+            numbers["complementarity_at_rest"] = float(
+                solved["complementarity"][late].max() / smallest
+            )
+    *_, network = contact_frames(contacts, stage, last)
+    return numbers, {"network/ids": network.ids, "network/forces": network.forces}
+
+
+def _largest_overlap(frame: ParticleFrame) -> float:
+    """Return the largest overlap of two particles or with a wall, length."""
+    pair = largest_pair_overlap(frame.positions, frame.radii, frame.bodies)
+    wall = largest_wall_overlap(frame.positions, frame.radii, frame.box)
+    return max(pair.depth, wall.depth)
+
+
+def _drift(times: FloatArray, height: FloatArray) -> float:
+    """Return the speed of the centre of mass over the last 0.25 time units, length / time."""
+    before = times[-1] - WINDOW
+    if before < times[0]:
+        return math.nan
+    return float(abs(height[-1] - np.interp(before, times, height)) / WINDOW)
