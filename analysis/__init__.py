@@ -30,7 +30,7 @@ from .necks import (
     with_scaled_necks,
 )
 from .neighbours import DistanceContacts, contacts_by_distance
-from .network import contact_graph, draw_network
+from .network import NetworkDifference, contact_graph, draw_network, network_difference
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import (
@@ -71,6 +71,7 @@ __all__ = [
     "ExportError",
     "ForceDistribution",
     "InputError",
+    "NetworkDifference",
     "Orientation",
     "PackingFraction",
     "PairOverlap",
@@ -106,6 +107,7 @@ __all__ = [
     "monte_carlo",
     "mueller_packing_fraction",
     "neck_volume",
+    "network_difference",
     "packing_fraction",
     "packing_fraction_with_necks",
     "particle_volumes_in_box",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import networkx
@@ -21,6 +22,62 @@ PALETTE = "viridis"
 MEAN_WIDTH = 0.8
 # The thickest line, in mean forces: few contacts carry more.
 LARGEST_SHOWN = 4.0
+
+
+@dataclass(frozen=True)
+class NetworkDifference:
+    """How far two contact networks of the same spheres differ.
+
+    Attributes
+    ----------
+    forces : sum of the differences of the forces over all contacts that either has, where those of
+        each network sum to 1: 0 if the two are the same, 2 if they have no contact in common
+    shared : contacts that both have, over those that either has
+    """
+
+    forces: float
+    shared: float
+
+
+def network_difference(
+    contact_ids: ArrayLike,
+    forces: ArrayLike,
+    reference_ids: ArrayLike,
+    reference_forces: ArrayLike,
+) -> NetworkDifference:
+    """Compare a contact network with a reference, whatever the units of their forces.
+
+    Parameters
+    ----------
+    contact_ids : (m, 2), m >= 1, spheres on both sides, in either order; the second is -k for wall
+        k. A contact that is there several times counts with the sum of its forces
+    forces : (m,), not negative, of a positive sum
+    reference_ids, reference_forces : (r, 2) and (r,), likewise
+    """
+    one = _shares(contact_ids, forces)
+    other = _shares(reference_ids, reference_forces)
+    either = one.keys() | other.keys()
+    apart = sum(abs(one.get(pair, 0.0) - other.get(pair, 0.0)) for pair in either)
+    return NetworkDifference(apart, len(one.keys() & other.keys()) / len(either))
+
+
+def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], float]:
+    """Return for each pair its share of all forces."""
+    ids = np.asarray(contact_ids, dtype=np.int64)
+    strength = np.asarray(forces, dtype=np.float64)
+    if ids.ndim != 2 or ids.shape[1] != 2 or strength.shape != (len(ids),):
+        raise InputError(
+            f"contact ids and forces must have shape (m, 2) and (m,), not {ids.shape} and "
+            f"{strength.shape}"
+        )
+    # Written so that NaN fails too.
+    if not ((strength >= 0).all() and 0 < strength.sum() < np.inf):
+        raise InputError("forces must not be negative, and their sum must be positive and finite")
+    shares: dict[tuple[int, int], float] = {}
+    ordered = np.sort(ids, axis=1).tolist()
+    for (low, high), share in zip(ordered, (strength / strength.sum()).tolist(), strict=True):
+        shares[low, high] = shares.get((low, high), 0.0) + share
+    return shares
 
 
 def contact_graph(

@@ -10,7 +10,14 @@ from typing import NoReturn
 
 from lammps_inelastic.analysis import AnalysisError
 
-from . import export_command, look_command, report_command, reproduce_command, study_commands
+from . import (
+    export_command,
+    look_command,
+    report_command,
+    reproduce_command,
+    study_commands,
+    tradeoff_command,
+)
 from .errors import StudyError, WorkflowError
 
 
@@ -29,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return report_command.run(options)
         if options.command == "reproduce":
             return reproduce_command.run(options)
+        if options.command == "tradeoff":
+            return tradeoff_command.run(options)
         return study_commands.run_command(options)
     except StudyError as error:
         # Every rank of an MPI job finds the same mistakes.
@@ -56,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     look_command.add_parser(commands)
     study_commands.add_parsers(commands)
     reproduce_command.add_parser(commands)
+    tradeoff_command.add_parser(commands)
     export_command.add_parser(commands)
     report_command.add_parser(commands)
     return parser

@@ -168,14 +168,14 @@ def run_one(
         else:
             outcome = run_study(study, cases, folder, options, display)
     if first:
-        _tell(study, outcome)
+        tell(study, outcome)
         file = folder.root / f"{study.name}.h5"
         write_studies(file, [gathered(study, folder)])
         print(f"results: {file}")
     return outcome
 
 
-def _tell(study: Study, outcome: Outcome) -> None:
+def tell(study: Study, outcome: Outcome) -> None:
     """Print what became of a study's cases, and why some failed."""
     parts = [
         (len(outcome.measured), "done"),
@@ -289,7 +289,7 @@ def add_options_of_run(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--ranks", type=_count, default=1, help="MPI ranks of each (default: 1)")
     parser.add_argument(
-        "--timeout", type=_seconds, help="give up a case after so many seconds (default: never)"
+        "--timeout", type=seconds, help="give up a case after so many seconds (default: never)"
     )
 
 
@@ -319,7 +319,7 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _seconds(text: str) -> float:
+def seconds(text: str) -> float:
     try:
         value = float(text)
     except ValueError:

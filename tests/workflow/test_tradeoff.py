@@ -1,0 +1,457 @@
+"""Time against accuracy: when a start is at rest, how packings are compared, the whole command."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from few_spheres import write_data
+from lammps_inelastic.analysis import InputError, ParticleFrame, network_difference
+from lammps_inelastic.workflow import tradeoff_command
+from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.settling import first_at_rest, overlaps_as_contacts
+from lammps_inelastic.workflow.store import Result, read_studies
+from lammps_inelastic.workflow.study import Case
+from lammps_inelastic.workflow.thermo import at_steps, read_thermo
+from lammps_inelastic.workflow.tradeoff import (
+    Configuration,
+    Run,
+    compare,
+    recommendations,
+    reference_of,
+)
+from study_run import killed_when, numbers_of, same
+
+# Deep enough to fill the measuring box, few enough for a second a run.
+FEW = ["--particles", "60", "--diameter", "0.3"]
+
+
+# When a start is at rest
+
+TIMES = np.arange(41) * 0.05
+DIAMETER = 0.1
+
+
+def fallen_by(time):
+    """Height of the centre of mass in a fall from 2.5 that a floor ends at 0.5."""
+    return np.maximum(2.5 - 9.81 * time**2 / 2, 0.5)
+
+
+def test_at_rest_when_fallen_and_steady():
+    landed = math.sqrt(2 * 2 / 9.81)
+    share = np.where(landed + 0.1 < TIMES, 0.6, 0.14)
+    index = first_at_rest(TIMES, share, fallen_by(TIMES), DIAMETER)
+    # The step from 0.14 to 0.6, at 0.74, is 0.25 ago.
+    assert TIMES[index] == pytest.approx(1.0)
+
+
+def test_a_falling_cloud_keeps_its_packing_fraction_and_is_not_at_rest():
+    share = np.full(len(TIMES), 0.14)
+    index = first_at_rest(TIMES, share, fallen_by(TIMES), DIAMETER)
+    # It lands at 0.64.
+    assert TIMES[index] == pytest.approx(0.9)
+
+
+def test_a_change_that_is_too_large_is_not_at_rest():
+    height = np.full(len(TIMES), 0.5)
+    slow, fast = (0.6 * (1 + rate * TIMES) for rate in (0.0039, 0.0042))
+    assert first_at_rest(TIMES, slow, height, DIAMETER) == 5
+    assert first_at_rest(TIMES, fast, height, DIAMETER) is None
+
+
+def test_never_at_rest():
+    still = np.full(len(TIMES), 0.5)
+    # An empty box, a run that is too short, and times that are not known.
+    assert first_at_rest(TIMES, np.zeros(len(TIMES)), still, DIAMETER) is None
+    assert first_at_rest(TIMES[:5], still[:5], still[:5], DIAMETER) is None
+    assert first_at_rest(np.full(len(TIMES), np.nan), still, still, DIAMETER) is None
+
+
+def test_frames_need_not_be_evenly_spaced():
+    times = np.array([0.0, 0.3, 0.5, 0.6])
+    share = np.array([0.5, 0.6, 0.6, 0.6])
+    # At 0.5 the time 0.25 before lies within the rise from 0 to 0.3.
+    assert first_at_rest(times, share, np.full(4, 0.5), DIAMETER) == 3
+
+
+# What is read from logs and frames
+
+
+def test_a_log_between_and_after_its_lines(tmp_path):
+    log = tmp_path / "log.lammps"
+    runs = [
+        "   Step  \n     0\nLoop time of 1 on 1 procs for 0 steps with 3 atoms\n",
+        "   Step          Time   \n     0   0\n   100   1.0\nLoop time of 1 on 1 procs\n",
+        "   Step          Time   \n   100   1.0\n   200   3.0\nLoop time of 1 on 1 procs\n",
+    ]
+    log.write_text("".join(runs))
+    table = read_thermo(log, "Time")
+    assert table["Step"].tolist() == [0, 100, 200]
+    times = at_steps([50, 100, 150, 200, 210, -1], table["Step"], table["Time"])
+    assert times[:5] == pytest.approx([0.5, 1, 2, 3, 3.2])
+    assert math.isnan(times[5])
+    assert np.isnan(at_steps([1], *read_thermo(log, "CPU").values())).all()
+
+
+def test_overlaps_are_the_contacts_of_soft_spheres():
+    frame = ParticleFrame(
+        step=7,
+        ids=np.array([4, 2, 9]),
+        positions=np.array([[0.5, 0.24, 0.5], [0.5, 0.72, 0.5], [0.3, 2.0, 0.5]]),
+        velocities=None,
+        radii=np.full(3, 0.25),
+        bodies=None,
+        box=np.array([[0, 1], [0, 5], [0, 1]]),
+        boundaries=("ff", "ff", "ff"),
+    )
+    contacts = overlaps_as_contacts(frame)
+    assert contacts.ids.tolist() == [[4, 2], [4, -3]]
+    assert contacts.forces == pytest.approx([0.02, 0.01])
+
+
+# How networks and packings are compared
+
+
+def test_networks_that_are_the_same_up_to_units_and_order():
+    one = network_difference([[1, 2], [3, -1]], [1, 3], [[-1, 3], [2, 1]], [30, 10])
+    assert (one.forces, one.shared) == (0, 1)
+
+
+def test_networks_that_differ():
+    # Shares 1/4, 3/4, 0 against 1/2, 0, 1/2
+    one = network_difference([[1, 2], [2, 3]], [1, 3], [[1, 2], [3, 4]], [2, 2])
+    assert one.forces == pytest.approx(1 / 4 + 3 / 4 + 1 / 2)
+    assert one.shared == pytest.approx(1 / 3)
+    nothing = network_difference([[1, 2]], [1], [[3, 4]], [1])
+    assert (nothing.forces, nothing.shared) == (2, 0)
+
+
+@pytest.mark.parametrize(
+    ("ids", "forces", "message"),
+    [
+        ([[1, 2]], [1, 2], "must have shape"),
+        ([1, 2], [1, 2], "must have shape"),
+        ([[1, 2]], [-1], "must not be negative"),
+        ([[1, 2]], [math.nan], "must not be negative"),
+        (np.empty((0, 2)), [], "must be positive"),
+    ],
+)
+def test_networks_that_cannot_be_compared(ids, forces, message):
+    with pytest.raises(InputError, match=message):
+        network_difference([[1, 2]], [1], ids, forces)
+
+
+def configuration(contacts="hard", tolerance=0.005, dt=0.01, ranks=1):
+    hard = contacts == "hard"
+    return Configuration(contacts, tolerance, "apgd" if hard else None, dt if hard else None, ranks)
+
+
+def made_up(one, start, seconds=1.0, share=0.6, contacts=6.0):
+    """A run and its result, with a network that is the same for all."""
+    numbers = {
+        "plateau_seconds": seconds,
+        "plateau_time": seconds,
+        "overlap_at_rest": one.tolerance,
+        "packing_fraction": share,
+        "coordination_number": contacts,
+    }
+    values = {f"numbers/{name}": np.array(value) for name, value in numbers.items()}
+    values |= {"network/ids": np.array([[1, 2]]), "network/forces": np.array([1.0])}
+    return Run(one, start, Case((), {})), Result(values, {}, {}, "{}")
+
+
+def made_up_study():
+    """Three starts; the loose tolerance is off in contacts alone; soft spheres take six times."""
+    tight, loose, soft = (
+        configuration(tolerance=0.0005),
+        configuration(tolerance=0.005),
+        configuration("soft", 0.005),
+    )
+    results = []
+    for number, start in enumerate("123"):
+        share = 0.6 + 0.01 * number
+        results += [
+            made_up(tight, start, 4.0, share, 6.0 + 0.1 * number),
+            made_up(loose, start, 1.0 + number, share + 0.005, 5.0),
+            made_up(soft, start, 6.0, share, 7.0),
+        ]
+    return results
+
+
+def test_rows_errors_and_ratios():
+    comparison = compare(made_up_study())
+    tight, loose, _ = comparison.rows
+    assert comparison.reference == tight.configuration
+    assert math.isnan(tight.median("packing_fraction_error"))
+    assert loose.median("packing_fraction_error") == pytest.approx(0.005)
+    assert loose.median("coordination_number_error") == pytest.approx(1.1)
+    assert loose.median("network_error") == 0
+    assert sorted(loose.slower) == pytest.approx([2, 3, 6])
+    assert comparison.scatter("packing_fraction") == pytest.approx(0.01)
+    assert len(tight.slower) == 0
+
+
+def test_recommendations():
+    share, contacts, speed = recommendations(compare(made_up_study()))
+    assert "a tolerance of 0.005 r is enough as far as 3 starts can tell, and takes 2 s" in share
+    assert "+0.0050 from that of the tightest, 0.0005 r, which takes 4 s" in share
+    assert contacts.startswith("Contacts per particle: nothing but the tightest, 0.0005 r")
+    assert speed.endswith("take: 3 (2 to 6) times as long at 0.005 r.")
+
+
+def test_recommendations_that_the_numbers_do_not_carry():
+    one = [pair for pair in made_up_study() if pair[0].start == "1"]
+    share, contacts, _ = recommendations(compare(one))
+    assert "cannot be judged by one start" in share
+    assert "cannot be judged by one start" in contacts
+    hard = [pair for pair in made_up_study() if pair[0].configuration.contacts == "hard"]
+    assert "cannot be compared" in recommendations(compare(hard))[2]
+    assert all("no run with hard contacts" in line for line in recommendations(compare([]))[:2])
+
+
+def test_a_start_without_a_reference_or_not_at_rest_counts_where_it_can():
+    results = made_up_study()
+    # Of start 1 the reference has failed, and start 2 never comes to rest at the loose tolerance.
+    results = [p for p in results if (p[0].start, p[0].configuration.tolerance) != ("1", 0.0005)]
+    for run, result in results:
+        if (run.start, run.configuration) == ("2", configuration(tolerance=0.005)):
+            result.values["numbers/plateau_seconds"] = np.array(np.nan)
+            result.values["numbers/plateau_time"] = np.array(np.nan)
+    comparison = compare(results)
+    loose = next(row for row in comparison.rows if row.configuration.tolerance == 0.005)
+    assert len(loose.values("packing_fraction_error")) == 2
+    assert sorted(loose.slower) == pytest.approx([2, 6])
+    assert (len(loose.outcomes), len(loose.values("plateau_time"))) == (3, 2)
+
+
+def test_the_reference_is_the_tightest_with_the_shortest_step():
+    best = configuration(tolerance=1e-6, dt=0.005)
+    others = [configuration(tolerance=1e-6), configuration("soft", 1e-7), configuration()]
+    assert reference_of([*others, best]) == best
+    assert reference_of([configuration("soft")]) is None
+
+
+# The command
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--particle", "cubes"], "--particle: cubes is not allowed: it must be spheres or dimers"),
+        (["--particles", "0"], "--particles: 0 is not allowed: it must be a whole number of at le"),
+        (["--diameter", "2"], "--diameter: 2 is not allowed: it must be a number between 0 and 1"),
+        (["--aspect-ratio", "1.5"], "--aspect-ratio: only dimers have one (--particle dimers)"),
+        (
+            ["--particle", "dimers", "--aspect-ratio", "3"],
+            "--aspect-ratio: 3 is not allowed: it must be a number above 1 and up to 2",
+        ),
+        (["--tolerances", "0.05,"], "--tolerances:  is not allowed: it must be a number above 0"),
+        (["--tolerances", "nan"], "--tolerances: nan is not allowed: it must be a number above 0"),
+        (["--soft-tolerances", "0.05,no"], "--soft-tolerances: no is not allowed: it must be a nu"),
+        (["--dts", "-1"], "--dts: -1 is not allowed: it must be a number above 0"),
+        (["--solvers", "apgd,sor"], "--solvers: sor is not allowed: it must be apgd or uzawa"),
+        (["--ranks", "1,9999"], "--ranks: 9999 is not allowed: it must be a whole number from 1 t"),
+        (["--seeds", "1.5"], "--seeds: 1.5 is not allowed: it must be a whole number from 1 to 1"),
+        (["--time", "0"], "--time: 0 is not allowed: it must be a number above 0"),
+        (["--start", "no.data"], "--start: no.data: no such file"),
+        (["--timeout", "0"], "argument --timeout: '0' is no number of seconds above 0"),
+        (["--start", "a", "--seeds", "2"], "argument --seeds: not allowed with argument --start"),
+    ],
+)
+def test_bad_options(arguments, message, tmp_path, capsys):
+    try:
+        status = main(["tradeoff", "--out", str(tmp_path / "out"), *arguments])
+    except SystemExit as end:  # argparse's own
+        status = end.code
+    assert status == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    assert " ".join(message.split()) in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_line_for_each_bad_option(tmp_path, capsys):
+    arguments = ["--tolerances", "0,-1", "--seeds", "x", "--dts", "0"]
+    assert main(["tradeoff", "--out", str(tmp_path), *arguments]) == 2
+    names = [line.split(":")[1].strip() for line in capsys.readouterr().err.splitlines()]
+    assert names == ["--seeds", "--tolerances", "--tolerances", "--dts"]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Return the arguments and the folder of a small comparison."""
+    out = tmp_path_factory.mktemp("tradeoff") / "out"
+    arguments = ["tradeoff", "--out", str(out), *FEW, "--seeds", "2", "--time", "3"]
+    arguments += ["--tolerances", "0.005,5e-5", "--soft-tolerances", "0.005"]
+    assert main(arguments) == 0
+    return arguments, out
+
+
+@pytest.fixture
+def again(finished, tmp_path):
+    """Return the arguments that run half of it, that of seed 1, in another folder."""
+    arguments, undisturbed = finished
+    words = [str(tmp_path / "out") if word == str(undisturbed) else word for word in arguments]
+    words[words.index("--seeds") + 1] = "1"
+    return words, tmp_path / "out"
+
+
+def rows_of(out):
+    with (out / "tradeoff.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_what_a_comparison_writes(finished):
+    _, out = finished
+    assert {path.name for path in out.iterdir()} == {
+        "ranks-1",
+        "tradeoff.csv",
+        "tradeoff.h5",
+        "tradeoff.md",
+        "tradeoff.png",
+        "tradeoff.svg",
+    }
+    rows = rows_of(out)
+    assert [(r["contacts"], r["tolerance"], r["start"]) for r in rows] == [
+        ("hard", "0.005", "1"),
+        ("hard", "0.005", "2"),
+        ("hard", "5e-05", "1"),
+        ("hard", "5e-05", "2"),
+        ("soft", "0.005", "1"),
+        ("soft", "0.005", "2"),
+    ]
+    page = (out / "tradeoff.md").read_text()
+    assert page.count("| hard | apgd |") == 2
+    assert "Soft spheres" in page
+
+
+def test_numbers_of_a_comparison(finished):
+    _, out = finished
+    for row in rows_of(out):
+        words = ("contacts", "solver", "case")
+        number = {name: float(text) for name, text in row.items() if text and name not in words}
+        assert 0.4 < number["packing_fraction"] < 0.75
+        assert number["settling_seconds"] > 0
+        if row["contacts"] == "hard":
+            # The projection bounds the overlap of free spheres at flat walls at every step; the
+            # dump's digits add 1e-12.
+            assert number["overlap_falling"] <= number["tolerance"] * (1 + 1e-6)
+            assert number["iterations"] > 0
+        else:
+            assert row["solver"] == row["dt"] == row["iterations"] == ""
+        if "plateau_time" in number:
+            assert 0.25 <= number["plateau_time"] <= 3.05
+            assert 0 < number["plateau_seconds"] <= number["settling_seconds"] * 1.05
+            assert number["overlap_at_rest"] < 2 * number["tolerance"]
+        is_reference = row["tolerance"] == "5e-05"
+        assert (row["network_error"] == "") == is_reference
+
+
+def test_all_runs_of_a_seed_have_the_same_start(finished):
+    _, out = finished
+    (study,) = read_studies(out / "tradeoff.h5")
+    heights = {}
+    for result in study.results:
+        key = result.variables["seed"]
+        heights.setdefault(key, set()).add(float(result.values["evolution/centre_height"][0]))
+    assert {key: len(found) for key, found in heights.items()} == {1: 1, 2: 1}
+    assert heights[1] != heights[2]
+
+
+def test_nothing_is_left_to_do(finished, capsys):
+    arguments, out = finished
+    before = numbers_of(out / "tradeoff.h5"), (out / "tradeoff.csv").read_text()
+    assert main(arguments) == 0
+    assert "ranks-1: 6 there before" in capsys.readouterr().out
+    assert same(before[0], numbers_of(out / "tradeoff.h5"))
+    assert before[1] == (out / "tradeoff.csv").read_text()
+
+
+def test_killed_and_run_again(finished, again, capsys):
+    arguments, out = again
+    killed_when(lambda: list(out.glob("ranks-1/results/*/*.h5")), *arguments)
+    done = len(list(out.glob("ranks-1/results/*/*.h5")))
+    assert 1 <= done < 3
+    assert main(arguments) == 0
+    assert f"{done} there before" in capsys.readouterr().out
+    times = ("plateau_seconds", "settling_seconds")
+    one, other = (
+        [
+            {name: text for name, text in row.items() if name not in times}
+            for row in rows_of(folder)
+            if row["start"] == "1"
+        ]
+        for folder in (out, finished[1])
+    )
+    assert one == other
+
+
+def test_a_failed_run_is_left_out_and_said(again, capsys, monkeypatch):
+    arguments, out = again
+    runs_of = tradeoff_command.runs_of
+
+    def with_a_bad_one(plan):
+        runs = runs_of(plan)
+        # A variable that the deck refuses.
+        runs[0].case.stages[1].values["particle"] = "cubes"
+        return runs
+
+    monkeypatch.setattr(tradeoff_command, "runs_of", with_a_bad_one)
+    assert main(arguments) == 1
+    output = capsys.readouterr().out
+    assert "ranks-1: 2 done, 1 failed" in output
+    assert "left out: " in output
+    assert "exit status 1" in output
+    assert len(rows_of(out)) == 2
+    assert "left out: " in (out / "tradeoff.md").read_text()
+
+
+def test_dimers_and_time_steps(tmp_path, capsys):
+    arguments = ["--particle", "dimers", "--particles", "30", "--diameter", "0.3", "--seeds", "1"]
+    arguments += ["--tolerances", "0.005", "--dts", "0.01,0.005", "--soft-tolerances", "0.05"]
+    assert main(["tradeoff", "--out", str(tmp_path / "out"), *arguments]) == 0
+    rows = rows_of(tmp_path / "out")
+    assert [row["dt"] for row in rows] == ["0.01", "0.005", ""]
+    assert all(float(row["coordination_number"]) > 0 for row in rows)
+    # The shorter step is the reference.
+    assert [row["network_error"] == "" for row in rows] == [False, True, False]
+    assert "cannot be judged by one start" in capsys.readouterr().out
+
+
+def test_starts_from_data_files(tmp_path):
+    for name in ("a.data", "b.data"):
+        write_data(tmp_path / name, diameter=0.28)
+    files = [str(tmp_path / name) for name in ("a.data", "b.data")]
+    arguments = ["--diameter", "0.28", "--tolerances", "0.005", "--soft-tolerances", "none"]
+    out = tmp_path / "out"
+    assert main(["tradeoff", "--out", str(out), *arguments, "--start", *files]) == 0
+    assert [row["start"] for row in rows_of(out)] == ["a.data", "b.data"]
+    # One configuration is the reference, and has no error to plot.
+    assert (out / "tradeoff.png").stat().st_size > 0
+
+
+def test_two_ranks_are_kept_apart(tmp_path):
+    if tradeoff_command.cores() < 2:
+        pytest.skip("two ranks need two cores")
+    out = tmp_path / "out"
+    arguments = [*FEW, "--seeds", "1", "--tolerances", "0.005", "--soft-tolerances", "none"]
+    assert main(["tradeoff", "--out", str(out), *arguments, "--ranks", "1,2"]) == 0
+    assert [row["ranks"] for row in rows_of(out)] == ["1", "2"]
+    assert {path.name for path in Path(out).glob("ranks-*")} == {"ranks-1", "ranks-2"}
+    assert [study.name for study in read_studies(out / "tradeoff.h5")] == ["ranks-1", "ranks-2"]
+
+
+def test_settling_in_a_study(write_study, tmp_path):
+    study = write_study(
+        'title = "t"\ndeck = ["spheres", "settling"]\n[parameters]\nparticles = 60\n'
+        "diameter = 0.3\nsteps_agitated = 0\nsteps_settling = 0\nsteps_tightening = 0\n"
+        'steps_measuring = 0\ncontacts = ["hard", "soft"]\n[outputs]\nnetwork = true\n'
+    )
+    assert main(["run", str(study), "--out", str(tmp_path / "out")]) == 0
+    numbers = numbers_of(tmp_path / "out" / "few.h5")
+    assert (numbers["few/summary/coordination_number"] > 2).all()

@@ -1,0 +1,176 @@
+"""The plot of `inelastic tradeoff`: wall time against overlap, errors against the tolerance."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from numpy.typing import NDArray
+
+from lammps_inelastic.analysis.plots import plot_bounds, plot_points, style_of
+
+from .report.figures import DPI, RC
+from .tradeoff import Comparison, Configuration, Row
+
+# Inches: about the width of a page.
+SIZE = (7.4, 4.0)
+FORMATS = ("png", "svg")
+SCATTER = "scatter between starts"
+# Of largest to smallest y, below which powers of ten alone would be too few ticks.
+FEW = 200
+
+
+def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
+    """Draw a comparison, and write it as PNG and as SVG; return the files.
+
+    Parameters
+    ----------
+    comparison : with at least one row
+    path : of the files, without `.png` and `.svg`
+    """
+    files = [path.with_name(f"{path.name}.{kind}") for kind in FORMATS]
+    with matplotlib.rc_context(RC):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        grid = figure.add_gridspec(2, 2, width_ratios=(1.2, 1))
+        cost = figure.add_subplot(grid[:, 0])
+        upper = figure.add_subplot(grid[0, 1])
+        lower = figure.add_subplot(grid[1, 1], sharex=upper)
+        plot_cost(cost, comparison)
+        plot_errors(upper, comparison, "packing_fraction").set_ylabel("error of packing fraction")
+        plot_errors(lower, comparison, "coordination_number").set_ylabel("error of contacts")
+        upper.set_xlabel("")
+        upper.tick_params(labelbottom=False)
+        figure.align_ylabels((upper, lower))
+        known = {
+            label: handle
+            for ax in (cost, upper, lower)
+            for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(known.values(), known, loc="outside lower center", ncols=min(len(known), 3))
+        for file in files:
+            temporary = file.with_name(f".{os.getpid()}.{file.name}")
+            # No date: the same numbers give the same file.
+            metadata = {"Date": None} if file.suffix == ".svg" else {}
+            figure.savefig(temporary, dpi=DPI, metadata=metadata)
+            temporary.rename(file)
+    return files
+
+
+def plot_cost(ax: Axes, comparison: Comparison) -> Axes:
+    """Plot the wall time to rest against the largest overlap there: a point a run, and medians."""
+    for number, (label, rows) in enumerate(_curves(comparison.rows).items()):
+        names = ("overlap_at_rest", "plateau_seconds")
+        runs = [[one.numbers[name] for name in names] for row in rows for one in row.outcomes]
+        medians = [[row.median(name) for name in names] for row in rows]
+        _plot(ax, runs, medians, label, number)
+    _logarithmic(ax)
+    ax.set_xlabel("largest overlap at rest / radius")
+    ax.set_ylabel("wall time until at rest [s]")
+    _label_heights(ax)
+    return ax
+
+
+def plot_errors(ax: Axes, comparison: Comparison, name: str) -> Axes:
+    """Plot the error of a number against the tolerance, and the scatter between starts."""
+    for number, (label, rows) in enumerate(_curves(comparison.rows).items()):
+        error = f"{name}_error"
+        runs = [
+            [row.configuration.tolerance, one.numbers[error]]
+            for row in rows
+            for one in row.outcomes
+        ]
+        medians = [[row.configuration.tolerance, row.median(error)] for row in rows]
+        _plot(ax, runs, medians, label, number)
+    _logarithmic(ax)
+    ax.set_xlabel("tolerance / radius")
+    scatter = comparison.scatter(name)
+    if scatter > 0 and ax.has_data():
+        # The band goes down to the axis, which has no 0.
+        bottom, top = ax.get_ylim()
+        bottom = min(bottom, scatter / 3)
+        plot_bounds(ax, bottom / 10, scatter, label=SCATTER)
+        ax.set_ylim(bottom, max(top, 1.5 * scatter))
+    _label_heights(ax)
+    return ax
+
+
+def _plot(
+    ax: Axes,
+    runs: Sequence[Sequence[float]],
+    medians: Sequence[Sequence[float]],
+    label: str,
+    number: int,
+) -> None:
+    """Plot (x, y) of each run as a small point, and those of the medians as a curve."""
+    if len(_positive(medians)) == 0:
+        return
+    style = style_of(number)
+    ax.plot(
+        *_positive(runs).T,
+        linestyle="none",
+        marker=style.marker,
+        markersize=3,
+        markeredgewidth=0,
+        color=style.colour,
+        alpha=0.45,
+    )
+    plot_points(ax, *_positive(medians).T, label=label, number=number)
+
+
+def _curves(rows: Sequence[Row]) -> Mapping[str, list[Row]]:
+    """Return the rows that differ in the tolerance alone, by what tells them from others."""
+    curves: dict[str, list[Row]] = {}
+    for row in rows:
+        one = row.configuration
+        words = [f"{one.contacts} contacts" if one.contacts == "hard" else "soft spheres"]
+        for name, part in PARTS.items():
+            values = {part(other.configuration) for other in rows} - {None}
+            if len(values) > 1 and part(one) is not None:
+                words.append(f"{name}{part(one)}")
+        curves.setdefault(", ".join(words), []).append(row)
+    return curves
+
+
+PARTS: Mapping[str, Callable[[Configuration], object]] = {
+    "": lambda one: one.solver,
+    "dt ": lambda one: one.dt,
+    "ranks ": lambda one: one.ranks,
+}
+
+
+def _logarithmic(ax: Axes) -> None:
+    """Make both axes logarithmic, the loosest on the left: accuracy grows to the right.
+
+    Where nothing is drawn, that is said.
+    """
+    if not ax.has_data():
+        ax.text(0.5, 0.5, "no data", transform=ax.transAxes, ha="center", va="center")
+        return
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.xaxis.set_inverted(True)
+
+
+def _label_heights(ax: Axes) -> None:
+    """Write plain numbers at the ticks of y, some between powers of ten where these are few."""
+    if not ax.has_data():
+        ax.set_yticks([])
+        return
+    low, high = ax.get_ylim()
+    plain = StrMethodFormatter("{x:g}")
+    ax.yaxis.set_major_formatter(plain)
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    if high < FEW * low:
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+
+
+def _positive(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+    """Return those of some points (x, y) that have a place on logarithmic axes, (k, 2)."""
+    there = [point for point in points if all(0 < value < np.inf for value in point)]
+    return np.array(there, dtype=np.float64).reshape(-1, 2)
