@@ -2,7 +2,7 @@
 # make test     set up, check style and types, run the tests
 # make report   set up, write the report of the paper's studies from the results kept here
 # make validate set up, check the physics (minutes)
-# make bench    set up, measure iterations and times
+# make bench    set up, measure speed and accuracy (an hour and more; bench-quick: 15 minutes)
 # make tables   set up, print the measured tables of the documentation (an hour)
 # make clean    remove what these made
 
@@ -15,7 +15,7 @@ SOURCES := $(shell find src_fix inputs workflow analysis -type f -not -path '*/_
 # The environment's mpicxx and mpiexec come before any of the system's.
 export PATH := $(abspath $(BIN)):$(PATH)
 
-.PHONY: run report test validate tables bench setup clean
+.PHONY: run report test validate tables bench bench-quick setup clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -37,7 +37,10 @@ tables: setup
 	python tests/tables.py
 
 bench: setup
-	python tests/benchmark.py
+	PYTHONPATH=tests python tests/benchmark
+
+bench-quick: setup
+	PYTHONPATH=tests python tests/benchmark --quick
 
 setup: $(VENV)/installed
 

@@ -1,0 +1,79 @@
+"""Measures speed and accuracy on this machine: `make bench`, or `make bench-quick`.
+
+Every ratio comes from one run of this program, so that it holds on a noisy machine; seconds are
+those of this machine. What has run is kept in the folder and not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import machine
+import million
+import recorded
+import scenes_without
+import settling
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is measured.
+
+    Attributes
+    ----------
+    particles : of the scenes that settle with hard and with soft contacts
+    diameter : of their spheres, length
+    seeds : random starts
+    growing : numbers of spheres, with which the iterations grow
+    ranks : number of spheres for two ranks against one
+    million : whether a million spheres are tried
+    """
+
+    particles: int
+    diameter: float
+    seeds: int
+    growing: tuple[int, ...]
+    ranks: int
+    million: bool
+
+
+QUICK = Size(1_000, 0.11, 5, (1_000, 10_000), 10_000, False)
+FULL = Size(10_000, 0.052, 2, (1_000, 10_000, 100_000), 100_000, True)
+
+
+def main() -> int:
+    """Measure what is asked for."""
+    parser = argparse.ArgumentParser(prog="benchmark", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="smaller scenes: under 15 minutes")
+    parser.add_argument("--out", type=Path, default=Path("benchmark"), help="folder for the runs")
+    parser.add_argument(
+        "parts", nargs="*", help="of: machine settling recorded growth parts million"
+    )
+    options = parser.parse_args()
+    size = QUICK if options.quick else FULL
+    out = options.out / ("quick" if options.quick else "full")
+    parts: dict[str, Callable[[], None]] = {
+        "machine": machine.measure,
+        "settling": lambda: settling.compare(
+            out / "settling", size.particles, size.diameter, size.seeds
+        ),
+        "recorded": lambda: recorded.measure(size.particles, size.diameter),
+        "growth": lambda: settling.grow(out / "growth", size.growing, size.ranks),
+        "parts": scenes_without.measure,
+        "million": lambda: million.measure(out / "million"),
+    }
+    if not size.million:
+        del parts["million"]
+    for name in options.parts or parts:
+        if name not in parts:
+            parser.error(f"no part {name}; there are {', '.join(parts)}")
+        parts[name]()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

