@@ -31,9 +31,10 @@ from .thermo import at_steps, read_thermo
 
 FloatArray = NDArray[np.float64]
 
-# At rest: over the time before, packing fraction and height have changed by less than these shares.
+# At rest: over so much time the packing fraction has changed by less than this share, and the
+# centre of mass has stayed within so many diameters.
 WINDOW = 0.25
-STEADY, STANDING = 1e-3, 1e-2
+STEADY, STANDING = 1e-3, 0.05
 
 _LOOP = re.compile(r"^Loop time of (\S+) on \d+ procs for (\d+) steps", re.MULTILINE)
 
@@ -83,11 +84,11 @@ def first_at_rest(
     """Return the index of the first frame in which a start has come to rest; None if none has.
 
     Two things hold there. Over the last 0.25 time units the packing fraction in the box has changed
-    by less than 0.1 %. And the packing stands: in the same time the centre of mass has moved by
-    less than 1 % of its fall so far. A steady packing fraction alone says little, because a cloud
-    that falls as a whole keeps its own; but of a free fall the last 0.25 are always more than 1 %
-    (in the first 50 time units). A start that lies already has nowhere to fall: there 1 % of a
-    diameter is allowed.
+    by less than 0.1 %. And the packing stands: all that time the centre of mass has stayed within
+    5 % of a diameter. A steady packing fraction alone says little: a cloud that falls as a whole
+    keeps its own, and one that swings meets an earlier value again and again. Of a free fall 0.25
+    time units are 0.3 and more, however small the spheres; a packing that goes on being shaken, as
+    loose contacts may do, moves by more than this, too.
 
     Parameters
     ----------
@@ -99,14 +100,16 @@ def first_at_rest(
     when = np.asarray(times, dtype=np.float64)
     share = np.asarray(packing_fraction, dtype=np.float64)
     up = np.asarray(height, dtype=np.float64)
-    before = when - WINDOW
-    # A hair of round-off: the frame at 0.25 has the first one before it.
-    known = before >= when[0] - 1e-9
-    steady = np.abs(share - np.interp(before, when, share)) < STEADY * share
-    fall = np.maximum(up[0] - up, diameter)
-    standing = np.abs(up - np.interp(before, when, up)) < STANDING * fall
-    found = np.flatnonzero(known & steady & standing)
-    return int(found[0]) if len(found) else None
+    for index, before in enumerate(when - WINDOW):
+        # A hair of round-off: the frame at 0.25 has the first one before it. NaN is in no window.
+        if not before >= when[0] - 1e-9:
+            continue
+        within = (when > before) & (when <= when[index])
+        heights = np.append(up[within], np.interp(before, when, up))
+        change = abs(share[index] - np.interp(before, when, share))
+        if change < STEADY * share[index] and np.ptp(heights) < STANDING * diameter:
+            return index
+    return None
 
 
 def measure_settling(

@@ -196,6 +196,11 @@ class Row:
         """Return a number from each start, without those that have none."""
         return _finite(outcome.numbers[name] for outcome in self.outcomes)
 
+    @property
+    def all_at_rest(self) -> bool:
+        """Whether it came to rest from all starts."""
+        return len(self.values("plateau_seconds")) == len(self.outcomes)
+
     def median(self, name: str) -> float:
         """Return the median over the starts; NaN if none has the number."""
         values = self.values(name)
@@ -209,43 +214,54 @@ class Comparison:
     Attributes
     ----------
     rows : one a configuration of which anything came out
-    reference : the configuration that the others are compared with; None if there is none
     """
 
     rows: Sequence[Row]
-    reference: Configuration | None
 
-    @property
-    def of_reference(self) -> Row | None:
-        """The reference's row."""
-        return next((row for row in self.rows if row.configuration == self.reference), None)
+    def reference(self, ranks: int | None = None) -> Row | None:
+        """Return the row that those of so many ranks are compared with; None if there is none.
+
+        Without a number of ranks: that of the first row.
+        """
+        if ranks is None:
+            ranks = self.rows[0].configuration.ranks if self.rows else 1
+        wanted = reference_of((row.configuration for row in self.rows), ranks)
+        return next((row for row in self.rows if row.configuration == wanted), None)
 
     def scatter(self, name: str) -> float:
         """Return the standard deviation of a number between the starts at the reference.
 
         NaN where there are fewer than two starts.
         """
-        row = self.of_reference
+        row = self.reference()
         values = np.empty(0) if row is None else row.values(name)
         return float(values.std(ddof=1)) if len(values) > 1 else math.nan
 
     def shifts(self, row: Row, name: str) -> FloatArray:
         """Return a number less the reference's, one a start that both have."""
-        if self.of_reference is None:
+        reference = self.reference(row.configuration.ranks)
+        if reference is None:
             return np.empty(0)
-        known = {one.run.start: one.numbers[name] for one in self.of_reference.outcomes}
+        known = {one.run.start: one.numbers[name] for one in reference.outcomes}
         return _finite(
             one.numbers[name] - known.get(one.run.start, math.nan) for one in row.outcomes
         )
 
 
 def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
-    """Compare all runs of which there is a result with the reference's from the same start."""
+    """Compare all runs of which there is a result with the reference's from the same start.
+
+    The same start on another number of ranks is another one: its spheres have other numbers.
+    """
     configurations = list(dict.fromkeys(run.configuration for run, _ in results))
-    reference = reference_of(configurations)
-    references = {run.start: result for run, result in results if run.configuration == reference}
+    references = {
+        (run.configuration.ranks, run.start): result
+        for run, result in results
+        if run.configuration == reference_of(configurations, run.configuration.ranks)
+    }
     outcomes = [
-        Outcome(run, _numbers(result, references.get(run.start))) for run, result in results
+        Outcome(run, _numbers(result, references.get((run.configuration.ranks, run.start))))
+        for run, result in results
     ]
     grouped = {
         configuration: [one for one in outcomes if one.run.configuration == configuration]
@@ -256,15 +272,15 @@ def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
         soft = next((other for other in grouped if _matches(configuration, other)), None)
         slower = np.empty(0) if soft is None else _ratios(grouped[soft], group)
         rows.append(Row(configuration, group, slower))
-    return Comparison(rows, reference)
+    return Comparison(rows)
 
 
-def reference_of(configurations: Iterable[Configuration]) -> Configuration | None:
-    """Return the tightest hard one, of several that with the shortest time step; None if none is.
+def reference_of(configurations: Iterable[Configuration], ranks: int) -> Configuration | None:
+    """Return the tightest hard one on so many ranks; None if there is none.
 
-    Of several of those it is the first.
+    Of several that with the shortest time step, and of several of those the first.
     """
-    hard = [one for one in configurations if one.contacts == "hard"]
+    hard = [one for one in configurations if (one.contacts, one.ranks) == ("hard", ranks)]
     return min(hard, key=lambda one: (one.tolerance, one.dt), default=None)
 
 
@@ -292,7 +308,8 @@ def _finite(values: Iterable[float]) -> FloatArray:
 def _numbers(result: Result, reference: Result | None) -> dict[str, float]:
     numbers = {name: result.number(name) for name in MEASURED}
     numbers |= dict.fromkeys(COMPARED, math.nan)
-    if reference is None or reference is result:
+    # Of a packing that still moves the last moment is one of many, and has no error to speak of.
+    if reference is None or reference is result or math.isnan(numbers["plateau_time"]):
         return numbers
     for name in ("packing_fraction", "coordination_number"):
         numbers[f"{name}_error"] = abs(numbers[name] - reference.number(name))
@@ -319,7 +336,7 @@ def recommendations(comparison: Comparison) -> list[str]:
 
 def _enough(comparison: Comparison, title: str, name: str, form: str) -> str:
     """Say which is the loosest tolerance that is as good as the tightest, as far as one can see."""
-    reference = comparison.of_reference
+    reference = comparison.reference()
     scatter = comparison.scatter(name)
     if reference is None:
         return f"{title}: no run with hard contacts has a result, so that there is no reference."
@@ -331,43 +348,53 @@ def _enough(comparison: Comparison, title: str, name: str, form: str) -> str:
             f"{title}: errors cannot be judged by one start, whose runs end in different packings; "
             "take several (--seeds)."
         )
+    tightest = f"the tightest, {described(reference.configuration, comparison)}"
+    if not reference.all_at_rest:
+        return (
+            f"{title}: {tightest}, has not come to rest from every start, so that nothing can be "
+            "compared with it."
+        )
     good = [
-        (row, shift)
+        (row, shifts)
         for row in hard
-        if row is not reference
+        if row is not comparison.reference(row.configuration.ranks)
         and len(shifts := comparison.shifts(row, name))
-        and abs(shift := float(shifts.mean())) < scatter
-        and len(row.values("plateau_seconds"))
+        and abs(shifts.mean()) < scatter
+        and row.all_at_rest
     ]
-    starts = len(reference.outcomes)
     if not good:
         return (
-            f"{title}: nothing but the tightest, {reference.configuration.tolerance:g} r, is good "
-            f"enough: of all others the means over {starts} starts are off by more than the "
-            f"scatter between starts, {scatter:{form}}."
+            f"{title}: nothing but {tightest}, is good enough: the mean over the starts of every "
+            f"other that comes to rest is off by more than the scatter between starts, "
+            f"{scatter:{form}}."
         )
-    row, shift = min(
+    row, shifts = min(
         good, key=lambda one: (-one[0].configuration.tolerance, one[0].median("plateau_seconds"))
     )
     return (
-        f"{title}: a tolerance of {_described(row.configuration, comparison)} is enough as far as "
-        f"{starts} starts can tell, and takes {row.median('plateau_seconds'):.2g} s. The mean is "
-        f"{shift:+{form}} from that of the tightest, {reference.configuration.tolerance:g} r, "
-        f"which takes {reference.median('plateau_seconds'):.2g} s; the scatter between starts is "
+        f"{title}: a tolerance of {described(row.configuration, comparison)} is enough as far as "
+        f"{len(shifts)} starts can tell, and {_duration(row)}. The mean is {shifts.mean():+{form}} "
+        f"from that of {tightest}, which {_duration(reference)}; the scatter between starts is "
         f"{scatter:{form}}."
     )
 
 
-def _described(one: Configuration, comparison: Comparison) -> str:
-    """Return a hard configuration's tolerance, and what else tells it from the others."""
-    hard = [row.configuration for row in comparison.rows if row.configuration.contacts == "hard"]
+def _duration(row: Row) -> str:
+    return f"takes {row.median('plateau_seconds'):.2g} s"
+
+
+def described(one: Configuration, comparison: Comparison) -> str:
+    """Return a configuration's tolerance, and what else tells it from others of its contacts."""
+    others = [
+        row.configuration for row in comparison.rows if row.configuration.contacts == one.contacts
+    ]
     words = [f"{one.tolerance:g} r"]
     parts: list[tuple[str, Callable[[Configuration], object]]] = [
         ("solver", lambda each: each.solver),
         ("dt", lambda each: each.dt),
         ("ranks", lambda each: each.ranks),
     ]
-    words += [f"{name} {part(one)}" for name, part in parts if len(set(map(part, hard))) > 1]
+    words += [f"{name} {part(one)}" for name, part in parts if len(set(map(part, others))) > 1]
     return ", ".join(words)
 
 
@@ -380,7 +407,7 @@ def _speed(comparison: Comparison) -> str:
             "their times cannot be compared."
         )
     ratios = "; ".join(
-        f"{ratio_text(row.slower)} times as long at {_described(row.configuration, comparison)}"
+        f"{ratio_text(row.slower)} times as long at {described(row.configuration, comparison)}"
         for row in rows
     )
     return f"Soft spheres with the same largest overlap at rest take: {ratios}."

@@ -32,6 +32,7 @@ from .tradeoff import (
     Row,
     Run,
     compare,
+    described,
     ratio_text,
     recommendations,
     runs_of,
@@ -273,19 +274,21 @@ COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
     ("soft/hard time", lambda row: ratio_text(row.slower) if len(row.slower) else MISSING),
 )
 LEGEND = (
-    "Medians over the starts. At rest: starts that came to rest within the run. Overlap: largest "
-    "at rest, and before. Seconds: wall time until at rest; time: simulated. Errors: difference "
-    "to the reference from the same start, of packing fraction (phi), contacts per particle (z) "
-    "and contact forces (0: the same network, 2: no contact in common). Complementarity: largest "
-    "gap under a force. Drift: of the centre of mass at the end, diameters per time."
+    "Medians over the starts. At rest: starts that came to rest within the run; the others have no "
+    "time and no errors. Overlap: largest at rest, and before. Seconds: wall time until at rest; "
+    "time: simulated. Errors: difference to the reference from the same start, of packing "
+    "fraction (phi), contacts per particle (z) and contact forces (0: the same network, 2: no "
+    "contact in common). Complementarity: largest gap under a force. Drift: of the centre of mass "
+    "at the end, diameters per time."
 )
 
 
 def _heading(comparison: Comparison) -> list[str]:
     """Say what the errors are compared with, and from where on they mean something."""
-    one = comparison.reference
-    if one is None:
+    reference = comparison.reference()
+    if reference is None:
         return []
+    one = reference.configuration
     line = f"Reference: hard contacts, {one.solver}, {one.tolerance:g} r, dt {one.dt:g}."
     scatter = [comparison.scatter(name) for name in ("packing_fraction", "coordination_number")]
     if not math.isnan(scatter[0]):
@@ -297,14 +300,19 @@ def _heading(comparison: Comparison) -> list[str]:
 
 
 def _not_at_rest(comparison: Comparison) -> list[str]:
-    """Say of each run that it did not come to rest."""
-    return [
-        f"not at rest at the end (a longer --time may help): {one.run.configuration.contacts}, "
-        f"tolerance {one.run.configuration.tolerance:g}, start {one.run.start}"
-        for row in comparison.rows
-        for one in row.outcomes
-        if math.isnan(one.numbers["plateau_time"])
-    ]
+    """Say which runs did not come to rest, and how they still moved."""
+    lines = []
+    for row in comparison.rows:
+        moving = [one for one in row.outcomes if math.isnan(one.numbers["plateau_time"])]
+        if moving:
+            one = row.configuration
+            drift = max(each.numbers["drift"] for each in moving)
+            lines.append(
+                f"never at rest: {one.contacts}, {described(one, comparison)}, start "
+                f"{', '.join(each.run.start for each in moving)} (drift at the end {drift:.1e}; a "
+                "longer --time helps if the packing still sinks, not if it is shaken)"
+            )
+    return lines
 
 
 def _print(comparison: Comparison, lines: Sequence[str]) -> None:

@@ -19,7 +19,7 @@ from .report.figures import DPI, RC
 from .tradeoff import Comparison, Configuration, Row
 
 # Inches: about the width of a page.
-SIZE = (7.4, 4.0)
+SIZE = (7.4, 4.3)
 FORMATS = ("png", "svg")
 SCATTER = "scatter between starts"
 # Of largest to smallest y, below which powers of ten alone would be too few ticks.
