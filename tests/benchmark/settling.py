@@ -109,10 +109,10 @@ def grow(folder: Path, sizes: Sequence[int], parallel: int) -> None:
         # The bed is equally high for every number; what grows is its height in diameters.
         heights.append(1.0 / diameter)
         per_step.append(one.number("iterations") / steps)
+        constraint = _constraint(folder / str(particles))
         print(
             f"{particles:,} spheres at {LOOSE:g} r: {whole:.1f} s to t = {TIME:g}, {steps:.0f} "
-            f"steps, {per_step[-1]:.0f} iterations a step ({_constraint(folder / str(particles))}); "
-            f"{_plateau(one)}, phi {one.number('packing_fraction'):.4f}, "
+            f"steps, {per_step[-1]:.0f} iterations a step ({constraint}); {_plateau(one)}, phi {one.number('packing_fraction'):.4f}, "
             f"z {one.number('coordination_number'):.3f}",
             flush=True,
         )
