@@ -18,7 +18,7 @@ from pathlib import Path
 
 from million import diameter_of
 
-TIME = 2.0
+TIME = 1.8
 LOOSE = 0.005  # radii
 TOLERANCES = (LOOSE, 0.0005)
 DT = 0.01  # of spheres of this diameter; the step goes with the square root of the diameter
