@@ -1,8 +1,9 @@
 """Only what a scene requires: what code that a scene does not use costs it.
 
-Free spheres without walls, bodies, random force or output are run with the plugin as it is and with
-plugins from whose sources that code is cut, in turn. Each cut is a replacement in a copy of the
-sources; the compiler removes what can then not be reached.
+Free spheres without walls, bodies or output are run with the plugin as it is and with plugins from
+whose sources that code is cut, in turn. Each cut is a replacement in a copy of the sources; the
+compiler removes what can then not be reached. (The random force is a fix of its own: where a deck
+does not define it, it is not there.)
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ CORE = "src_fix/core/accelerated_gradient.cpp"
 # File, what is there, and what takes its place.
 Cut = tuple[str, str, str]
 
+# Not a part of the plugin, and needs more than a user has.
+MODULE: list[Cut] = [("CMakeLists.txt", "  add_subdirectory(src_fix/python)\n", "")]
 BODIES: list[Cut] = [
     (
         FIX_HEADER,
@@ -34,21 +37,11 @@ BODIES: list[Cut] = [
     ),
     (FIX, "rigid_ = std::make_unique<RigidMotion>(", "(void) std::make_unique<RigidMotion>("),
     ("src_fix/core/rigid_bodies.h", "return inverse_mass.empty();", "return true;"),
-    (
-        "src_fix/core/accelerated_gradient.cpp",
-        "if (!bodies_.empty()) turn_all(",
-        "if (false) turn_all(",
-    ),
+    (CORE, "if (!bodies_.empty()) turn_all(", "if (false) turn_all("),
 ]
-WALLS: list[Cut] = [
-    ("src_fix/lammps/region_walls.h", "return ids_.empty();", "return true;"),
-]
+WALLS: list[Cut] = [("src_fix/lammps/region_walls.h", "return ids_.empty();", "return true;")]
 OUTPUT: list[Cut] = [
-    (
-        FIX,
-        "double *const out = array_local[row++];",
-        "static double out[10];",
-    ),
+    (FIX, "double *const out = array_local[row++];", "static double out[10];"),
     (FIX, "if (evflag) {", "if (false) {"),
 ]
 CUTS = {
@@ -89,7 +82,7 @@ def build(folder: Path, cuts: list[Cut]) -> Path:
     sources = folder / "sources"
     shutil.copytree(ROOT / "src_fix", sources / "src_fix")
     shutil.copy(ROOT / "CMakeLists.txt", sources)
-    for name, there, instead in cuts:
+    for name, there, instead in MODULE + cuts:
         path = sources / name
         text = path.read_text()
         assert text.count(there) == 1, f"{name} has not one {there!r}"

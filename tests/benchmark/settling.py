@@ -112,8 +112,8 @@ def grow(folder: Path, sizes: Sequence[int], parallel: int) -> None:
         constraint = _constraint(folder / str(particles))
         print(
             f"{particles:,} spheres at {LOOSE:g} r: {whole:.1f} s to t = {TIME:g}, {steps:.0f} "
-            f"steps, {per_step[-1]:.0f} iterations a step ({constraint}); {_plateau(one)}, phi {one.number('packing_fraction'):.4f}, "
-            f"z {one.number('coordination_number'):.3f}",
+            f"steps, {per_step[-1]:.0f} iterations a step ({constraint}); {_plateau(one)}, "
+            f"phi {one.number('packing_fraction'):.4f}, z {one.number('coordination_number'):.3f}",
             flush=True,
         )
         for two in runs:
