@@ -63,14 +63,15 @@ def main() -> int:
         ),
         "recorded": lambda: recorded.measure(size.particles, size.diameter),
         "growth": lambda: settling.grow(out / "growth", size.growing, size.ranks),
-        "parts": scenes_without.measure,
+        "parts": lambda: scenes_without.measure(each=not options.quick),
         "million": lambda: million.measure(out / "million"),
     }
     if not size.million:
         del parts["million"]
-    for name in options.parts or parts:
+    for name in options.parts:
         if name not in parts:
             parser.error(f"no part {name}; there are {', '.join(parts)}")
+    for name in options.parts or parts:
         parts[name]()
     return 0
 
