@@ -550,9 +550,11 @@ void RigidMotion::finish(const inelastic::ContactProblem &problem, int i, const 
     const double *const f = contact_force + 3 * static_cast<std::size_t>(bodies.member[k]);
     moments += std::sqrt(dot(r, r) * dot(f, f));
   }
-  of_body.angle = problem.timestep *
+  const double angle = problem.timestep *
       (std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end)) +
        kick.strength * moments * trace(&bodies.inverse_inertia[6 * b]));
+  // The angular momentum is carried along, and with it what an earlier step's moments have rounded.
+  of_body.angle = kick.whole ? std::max(of_body.angle, angle) : angle;
   std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
 }
 

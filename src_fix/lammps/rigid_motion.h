@@ -82,7 +82,7 @@ class RigidMotion : protected Pointers {
   // momentum.
   void note_push(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
 
-  // By how much the last step has magnified the round-off of a local atom's position: how fast a
+  // By how much the steps of a run have magnified the round-off of a local atom's position: how fast a
   // body turns, and where to, is known no better than its arms, which may be short.
   double round_off_growth(int i) const
   {
@@ -120,7 +120,8 @@ class RigidMotion : protected Pointers {
     std::array<double, 3> angular_momentum;    // after the last move, push included
     Push next;                                 // part of the motion after the last move
     Push held;                                 // at whole steps
-    double angle;    // turned in the last step, by motion and by moments of contacts [radians]
+    double angle;    // the largest one turned in a step of this run, by motion and by moments of
+                     // contacts [radians]
   };
   struct Body {
     double mass;
