@@ -16,6 +16,7 @@ namespace {
   constexpr std::size_t BLOCK = 256;
   constexpr std::size_t STREAMS = 8;
 
+  constexpr double UNIT_ROUND_OFF = 0.5 * std::numeric_limits<double>::epsilon();
   constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
                                  std::numeric_limits<double>::infinity()};
 
@@ -396,6 +397,9 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
   constexpr double MARGIN = 1.05;
   // A residual within the tolerance that double precision does not confirm: round-off shows.
   constexpr long MOST_FAILURES = 4;
+  // Measured: the residual comes down to 0.6-1.6 times the unit round-off of the heaviest impulse
+  // (as a length), in columns, heaps and crystals of 2 to 600 particles.
+  constexpr double BELOW_ROUND_OFF = 0.5;
 
   iterations.prepare(problem, gap_operator_.free_gap(), diagonal_, scales, host);
   const double tolerance = limits.tolerance / scales.length;
@@ -428,6 +432,15 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
     if (!suffices<Real>(maxima[2], tolerance)) {
       iterations.impulses(scales, problem.contacts.impulse);
       return;
+    }
+    result.round_off = UNIT_ROUND_OFF * scales.length * maxima[2];
+    if (result.iterations % CHECK_EVERY == 0) {
+      iterations.impulses_before(scales, problem.contacts.impulse);
+      result.infeasible = is_infeasible(problem, gap_operator_, limits, host);
+      if (result.infeasible || limits.tolerance < BELOW_ROUND_OFF * result.round_off) {
+        judge(problem, limits, host, result);
+        return;
+      }
     }
 
     if (sums[0] > 0.0) {
@@ -504,7 +517,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
     if (!single_) single_ = std::make_unique<Iterations<float>>();
     iterate(*single_, problem, limits, scales, host, result);
   }
-  if (!result.converged && result.iterations < limits.max_iterations) {
+  if (!result.converged && !result.infeasible && result.iterations < limits.max_iterations) {
     if (!double_) double_ = std::make_unique<Iterations<double>>();
     iterate(*double_, problem, limits, scales, host, result);
   }

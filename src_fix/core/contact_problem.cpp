@@ -103,6 +103,45 @@ void GapOperator::velocity_change(const ContactProblem &problem, const double *i
   }
 }
 
+GapOperator::Kick GapOperator::kick(const ContactProblem &problem, const double *impulse,
+                                    Host &host)
+{
+  // Of each particle, and not of each constraint: where impulses balance, what round-off leaves
+  // is squared.
+  std::vector<double> sum(change_.size(), 0.0);
+  scatter_impulses(problem.contacts, impulse, sum.data());
+  host.sum_over_copies(sum.data(), 3);
+  velocity_change(problem, impulse, host);
+  Kick kick = {0.0, 0.0};
+  std::vector<char> pushed(static_cast<std::size_t>(problem.particles) + 1, 0);
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c)
+    if (impulse[c] > 0.0)
+      pushed[problem.contacts.first[c]] = pushed[problem.contacts.second[c]] = 1;
+  auto work = [&](int i) {
+    return sum[3 * i] * change_[3 * i] + sum[3 * i + 1] * change_[3 * i + 1] +
+        sum[3 * i + 2] * change_[3 * i + 2];
+  };
+  const RigidBodies &bodies = problem.bodies;
+  for (int i = 0; i < problem.particles; ++i) {
+    if (!pushed[i] || problem.inverse_mass[i] == 0.0) continue;
+    if (!bodies.empty() && bodies.body[i] >= 0) continue;
+    kick.squared += work(i);
+    kick.mass += 1.0 / problem.inverse_mass[i];
+  }
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    bool any = false;
+    double of_body = 0.0;
+    for (int k = bodies.start[b]; k < bodies.start[b] + bodies.originals[b]; ++k)
+      of_body += work(bodies.member[k]);
+    for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k)
+      any = any || pushed[bodies.member[k]];
+    if (!any || bodies.inverse_mass[b] == 0.0) continue;
+    kick.squared += std::max(0.0, of_body);
+    kick.mass += 1.0 / bodies.inverse_mass[b];
+  }
+  return kick;
+}
+
 void GapOperator::apply(const ContactProblem &problem, const double *impulse, double *gap_at_end,
                         Host &host)
 {

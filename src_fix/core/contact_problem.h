@@ -57,6 +57,14 @@ class GapOperator {
   // Velocities V* + M^-1 G^T lambda of all particles, copies included.
   void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
 
+  // |G^T lambda|^2 in the norm of M^-1, this rank's share: twice the kinetic energy that the impulses
+  // give to what is at rest. And the mass that they act on. Copies count as often as they are there.
+  struct Kick {
+    double squared;
+    double mass;
+  };
+  Kick kick(const ContactProblem &problem, const double *impulse, Host &host);
+
   const std::vector<double> &free_gap() const { return free_gap_; }
 
  private:

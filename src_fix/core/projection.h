@@ -27,11 +27,19 @@ class ConstraintSource {
 };
 
 struct ProjectionResult {
-  bool converged = false;    // the solver met the tolerance in every round
-  bool complete = false;     // the last round left nothing to add or change
-  long iterations = 0;       // over all rounds
+  bool converged = false;     // the solver met the tolerance in every round
+  bool complete = false;      // the last round left nothing to add or change
+  bool infeasible = false;    // it is certain that no sensible velocities are admissible
+  long iterations = 0;        // over all rounds
   int rounds = 0;
-  Residual residual;    // over all constraints that came to light
+  Residual residual;         // over all constraints that came to light
+  double round_off = 0.0;    // [length] of the last solve: see SolverResult
+
+  // Unless converged and complete, and where this rank has any: the constraint that is farthest
+  // from being met, and the gap [length] that it leaves at the end of the step.
+  static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
+  std::size_t worst = NONE;
+  double worst_gap = 0.0;
 };
 
 // Solves at least once. On return `velocity` (3 per particle, copies included) holds the projection

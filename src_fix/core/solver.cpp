@@ -27,6 +27,27 @@ Residual residual(const double *gap_at_end, const double *impulse, std::size_t c
   return worst;
 }
 
+bool is_infeasible(const ContactProblem &problem, GapOperator &gap_operator,
+                   const SolverLimits &limits, Host &host)
+{
+  constexpr double FAR = 10.0;
+  const std::vector<double> &impulse = problem.contacts.impulse;
+  const std::vector<double> &free_gap = gap_operator.free_gap();
+  double lacking = 0.0, farthest = 0.0;
+  for (std::size_t c = 0; c < impulse.size(); ++c) {
+    lacking -= impulse[c] * (free_gap[c] + limits.tolerance);
+    farthest = std::max(farthest, -free_gap[c]);
+  }
+  for (int i = 0; i < problem.particles; ++i) {
+    const double *const v = &problem.predicted_velocity[3 * static_cast<std::size_t>(i)];
+    farthest = std::max(farthest, problem.timestep * std::hypot(v[0], v[1], v[2]));
+  }
+  const GapOperator::Kick kick = gap_operator.kick(problem, impulse.data(), host);
+  double sums[3] = {lacking, kick.squared, kick.mass};
+  host.reduce(sums, 3, &farthest, 1);
+  return sums[0] > std::max(limits.reach, FAR * farthest) * std::sqrt(sums[1] * sums[2]);
+}
+
 double largest_eigenvalue(const ContactProblem &problem, Host &host)
 {
   constexpr double RELATIVE_CHANGE = 1.0e-6;    // of the estimate, per iteration, to stop at
@@ -86,6 +107,10 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
     if (result.converged || result.iterations >= limits.max_iterations ||
         !std::isfinite(result.residual.feasibility))
       return result;
+    if (result.iterations > 0 && result.iterations % CHECK_EVERY == 0) {
+      result.infeasible = is_infeasible(problem, gap_operator_, limits, host);
+      if (result.infeasible) return result;
+    }
     if (step == 0.0) step = 1.0 / largest_eigenvalue(problem, host);
     for (std::size_t c = 0; c < count; ++c)
       contacts.impulse[c] = std::max(0.0, contacts.impulse[c] - step * gap_[c]);

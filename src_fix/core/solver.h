@@ -12,6 +12,7 @@
 
 #include "contact_problem.h"
 
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -28,13 +29,31 @@ Residual residual(const double *gap_at_end, const double *impulse, std::size_t c
 struct SolverLimits {
   double tolerance = 0.0;    // [length], both residuals must come down to it
   long max_iterations = 0;
+  // [length] no step is to move particles further: see is_infeasible
+  double reach = std::numeric_limits<double>::infinity();
 };
 
 struct SolverResult {
   bool converged = false;
+  bool infeasible = false;    // it is certain that no sensible velocities are admissible
   long iterations = 0;
   Residual residual;
+  double round_off = 0.0;    // [length] of the gaps where impulses act; no residual goes below it
 };
+
+// Whether the impulses at hand, whatever they are, prove that there are no admissible velocities.
+// For every V with gap + h G V >= -tolerance, lambda >= 0 gives (weak duality, Cauchy-Schwarz)
+//
+//   h |V - V*|_M  >=  (-lambda . w(0) - tolerance sum lambda) / |G^T lambda|_(M^-1)
+//
+// Where that is more than `reach`, and ten times as far as any overlap or predicted motion, in the
+// mean over the masses that the impulses act on, there is no sense in going on. Without admissible
+// velocities the impulses of a solver grow for ever along a direction in which they balance, and the
+// bound grows with them. With velocities nearby it is never reached.
+// Collective. Costs about two iterations: call it every CHECK_EVERY of them.
+bool is_infeasible(const ContactProblem &problem, GapOperator &gap_operator,
+                   const SolverLimits &limits, Host &host);
+constexpr long CHECK_EVERY = 500;
 
 class Solver {
  public:

@@ -21,6 +21,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
@@ -34,10 +35,14 @@ constexpr double PUSH_LIMIT =
     0.05;    // of the sum of radii, per regular step, out of a bad overlap
 constexpr double RELINEARISE_BEYOND = 1.1;    // in eps, overlap at the end of the step
 constexpr double SHORTEST_STEP = 1.0e-6;      // of the regular one: below, something else is wrong
-constexpr double COINCIDENT = 1.0e-10;        // of the sum of radii: no normal can be computed
-constexpr double EXPECTED_IN_EPS = 1.0e-7;    // how well the predicted motion must be met ...
+constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
+constexpr double COINCIDENT = 1.0e-10;          // of the sum of radii: no normal can be computed
+constexpr double EXPECTED_IN_EPS = 1.0e-7;      // how well the predicted motion must be met ...
 constexpr double EXPECTED_RELATIVE =
-    1.0e-12;                             // ... beside the round-off of positions and velocities
+    1.0e-12;    // ... beside the round-off of positions and velocities
+// Of the largest coordinate: an overlap of two spheres is not known better than that. Each of the
+// three coordinates of either is rounded by up to half of the machine epsilon.
+constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon();
 constexpr double SIMILAR_RADII = 1.1;    // up to here one cutoff for all pairs wastes little
 
 constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
@@ -87,10 +92,11 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     list_(nullptr), margin_(-1.0), came_back_(false), relinearised_(false), relinearisations_(0),
     phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr), largest_radius_(0.0),
     one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
-    regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0), output_{},
-    wall_force_step_(-1), max_atoms_(0), max_contacts_(0), run_iterations_(0.0),
-    run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0),
-    run_shortened_(0), run_constraint_iterations_(0.0), exchanged_{}, exchanging_memory_(false)
+    regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0),
+    largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
+    run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
+    run_unconverged_(0), run_shortened_(0), run_constraint_iterations_(0.0), exchanged_{},
+    exchanging_memory_(false)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -305,10 +311,20 @@ void FixInelastic::post_neighbor()
   radius_at_build_.assign(atom->radius, atom->radius + atom->nlocal);
   for (int i = 0; i < atom->nlocal; ++i) std::copy_n(x[i], 3, &position_at_build_[3 * i]);
 
-  largest_radius_ = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (atom->mask[i] & groupbit) largest_radius_ = std::max(largest_radius_, atom->radius[i]);
-  reduce(nullptr, 0, &largest_radius_, 1);
+  double largest[2] = {0.0, 0.0};
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    largest[0] = std::max(largest[0], atom->radius[i]);
+    for (int d = 0; d < 3; ++d) largest[1] = std::max(largest[1], std::abs(x[i][d]));
+  }
+  reduce(nullptr, 0, largest, 2);
+  largest_radius_ = largest[0];
+  const double resolution = POSITIONS_RESOLVED * (largest[1] + largest_radius_);
+  if (tolerance_ < resolution)
+    error->all(FLERR,
+               "Fix inelastic: the tolerance {:.4g} is below the round-off of positions: with "
+               "coordinates of up to {:.4g} give at least {:.2g}",
+               tolerance_, largest[1], 1.05 * resolution);
   const double widest = 2.0 * largest_radius_ + neighbor->skin;
   const double listed = one_cutoff_ ? neighbor->cutneighmin : neighbor->cutneighmax;
   if (listed < widest * (1.0 - 1.0e-12))
@@ -414,6 +430,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
 
   inelastic::ProjectionResult result;
   while (true) {
+    worst_.clear();
     predict(kick_steps);
     spread_at_start_ = spread_since_build(nullptr);
     // The prediction moves nearly as far as the projection will: where the list cannot reach that
@@ -438,7 +455,8 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (bad_overlap_) push_apart(result);
     if (!result.converged || !result.complete) {
       // Where the gaps at the end of the step were not to be had, those of a shorter one may be.
-      if (shorten_ && relinearised_ && update->dt > SHORTEST_STEP * regular_timestep_) {
+      if (shorten_ && (relinearised_ || result.infeasible) &&
+          update->dt > SHORTEST_UNSOLVED * regular_timestep_) {
         shorten_step(0.5);
         continue;
       }
@@ -481,8 +499,12 @@ void FixInelastic::advance(int vflag, double kick_steps)
 inelastic::ProjectionResult FixInelastic::project(long max_iterations)
 {
   const PhaseClock::Within within(clock_, PhaseClock::SOLVE);
+  // Further than the list reaches no step goes: such a one is shortened, or it is an error.
+  constexpr double BEYOND_REACH = 10.0;
+  const double reach = (shorten_ ? 1.0 : BEYOND_REACH) * list_reach_;
   const inelastic::ProjectionResult result = inelastic::project(
-      problem_, *this, *solver_, {tolerance_, max_iterations}, MAX_ROUNDS, *this, velocity_);
+      problem_, *this, *solver_, {tolerance_, max_iterations, reach}, MAX_ROUNDS, *this, velocity_);
+  if (!result.converged || !result.complete) note_worst(result);
   run_constraint_iterations_ +=
       static_cast<double>(result.iterations) * static_cast<double>(problem_.contacts.size());
   return result;
@@ -978,6 +1000,8 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
       project(std::max(0L, max_iterations_ - result.iterations));
   result.iterations += pushed.iterations;
   result.converged = result.converged && pushed.converged;
+  result.infeasible = result.infeasible || pushed.infeasible;
+  result.round_off = std::max(result.round_off, pushed.round_off);
   result.complete = result.complete && pushed.complete;
   result.residual.feasibility = std::max(result.residual.feasibility, pushed.residual.feasibility);
   result.residual.complementarity =
@@ -1089,7 +1113,7 @@ void FixInelastic::check_expected()
                               atom->v[i][2] - state[EXPECTED_V + 2]};
     const bool frozen = (atom->mask[i] & frozen_bit_) != 0;
     const double round_off = EXPECTED_RELATIVE *
-        (norm(atom->x[i]) + largest_radius_ + h * norm(&state[EXPECTED_V])) *
+        (norm(atom->x[i]) + largest_radius_ + h * (norm(&state[EXPECTED_V]) + largest_kick_)) *
         (rigid_ ? rigid_->round_off_growth(i) : 1.0);
     const double allowed = (frozen ? 1.0 : EXPECTED_IN_EPS) * tolerance_ + round_off;
     const double position_error = norm(off);
@@ -1220,8 +1244,8 @@ void FixInelastic::shorten_step(double factor)
 {
   const double timestep = factor * update->dt;
   if (timestep < SHORTEST_STEP * regular_timestep_)
-    error->all(FLERR, "Fix inelastic: step {}: no time step above {:.3g} keeps the spheres apart",
-               update->ntimestep, timestep);
+    error->all(FLERR, "Fix inelastic: step {}: no time step above {:.3g} keeps the spheres apart{}",
+               update->ntimestep, timestep, worst_.empty() ? "" : ": " + worst_);
   if (update->dt == regular_timestep_) {
     output_[SHORTENED_STEPS] += 1.0;
     run_shortened_ += 1;
@@ -1258,6 +1282,8 @@ void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
 
   double counts[2] = {0.0, 0.0};
   int row = 0;
+  // The angular momentum of a body is carried along: so is its round-off.
+  if (!rigid_ || !expecting_) largest_kick_ = 0.0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     if (!(contacts.impulse[c] > 0.0)) continue;
     const int i = contacts.first[c];
@@ -1267,6 +1293,8 @@ void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
     const Origin &origin = origin_[c];
     const bool is_wall = origin.wall != 0;
     counts[is_wall] += 1.0;
+    largest_kick_ = std::max(
+        largest_kick_, contacts.impulse[c] * (problem_.inverse_mass[i] + problem_.inverse_mass[j]));
     contact_count_[3 * i + is_wall] += 1.0;
     for (int d = 0; d < 3; ++d) {
       contact_force_[3 * i + d] += strength * n[d];
@@ -1306,7 +1334,7 @@ void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
   }
 
   double sums[3] = {counts[0], counts[1], static_cast<double>(contacts.size())};
-  reduce(sums, 3, nullptr, 0);
+  reduce(sums, 3, &largest_kick_, 1);
   output_[PARTICLE_CONTACTS] = sums[0];
   output_[WALL_CONTACTS] = sums[1];
   output_[CONSTRAINTS] = sums[2];
@@ -1535,21 +1563,58 @@ void FixInelastic::fail_together(const std::string &message)
   error->all(FLERR, "Fix inelastic: step {}: {}", update->ntimestep, text);
 }
 
+// Collective: the constraint of all ranks that is farthest from being met.
+void FixInelastic::note_worst(const inelastic::ProjectionResult &result)
+{
+  struct {
+    double size;
+    int rank;
+  } mine = {-1.0, comm->me}, worst;
+  worst_.clear();
+  if (result.worst != inelastic::ProjectionResult::NONE) {
+    const std::size_t c = result.worst;
+    const int wall = origin_[c].wall;
+    const tagint first = atom->tag[problem_.contacts.first[c]];
+    const std::string sides = wall
+        ? fmt::format("atom {} and wall {}", first, wall)
+        : fmt::format("atoms {} and {}", first, atom->tag[problem_.contacts.second[c]]);
+    mine.size = std::abs(result.worst_gap);
+    worst_ = result.worst_gap < 0.0
+        ? fmt::format("{} overlap by {:.4g} at its end", sides, mine.size)
+        : fmt::format("{} keep a gap of {:.4g} under a force", sides, mine.size);
+  }
+  MPI_Allreduce(&mine, &worst, 1, MPI_DOUBLE_INT, MPI_MAXLOC, world);
+  int length = static_cast<int>(worst_.size());
+  MPI_Bcast(&length, 1, MPI_INT, worst.rank, world);
+  worst_.resize(length);
+  MPI_Bcast(worst_.data(), length, MPI_CHAR, worst.rank, world);
+}
+
 void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
 {
+  // Up to here a residual can come down, but need not.
+  constexpr double NEAR_ROUND_OFF = 10.0;
   ++run_unconverged_;
-  const std::string message =
-      fmt::format("step {}: {} iterations left an overlap of {:.4g} and a gap under a force of "
-                  "{:.4g}, where {:.4g} is "
-                  "allowed",
-                  update->ntimestep, result.iterations, result.residual.feasibility,
-                  result.residual.complementarity, tolerance_);
-  if (!warn_only_)
-    error->all(FLERR,
-               "Fix inelastic: {}. Either the scene leaves no room for the spheres, or: raise "
-               "maxiter ({}), "
-               "raise the tolerance, or lower the timestep",
-               message, max_iterations_);
+  std::string message, cause;
+  if (result.infeasible) {
+    message = fmt::format("step {}: no velocities keep the surfaces apart: {}, where {:.4g} is "
+                          "allowed",
+                          update->ntimestep, worst_, tolerance_);
+    cause = "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
+            "are too many spheres";
+  } else {
+    message = fmt::format("step {}: {} iterations left an overlap of {:.4g} and a gap under a "
+                          "force of {:.4g}, where {:.4g} is allowed: {}",
+                          update->ntimestep, result.iterations, result.residual.feasibility,
+                          result.residual.complementarity, tolerance_, worst_);
+    cause = tolerance_ < NEAR_ROUND_OFF * result.round_off
+        ? fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
+                      NEAR_ROUND_OFF * result.round_off)
+        : fmt::format("Either the scene leaves no room for the spheres, or: raise maxiter ({}), "
+                      "raise the tolerance, or lower the timestep",
+                      max_iterations_);
+  }
+  if (!warn_only_) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
 }
 

@@ -100,6 +100,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool relinearised_;       // about the end of the step, any of them
   int relinearisations_;    // in this step
   std::string message_;     // what went wrong on this rank while collecting
+  std::string worst_;       // the constraint that is farthest from being met, after a failure
 
   // A bad start: overlaps beyond the regular ones are first treated as touching, then pushed apart.
   enum class Phase { CONTACT, PUSH };
@@ -131,6 +132,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool setting_timestep_;      // the fix itself is changing it
   bool expecting_;             // state_ holds a prediction to compare with
   double kick_;                // time for which the force acts before the next move
+  double largest_kick_;        // [velocity] that one of the last contacts gave, on any rank
 
   // Output
   enum Output {
@@ -260,6 +262,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   void tally_virial(int i, int j, const double *virial);
   void share_virial();
+  void note_worst(const inelastic::ProjectionResult &);
   void unconverged(const inelastic::ProjectionResult &);
   void fail_together(const std::string &message);
   std::vector<double> gather(std::vector<double> mine) const;
