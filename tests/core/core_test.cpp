@@ -551,6 +551,41 @@ void test_iteration_limit()
     }
 }
 
+// A floor and a ceiling that a column cannot be between: the overlap is shared by all its contacts.
+// The same with a body, of half of its particles.
+void test_no_room()
+{
+  SerialHost host;
+  constexpr int COUNT = 6;
+  constexpr double MISSING = 0.07;
+  constexpr double REACH = 10.0;
+  const double down[3] = {0.0, 0.0, -1.0};
+  for (const std::string &name : SOLVERS)
+    for (const bool joined : {false, true}) {
+      ContactProblem problem = make_column(COUNT, true);
+      problem.contacts.add(COUNT - 1, problem.particles, down, -MISSING, 0.0);
+      if (joined) {
+        const int members[1] = {2};
+        const double arm[3] = {}, inertia[6] = {1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+        problem.bodies.clear(problem.particles);
+        problem.bodies.add(members, arm, 1, 1, problem.inverse_mass[2], inertia);
+      }
+      const auto solver = make_solver(name);
+      ContactProblem feasible = problem;
+      feasible.contacts.gap.back() = MISSING;
+      CHECK(!solver->solve(feasible, {TOLERANCE, 100000, REACH}, host).infeasible);
+      AllContactsKnown source;
+      std::vector<double> velocity;
+      const ProjectionResult result =
+          project(problem, source, *solver, {TOLERANCE, 100000, REACH}, 10, host, velocity);
+      CHECK(result.infeasible);
+      CHECK(!result.converged);
+      CHECK(result.iterations < 100000);
+      CHECK(result.worst < problem.contacts.size());
+      CHECK_NEAR(result.worst_gap, -MISSING / (COUNT + 1), 0.1 * MISSING);
+    }
+}
+
 // One solver for steps with other numbers of particles and contacts, as in a run.
 void test_solver_is_used_again()
 {
@@ -1389,6 +1424,7 @@ int main()
   test_crystal(make_crystal(4));
   test_crystal(make_crystal_of_bodies());
   test_iteration_limit();
+  test_no_room();
   test_solver_is_used_again();
   test_first_guess();
   test_largest_eigenvalue();

@@ -228,6 +228,39 @@ def test_too_few_iterations(ranks: int, tmp_path: Path, refused: Refused, lmp: R
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+def test_a_container_that_closes(
+    solver: str, ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
+) -> None:
+    """The lid comes down by 0.01 a step; the last one lacks this much, half of it on each side."""
+    text = scene(
+        [0.5, RADIUS, 0.5],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        skin=0.1,
+        setup="variable down equal -2*time\n"
+        "region lid plane 0 0.205 0 0 -1 0 move NULL v_down NULL",
+        options=f"region container lid solver {solver}",
+    )
+    error = refused(text + "run 20\n", ranks=ranks)
+    assert "no velocities keep the surfaces apart" in error
+    assert "leaves no room" in error
+    found = re.search(r"step (\d+):.* atom 1 and wall (\d+) overlap by (\S+) at its end", error)
+    assert found, error
+    assert found[2] in ("3", "7")
+    missing = 2 * RADIUS - (0.205 - 0.01 * (int(found[1]) + 1))
+    assert EPS < missing < 0.01 + 2 * EPS
+    assert float(found[3]) == pytest.approx(missing / 2, abs=2 * EPS)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_tolerance_below_round_off(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    text = deck(tmp_path) + "fix_modify contact tolerance 1e-16\nrun 1\n"
+    assert "below the round-off of positions" in refused(text, ranks=ranks)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_a_list_that_does_not_reach(
     ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
 ) -> None:

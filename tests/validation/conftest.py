@@ -1,8 +1,9 @@
-"""The shared helpers of tests/pouring.py are imported by name."""
+"""The helpers of tests/ and of tests/fix/ are imported by name."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+TESTS = Path(__file__).parents[1]
+sys.path[:0] = [str(TESTS), str(TESTS / "fix")]
