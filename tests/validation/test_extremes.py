@@ -15,7 +15,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bodies import DUMP_BODY_SPHERES, INERTIAS, Bodies, body_scene, dimer, placed, random_bodies
+from bodies import (
+    DUMP_BODY_SPHERES,
+    INERTIAS,
+    TETRAHEDRON,
+    Bodies,
+    body_scene,
+    dimer,
+    placed,
+    random_bodies,
+)
 from lammps_run import Run, run_lmp
 from scenes import (
     DEFAULT_BOX,
@@ -546,6 +555,19 @@ def crushed(name: str, folder: Path, options: str) -> str:
     if name == "dimers":
         bodies = random_bodies([dimer(1.5)] * 60, RADIUS, CENTRES, seed=1)
         return body_scene(bodies, RADIUS, folder, inertia="point", tolerance=EPS, skin=0.2, **lid)
+    if name == "frozen spheres":
+        return scene(
+            [[0.3, 0.5, 0.5], [0.5, 0.5, 0.5], [0.7, 0.5, 0.5]],
+            RADIUS,
+            folder,
+            tolerance=EPS,
+            skin=0.2,
+            gravity=False,
+            velocities=[[1, 0, 0], [0, 0, 0], [-1, 0, 0]],
+            options=f"region container frozen jaws {options}",
+            # Nothing accelerates the frozen ones.
+            motion="group jaws id 1 3\nfix motion all nve",
+        )
     points = np.random.default_rng(1).uniform(0.06, 0.94, (1500, 3))
     settings = {"skin": 0.2, "box": ((0, 1),) * 3, "options": f"region container {options}"}
     return scene(points, RADIUS, folder, tolerance=EPS, **settings)
@@ -561,6 +583,7 @@ def crushed(name: str, folder: Path, options: str) -> str:
         ("spheres", 2),
         ("dimers", 1),
         ("dimers", 2),
+        ("frozen spheres", 1),
         ("too many spheres", 1),
     ],
 )
@@ -660,8 +683,13 @@ def in_units(folder: Path, length: float, gravity: float, eps: float) -> FloatAr
         gravity=False,
         fixes=f"fix gravity all gravity {gravity * GRAVITY:.17g} vector 0 -1 0",
     )
-    # LAMMPS's own box, too: it is cut into bins of the size of the spheres.
-    data = folder / "spheres.data"
+    scale_box(folder / "spheres.data", length)
+    run(folder, deck + DUMP_PARTICLES + "run 100\n")
+    return np.array([frame.positions for frame in read_dump(folder / "particles.dump")]) / length
+
+
+def scale_box(data: Path, length: float) -> None:
+    """Scale LAMMPS's own box, too: it is cut into bins of the size of the spheres."""
     text = data.read_text()
     for (low, high), axis in zip(length * np.array(DEFAULT_BOX), "xyz", strict=True):
         text = re.sub(
@@ -670,8 +698,6 @@ def in_units(folder: Path, length: float, gravity: float, eps: float) -> FloatAr
             text,
         )
     data.write_text(text)
-    run(folder, deck + DUMP_PARTICLES + "run 100\n")
-    return np.array([frame.positions for frame in read_dump(folder / "particles.dump")]) / length
 
 
 @pytest.mark.parametrize(
@@ -683,6 +709,49 @@ def test_units_of_powers_of_two_change_no_bit(
     usual = in_units(tmp_path / "usual", 1, 1, EPS)
     other = in_units(tmp_path / "other", length, gravity, EPS)
     print(f"length {length:.4g}, gravity {gravity:.4g}: off by {np.abs(usual - other).max():g}")
+    assert np.array_equal(usual, other)
+
+
+def bodies_in_units(folder: Path, length: float, gravity: float, inertia: str) -> FloatArray:
+    """Trajectory of 40 dimers and 8 tetrahedra in these units, in the usual ones."""
+    shapes = [dimer(1.5)] * 40 + [TETRAHEDRON] * 8
+    bodies = random_bodies(shapes, RADIUS, CENTRES, seed=1)
+    deck = body_scene(
+        Bodies(length * bodies.positions, bodies.molecules),
+        length * RADIUS,
+        folder,
+        inertia=inertia,
+        tolerance=length * EPS,
+        timestep=STEP * np.sqrt(length / gravity),
+        skin=length * 0.2,
+        box=length * np.array(DEFAULT_BOX),
+        gravity=False,
+        fixes=f"fix gravity all gravity {gravity * GRAVITY:.17g} vector 0 -1 0",
+        options="region container shorten yes",
+    )
+    scale_box(folder / "spheres.data", length)
+    run(folder, deck + DUMP_BODY_SPHERES + "run 100\n")
+    return np.array([frame.positions for frame in read_dump(folder / "particles.dump")]) / length
+
+
+@pytest.mark.parametrize(
+    ("length", "gravity", "inertia"),
+    [
+        (2.0**-30, 1, "point"),
+        (2.0**-30, 1, "solid"),
+        # Fix rigid/small compares the zero moment of point masses on a line with 1e-6: no 2^20.
+        (2.0**20, 1, "solid"),
+        (1, 2.0**-20, "point"),
+        (1, 2.0**20, "solid"),
+    ],
+)
+def test_units_of_powers_of_two_with_bodies(
+    length: float, gravity: float, inertia: str, tmp_path: Path
+) -> None:
+    usual = bodies_in_units(tmp_path / "usual", 1, 1, inertia)
+    other = bodies_in_units(tmp_path / "other", length, gravity, inertia)
+    off = np.abs(usual - other).max()
+    print(f"bodies ({inertia}), length {length:.4g}, gravity {gravity:.4g}: off by {off:g}")
     assert np.array_equal(usual, other)
 
 
