@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from .dump_text import (
+    LARGEST_ID,
     FrameHeader,
     malformed_row,
     open_dump,
@@ -95,7 +96,10 @@ def _check(data: FloatArray, header: FrameHeader, path: Path) -> None:
     ids = data[:, 0:2]
     for wrong, message in (
         (
-            (ids != np.rint(ids)).any(axis=1) | (ids[:, 0] < 1) | (ids[:, 1] == 0),
+            (ids != np.rint(ids)).any(axis=1)
+            | (ids[:, 0] < 1)
+            | (ids[:, 1] == 0)
+            | (np.abs(ids) >= LARGEST_ID).any(axis=1),
             "id1 must be a sphere's id and id2 a sphere's id or minus a wall's number",
         ),
         (ids[:, 0] == ids[:, 1], "a sphere is in contact with itself"),

@@ -17,6 +17,7 @@ change it.
 from __future__ import annotations
 
 import gzip
+import sys
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -31,6 +32,8 @@ from .geometry import FloatArray
 
 HEADER_LINES = 9
 GZIP_MAGIC = b"\x1f\x8b"
+# Ids are read as float64, which holds every whole number up to here.
+LARGEST_ID = 2**53
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +131,8 @@ def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | N
 
 def read_rows(dump: Iterator[bytes], path: Path, header: FrameHeader) -> list[bytes]:
     """Read the lines of one frame's rows, unparsed, and see that they are all there."""
-    rows = list(islice(dump, header.rows))
+    # A file that announces more rows than a computer can count has fewer.
+    rows = list(islice(dump, min(header.rows, sys.maxsize)))
     # A last line without its end of line may have lost digits: it counts as missing.
     complete = len(rows) if not rows or rows[-1].endswith(b"\n") else len(rows) - 1
     if complete < header.rows:
@@ -146,11 +150,16 @@ def require_columns(header: FrameHeader, needed: Sequence[str], path: Path) -> N
     missing = [name for name in needed if name not in header.columns]
     if missing:
         raise missing_columns(header, path, ", ".join(missing))
+    twice = [name for name in needed if header.columns.count(name) > 1]
+    if twice:
+        raise DumpError(
+            path, f"more than one column is called {twice[0]}", header.first_row_line - 1
+        )
 
 
 def missing_columns(header: FrameHeader, path: Path, names: str) -> DumpError:
     """Make the error that says which columns are missing and which are there."""
-    there = " ".join(header.columns) or "none"
+    there = _printable(" ".join(header.columns)) or "none"
     return DumpError(path, f"no column {names}; there is {there}", header.first_row_line - 1)
 
 
@@ -181,7 +190,14 @@ def malformed_row(
 
 
 def _shortened(text: str) -> str:
-    return text if len(text) <= 40 else text[:37] + "..."
+    return _printable(text if len(text) <= 40 else text[:37] + "...")
+
+
+def _printable(text: str) -> str:
+    """Return a text that spoils no terminal: what was a binary file is quoted too."""
+    return "".join(
+        letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text
+    )
 
 
 def _parsed_integer(text: str, path: Path, line: int) -> int:

@@ -10,15 +10,16 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from MDAnalysis.coordinates.LAMMPS import DumpReader
 
 from .bodies import Particles, group_spheres
 from .dump_text import (
+    LARGEST_ID,
     FrameHeader,
     malformed_row,
     missing_columns,
@@ -134,7 +135,7 @@ class ParticleDump:
             raise IndexError(f"{self.path}: no frame {index}, there are {len(self)}")
         header, layout = self._headers[index], self._layout
         data = self._read(index % len(self))
-        self._check(header.step, data)
+        self._check(header, data)
         positions = _side_by_side(data, layout.positions)
         if layout.positions in SCALED:
             lower, upper = header.box.T
@@ -164,9 +165,11 @@ class ParticleDump:
                 # float32 and shifts them to the box's origin. dt only silences its warning.
                 self._reader = DumpReader(str(self.path), additional_columns=[*columns], dt=1.0)
             values = self._reader[index].data
+        # An id of twenty digits is an OverflowError.
         except (ValueError, IndexError, OverflowError) as error:
             self._reader = None
-            raise self._malformed() or DumpError(self.path, f"cannot be read: {error}") from None
+            mistake = self._malformed() or self._mistake(self._headers[index])
+            raise mistake or DumpError(self.path, f"cannot be read: {error}") from None
         # Copies: MDAnalysis reads the next frame into the same arrays.
         return {name: np.array(values[name], dtype=np.float64) for name in columns}
 
@@ -182,28 +185,50 @@ class ParticleDump:
                 line = header.next_line
         return None
 
-    def _check(self, step: int, data: dict[str, FloatArray]) -> None:
-        ids = data["id"]
+    def _check(self, header: FrameHeader, data: dict[str, FloatArray]) -> None:
+        ids, size, whole = data["id"], self._layout.size, self._layout.whole
+        fine = np.isfinite(np.column_stack(list(data.values()))).all(axis=1)
+        fine &= (ids >= 1) & (ids < LARGEST_ID)
+        if size is not None:
+            fine &= data[size] > 0
+        for name in whole:
+            fine &= (data[name] >= 0) & (data[name] == np.rint(data[name]))
+        if not fine.all() or (np.diff(ids) == 0).any():
+            raise self._mistake(header) or DumpError(self.path, "changed while it was read")
 
-        def raise_at(row: int, message: str) -> NoReturn:
-            raise DumpError(self.path, f"step {step}, sphere {ids[row]:.0f}: {message}")
+    def _mistake(self, header: FrameHeader) -> DumpError | None:
+        """Find the first row that is wrong, in the order of the file, which tells its line."""
+        with open_dump(self.path) as dump:
+            rows = list(islice(dump, header.first_row_line - 1, header.next_line - 1))
+        columns = self._layout.columns
+        place = [header.columns.index(name) for name in columns]
+        before: set[int] = set()
+        for line, row in enumerate(rows, start=header.first_row_line):
+            fields = row.split()
+            number = int(fields[place[0]])
+            values = {
+                name: float(fields[k]) for name, k in zip(columns[1:], place[1:], strict=True)
+            }
+            if not 1 <= number < LARGEST_ID or number in before:
+                said = f"step {header.step}: ids must be positive and each there once"
+                return DumpError(self.path, said, line)
+            before.add(number)
+            if said := self._said_of(values):
+                return DumpError(self.path, f"step {header.step}, sphere {number}: {said}", line)
+        return None
 
-        table = np.column_stack(list(data.values()))
-        finite = np.isfinite(table)
-        if not finite.all():
-            row, column = np.argwhere(~finite)[0]
-            raise_at(row, f"{list(data)[column]} is {table[row, column]}")
-        if ids[0] < 1 or (np.diff(ids) == 0).any():
-            raise DumpError(self.path, f"step {step}: ids must be positive and each there once")
+    def _said_of(self, values: dict[str, float]) -> str:
+        """Say what is wrong with the values of a sphere; nothing if they are right."""
+        for name, value in values.items():
+            if not math.isfinite(value):
+                return f"{name} is {value}"
         size = self._layout.size
-        if size is not None and (data[size] <= 0).any():
-            raise_at(int(np.argmax(data[size] <= 0)), f"{size} is not positive")
+        if size is not None and not values[size] > 0:
+            return f"{size} is not positive"
         for name in self._layout.whole:
-            values = data[name]
-            wrong = (values < 0) | (values != np.rint(values))
-            if wrong.any():
-                first = int(np.argmax(wrong))
-                raise_at(first, f"{name} must be {WHOLE_NUMBERS[name]}, not {values[first]:g}")
+            if values[name] < 0 or values[name] != round(values[name]):
+                return f"{name} must be {WHOLE_NUMBERS[name]}, not {values[name]:g}"
+        return ""
 
 
 def read_particle_frame(
@@ -236,12 +261,14 @@ def _layout(header: FrameHeader, path: Path, radius: float | None) -> _Layout:
     size = next((name for name in ("radius", "diameter") if name in there), None)
     if size is None and radius is None:
         raise missing_columns(header, path, "radius (nor diameter), and no radius is given")
-    return _Layout(
+    layout = _Layout(
         positions=whole[0],
         velocities=VELOCITIES if there.issuperset(VELOCITIES) else (),
         size=size,
         whole=tuple(name for name in WHOLE_NUMBERS if name in there),
     )
+    require_columns(header, layout.columns, path)
+    return layout
 
 
 def _scanned_headers(path: Path) -> list[FrameHeader]:
