@@ -38,10 +38,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from .decks import FILES, OUT, PACKING, RULES, Deck, Value, find_deck
 from .errors import StudyError, WorkflowError
+from .toml_lines import lines_of_keys
 
 # A study of more cases is a slip of the pen.
 MOST_CASES = 10_000
 LONGEST_NAME = 160
+# Of an error; a file may quote a picture.
+LONGEST_LINE = 2000
 # In a case's name even at their defaults; others where they differ.
 ALWAYS_SHOWN = ("particles", "aspect_ratio", "change", "seed")
 
@@ -270,21 +273,43 @@ def read_study(path: Path) -> Study:
         raise StudyError([f"{path}: {error.strerror}"]) from None
     # A whole number of thousands of digits is a ValueError too.
     except ValueError as error:
-        raise StudyError([f"{path}: not TOML: {error}"]) from None
+        raise StudyError([f"{path}: not TOML: {_shown(str(error))}"]) from None
+    except RecursionError:
+        raise StudyError(
+            [f"{path}: not TOML: tables or lists are too deep in one another"]
+        ) from None
     mistakes: list[str] = []
     try:
         file = _StudyFile.model_validate(content)
     except ValidationError as error:
         mistakes = list(_lines(error))
         if any(one["loc"][:1] != ("outputs",) for one in error.errors()):
-            raise StudyError([f"{path}: {line}" for line in mistakes]) from None
+            raise StudyError(_placed(mistakes, path, text)) from None
         # The parameters are as they should be: their mistakes are to be told at once.
         file = _StudyFile.model_validate({**content, "outputs": {}})
     cases = tuple(_cases(file, path.parent, mistakes))
     if mistakes:
-        # The same mistake shows in every row that it concerns.
-        raise StudyError([f"{path}: {line}" for line in dict.fromkeys(mistakes)])
+        raise StudyError(_placed(mistakes, path, text))
     return Study(path.stem, file.title, text, cases, file.outputs)
+
+
+def _placed(mistakes: Sequence[str], path: Path, text: str) -> list[str]:
+    """Say of each mistake in which file it is, and on which line if its key is there."""
+    lines = lines_of_keys(text)
+    placed = []
+    # The same mistake shows in every row that it concerns.
+    for mistake in dict.fromkeys(mistakes):
+        line = lines.get(mistake.split(": ")[0])
+        # As tomllib says it.
+        where = "" if line is None else f" (at line {line})"
+        placed.append(f"{path}: {_shown(mistake)}{where}")
+    return placed
+
+
+def _shown(mistake: str) -> str:
+    """Return a line that quotes a file without what would spoil a terminal, or fill it."""
+    text = "".join(each if each.isprintable() else repr(each)[1:-1] for each in mistake)
+    return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
 
 
 def _cases(file: _StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case]:
@@ -298,7 +323,7 @@ def _cases(file: _StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case
         try:
             decks = _decks(row.get("deck", file.deck), folder)
         except WorkflowError as error:
-            mistakes.append(f"{where if 'deck' in row else 'deck'}: {error}")
+            mistakes.append(f"{f'{where}.deck' if 'deck' in row else 'deck'}: {error}")
             missing = True
             continue
         parameters = {name: p for deck in decks for name, p in deck.parameters.items()}
