@@ -106,7 +106,7 @@ class Problem:
         contacts = np.arange(self.gap.size)
         rows[contacts, self.first] += self.normal
         rows[contacts, self.second] -= self.normal  # a wall's -1 is the last, dropped particle
-        return rows[:, :-1].reshape(self.gap.size, -1)
+        return rows[:, :-1].reshape(self.gap.size, 3 * self.inverse_mass.size)
 
     def root(self) -> Floats:
         """R (3 n, 3 n + 6 b), dense, with M^-1 = R R^T: V = R y for coordinates y of unit mass.

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import clarabel
 import numpy as np
 import pytest
-from scipy import sparse
 
 from contact_problems import (
     Problem,
@@ -19,33 +17,10 @@ from contact_problems import (
     row,
 )
 from lammps_inelastic import core
+from reference_solver import reference
 
 # [diameters] A ten-thousand-millionth of one step's motion, not far above what float64 resolves.
 TOLERANCE = 1e-13
-
-
-def reference(given: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Velocities and impulses from the primal problem, in V = V* + R y with M^-1 = R R^T:
-
-    minimise 1/2 y . y  subject to  (gap / h + G V*) + G R y >= 0
-
-    Clarabel's dual variables are the impulses: y - R^T G^T z = 0.
-    """
-    root = given.root()
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
-    solution = clarabel.DefaultSolver(
-        sparse.identity(root.shape[1], format="csc"),
-        np.zeros(root.shape[1]),
-        sparse.csc_matrix(-given.jacobian() @ root),
-        given.gap_at_end(given.predicted_velocity) / given.timestep,
-        [clarabel.NonnegativeConeT(given.gap.size)],
-        settings,
-    ).solve()
-    assert solution.status == clarabel.SolverStatus.Solved
-    change = (root @ solution.x).reshape(-1, 3)
-    return given.predicted_velocity + change, np.array(solution.z)
 
 
 def three_times(given: Problem) -> Problem:
