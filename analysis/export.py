@@ -304,7 +304,8 @@ def write_raw(
         head.write_text(lines, encoding="utf-8")
         with _unfinished(target) as file, file.open("wb") as raw:
             for image in computed.slices(progress):
-                image.tofile(raw)
+                # Not by `tofile`, which does not tell that a disk is full.
+                raw.write(image.data)
     return VoxelImage(computed.shape, voxel, computed.solid)
 
 
@@ -357,7 +358,7 @@ def write_stl(
             table["corners"] = (
                 centres[chosen, None, None] + radius[chosen, None, None, None] * ball.triangles
             )
-            table.tofile(stl)
+            stl.write(table.data)
     return faces
 
 

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from .files import whole, writing
 from .store import origin_of
 from .study import Case, Study
 
@@ -108,8 +109,10 @@ class Folder:
         The lock goes with the process that holds it, however that ends.
         """
         path = self.root / "cases" / ".locks" / case.name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("w") as file:
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = path.open("w")
+        with file:
             yield _locked(file)
 
     def _is_locked(self, case: Case) -> bool:
@@ -126,11 +129,12 @@ class Folder:
         part = self.part(case)
         _stop_processes_in(part)
         shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
-        for stage in case.stages:
-            (part / f"{stage.deck.name}.in").write_text(stage.deck.text)
-        for name, path in case.inputs.items():
-            shutil.copyfile(path, part / name)
+        with writing(part):
+            part.mkdir(parents=True)
+            for stage in case.stages:
+                (part / f"{stage.deck.name}.in").write_text(stage.deck.text)
+            for name, path in case.inputs.items():
+                shutil.copyfile(path, part / name)
         return part
 
     def finish(self, case: Case, record: Mapping[str, Any]) -> None:
@@ -185,12 +189,8 @@ def _locked(file: IO[str]) -> bool:
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write a file that is either whole or not there."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    with temporary.open("w") as file:
-        json.dump(content, file, indent=2)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.rename(path)
+    with whole(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=2))
 
 
 def last_lines(path: Path, count: int = 8) -> list[str]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from .files import whole
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -56,13 +57,9 @@ def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None
 
     data = read_data(files)
     sections = all_sections(data, [path.name for path in files])
-    out.parent.mkdir(parents=True, exist_ok=True)
-    temporary = out.with_name(f".{out.name}.{os.getpid()}")
-    try:
-        temporary.write_text(render(data, sections), encoding="utf-8")
-        temporary.rename(out)
-    finally:
-        temporary.unlink(missing_ok=True)
+    text = render(data, sections)
+    with whole(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
     summary = summarise(sections)
     if summary is not None:
         print(f"{summary.large} of {summary.compared} differences are above two standard errors")

@@ -11,7 +11,6 @@ Everything is written under another name and renamed when it is complete.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import WorkflowError
+from .files import whole
 from .schema import PICTURES, SCHEMA, VERSION
 
 Array = NDArray[Any]
@@ -213,15 +213,17 @@ def _check_version(file: h5py.File, path: Path) -> None:
 
 @contextmanager
 def _whole(path: Path) -> Iterator[h5py.File]:
-    """Open a file for writing that gets its name only when it is complete."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        # The newer layout has smaller headers, of which there are many here.
-        with h5py.File(temporary, "w", libver=("v110", "v110")) as file:
-            yield file
-        with temporary.open("rb") as written:
-            os.fsync(written.fileno())
-        temporary.rename(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    """Open a file for writing that gets its name only when it is complete.
+
+    HDF5 keeps it in memory: where a disk is full, the library prints a traceback for every object
+    that is open, and crashes when the process ends.
+    """
+    # The newer layout has smaller headers, of which there are many here.
+    with h5py.File(
+        path.name, "w", libver=("v110", "v110"), driver="core", backing_store=False
+    ) as file:
+        yield file
+        file.flush()
+        image = file.id.get_file_image()
+    with whole(path) as temporary:
+        temporary.write_bytes(image)

@@ -17,6 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .errors import StudyError, WorkflowError
+from .files import whole
 from .folder import Folder, last_lines
 from .launch import MEASURED, Options, Outcome, run_study
 from .progress import Display
@@ -205,10 +206,8 @@ def adopt_results(study: Study, folder: Folder, source: Path) -> int:
         kept, target = source / study.name / f"{case.name}.h5", folder.result(study, case)
         if folder.is_measured(study, case) or not kept.is_file():
             continue
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{target.name}.{os.getpid()}")
-        shutil.copyfile(kept, temporary)
-        temporary.rename(target)
+        with whole(target) as temporary:
+            shutil.copyfile(kept, temporary)
         count += 1
     return count
 

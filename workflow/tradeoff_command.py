@@ -18,6 +18,7 @@ from rich.text import Text
 
 from .decks import RULES, Rule, Value, as_value
 from .errors import StudyError
+from .files import whole
 from .folder import Folder
 from .launch import Options, run_study
 from .progress import Display
@@ -367,10 +368,5 @@ def as_csv(comparison: Comparison) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file that is either whole or not there."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-        temporary.rename(path)
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from lammps_inelastic.analysis.plots import plot_bounds, plot_points, style_of
 
+from .files import whole
 from .report.figures import DPI, RC
 from .tradeoff import Comparison, Configuration, Row
 
@@ -54,11 +54,11 @@ def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
         }
         figure.legend(known.values(), known, loc="outside lower center", ncols=min(len(known), 3))
         for file in files:
-            temporary = file.with_name(f".{os.getpid()}.{file.name}")
             # No date: the same numbers give the same file.
             metadata = {"Date": None} if file.suffix == ".svg" else {}
-            figure.savefig(temporary, dpi=DPI, metadata=metadata)
-            temporary.rename(file)
+            form = file.suffix.removeprefix(".")
+            with whole(file) as temporary:
+                figure.savefig(temporary, format=form, dpi=DPI, metadata=metadata)
     return files
 
 

@@ -10,7 +10,7 @@ import csv
 import io
 import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -32,6 +32,8 @@ from lammps_inelastic.analysis.plots import (
     plot_reference,
     plot_wall_profile,
 )
+
+from ..files import whole
 
 FloatArray = NDArray[np.float64]
 Kind = Literal["curve", "points", "apart", "distribution", "profile"]
@@ -155,11 +157,11 @@ class Figure:
 
     def write(self, folder: Path) -> None:
         """Write it as PDF, PNG and CSV into a folder that is there."""
-        self._save(folder / f"{self.name}.pdf", "pdf")
-        self._save(folder / f"{self.name}.png", "png")
+        for form in ("pdf", "png"):
+            with whole(folder / f"{self.name}.{form}") as temporary:
+                self._save(temporary, form)
         if self.panels:
-            with (folder / f"{self.name}.csv").open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows(self.rows())
+            _write_rows(folder / f"{self.name}.csv", self.rows())
 
     def rows(self) -> list[list[str]]:
         """Return what the CSV file holds: a heading, then a row for each point of each curve."""
@@ -262,11 +264,16 @@ class Pictures:
         for image in images:
             joined.paste(image, (left, height - image.height))
             left += image.width
-        joined.save(folder / f"{self.name}.png")
-        joined.save(folder / f"{self.name}.pdf")
-        with (folder / f"{self.name}.csv").open("w", newline="", encoding="utf-8") as file:
-            rows = [["picture from the left", "what"], *enumerate(self.pictures, 1)]
-            csv.writer(file).writerows(rows)
+        for form in ("png", "pdf"):
+            with whole(folder / f"{self.name}.{form}") as temporary:
+                joined.save(temporary, format=form)
+        rows = [["picture from the left", "what"], *enumerate(self.pictures, 1)]
+        _write_rows(folder / f"{self.name}.csv", rows)
+
+
+def _write_rows(path: Path, rows: Iterable[Iterable[object]]) -> None:
+    with whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows(rows)
 
 
 def _without_margins(data: bytes) -> bytes:
