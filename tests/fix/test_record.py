@@ -320,3 +320,18 @@ def test_a_file_that_cannot_be_written(
     error = refused(deck + "run 4\n", ranks=ranks)
     assert "nowhere/step2.npz" in error
     assert "No such file" in error
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_full_disk(ranks: int, tmp_path: Path, refused: Callable[..., str]) -> None:
+    """Every file that is there is whole: those of the steps before, and those of a run before."""
+    deck = pile(tmp_path, "record step*.npz every 2", count=5)
+    (tmp_path / "step4.npz").write_text("of a run before")
+    # The name under which the file is written until it is whole.
+    (tmp_path / "step4.npz.part").symlink_to("/dev/full")
+    error = refused(deck + "run 6\n", ranks=ranks)
+    assert "step 4: cannot write the record step4.npz: No space left on device" in error
+    assert sorted(path.name for path in tmp_path.glob("step*")) == ["step2.npz", "step4.npz"]
+    assert load(tmp_path / "step2.npz")["step"] == 2
+    assert (tmp_path / "step4.npz").read_text() == "of a run before"
