@@ -210,12 +210,15 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
   FixInelastic::grow_arrays(atom->nmax);
   for (int i = 0; i < atom->nlocal; ++i) FixInelastic::set_arrays(i);
   atom->add_callback(Atom::GROW);
+  restart_peratom = 1;
+  atom->add_callback(Atom::RESTART);
 }
 
 FixInelastic::~FixInelastic()
 {
   if (copymode) return;
   atom->delete_callback(id, Atom::GROW);
+  atom->delete_callback(id, Atom::RESTART);
   memory->destroy(state_);
   memory->destroy(array_atom);
   memory->destroy(array_local);
@@ -1469,6 +1472,42 @@ int FixInelastic::unpack_exchange(int i, double *buffer)
   in += memory_.unpack(i, in);
   return static_cast<int>(in - buffer);
 }
+
+// Restart files that are written during a run hold velocities with the push in them: it goes along,
+// with the velocity that it belongs to. Most atoms have none, and most files nothing but a size.
+int FixInelastic::pack_restart(int i, double *buffer)
+{
+  const int size = size_restart(i);
+  double *out = buffer;
+  *out++ = size;
+  if (size == 1) return size;
+  out = std::copy_n(atom->v[i], 3, out);
+  out = std::copy_n(state_[i] + PUSH_HELD, 3, out);
+  if (rigid_) rigid_->pack_held(i, out);
+  return size;
+}
+
+void FixInelastic::unpack_restart(int i, int nth)
+{
+  const double *in = atom->extra[i];
+  for (int k = 0; k < nth; ++k) in += static_cast<int>(*in);
+  const int size = static_cast<int>(*in++);
+  if (size == 1) return;
+  // A velocity that was set since is all momentum.
+  if (!std::equal(in, in + 3, atom->v[i])) return;
+  for (int d = 0; d < 3; ++d) atom->v[i][d] -= in[3 + d];
+  if (rigid_ && size == maxsize_restart()) rigid_->unpack_held(i, in + 6);
+}
+
+int FixInelastic::size_restart(int i)
+{
+  const double *const held = state_[i] + PUSH_HELD;
+  const bool pushed = held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
+  return pushed || (rigid_ && rigid_->has_held(i)) ? maxsize_restart() : 1;
+}
+
+int FixInelastic::maxsize_restart()
+{ return 7 + (rigid_ ? RigidMotion::HELD_SIZE : 0); }
 
 /* ----------------------------------------------------------------------
    communication

@@ -587,6 +587,29 @@ int RigidMotion::unpack(int i, const double *buffer)
   return static_cast<int>(in - buffer);
 }
 
+bool RigidMotion::has_held(int i) const
+{
+  double held[HELD_SIZE];
+  pack_held(i, held);
+  return std::any_of(held, held + HELD_SIZE, [](double value) {
+    return value != 0.0;
+  });
+}
+
+void RigidMotion::pack_held(int i, double *buffer) const
+{
+  const Push &held = carried_[i].held;
+  double *out = std::copy_n(held.velocity.begin(), 3, buffer);
+  std::copy_n(held.angular_momentum.begin(), 3, out);
+}
+
+void RigidMotion::unpack_held(int i, const double *buffer)
+{
+  Push &held = carried_[i].held;
+  std::copy_n(buffer, 3, held.velocity.begin());
+  std::copy_n(buffer + 3, 3, held.angular_momentum.begin());
+}
+
 /* ----------------------------------------------------------------------
    do LAMMPS's bodies agree with these?
 ------------------------------------------------------------------------- */

@@ -108,6 +108,11 @@ class RigidMotion : protected Pointers {
   void forget(int i) { carried_[i] = Carried{}; }
   int pack(int i, double *buffer) const;
   int unpack(int i, const double *buffer);
+  // The push in the velocities at a whole step, for restart files.
+  static constexpr int HELD_SIZE = 6;
+  bool has_held(int i) const;
+  void pack_held(int i, double *buffer) const;
+  void unpack_held(int i, const double *buffer);
   static constexpr int CARRIED_SIZE = 16;
 
  private:

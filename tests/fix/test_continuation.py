@@ -241,6 +241,39 @@ def test_a_restart_in_the_midst_of_pushing_apart_keeps_no_speed(
     assert result.thermo["f_contact[4]"][-1] <= 1e-5 * (1 + 1e-6)  # round-off
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("step", [1, 2, 3])
+def test_from_a_file_written_while_a_run_pushes_apart(
+    step: int, ranks: int, undisturbed: FloatArray, tmp_path: Path, lmp: Runner
+) -> None:
+    """Five spheres start 0.14 r deep in the lid, and three steps take them out."""
+    deck = cloud(tmp_path)
+    first = lmp(deck + "thermo 1\nrestart 1 here.*.restart\nrun 5\n", ranks=3 - ranks)
+    assert first.thermo["f_contact[4]"][2] > 0.01 * RADIUS
+    second = deck.replace("read_data spheres.data", f"read_restart here.{step}.restart")
+    lmp(second + DUMP_LAST + f"run {STEPS - step}\n", ranks=ranks)
+    assert_same(last_positions(tmp_path), undisturbed)
+
+
+def test_velocities_set_after_reading_such_a_file_count(tmp_path: Path, lmp: Runner) -> None:
+    deck = scene(
+        [[0.3, 0.5, 0.3], [0.36, 0.5, 0.3]],
+        RADIUS,
+        tmp_path,
+        tolerance=1e-5,
+        box=BOX,
+        gravity=False,
+    )
+    lmp(deck + "restart 1 here.*.restart\nrun 3\n")
+    second = deck.replace(
+        "read_data spheres.data", "read_restart here.2.restart\nvelocity all set 0 0.25 0"
+    )
+    lmp(second + DUMP_PARTICLES + "run 60\n")
+    end = read_dump(tmp_path / "particles.dump")[-1]
+    # What stays of the push is the tolerance over the time step.
+    assert np.abs(end.velocities - [0, 0.25, 0]).max() <= 2 * 1e-5 / 0.005
+
+
 def test_velocities_set_during_pushing_apart_count(tmp_path: Path, lmp: Runner) -> None:
     """A velocity command replaces all velocity, whatever part of it was a push."""
     deck = scene(
