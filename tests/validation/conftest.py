@@ -1,4 +1,4 @@
-"""The helpers of tests/ and of tests/fix/ are imported by name."""
+"""The shared helpers of tests/ and tests/fix are imported by name."""
 
 from __future__ import annotations
 
