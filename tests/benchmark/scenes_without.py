@@ -27,8 +27,6 @@ CORE = "src_fix/core/accelerated_gradient.cpp"
 # File, what is there, and what takes its place.
 Cut = tuple[str, str, str]
 
-# Not a part of the plugin, and needs more than a user has.
-MODULE: list[Cut] = [("CMakeLists.txt", "  add_subdirectory(src_fix/python)\n", "")]
 BODIES: list[Cut] = [
     (
         FIX_HEADER,
@@ -82,7 +80,7 @@ def build(folder: Path, cuts: list[Cut]) -> Path:
     sources = folder / "sources"
     shutil.copytree(ROOT / "src_fix", sources / "src_fix")
     shutil.copy(ROOT / "CMakeLists.txt", sources)
-    for name, there, instead in MODULE + cuts:
+    for name, there, instead in cuts:
         path = sources / name
         text = path.read_text()
         assert text.count(there) == 1, f"{name} has not one {there!r}"
