@@ -1634,18 +1634,19 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
   // Up to here a residual can come down, but need not.
   constexpr double NEAR_ROUND_OFF = 10.0;
   ++run_unconverged_;
+  const std::string named = worst_.empty() ? "" : ": " + worst_;    // numbers may not be finite
   std::string message, cause;
   if (result.infeasible) {
-    message = fmt::format("step {}: no velocities keep the surfaces apart: {}, where {:.4g} is "
+    message = fmt::format("step {}: no velocities keep the surfaces apart{}, where {:.4g} is "
                           "allowed",
-                          update->ntimestep, worst_, tolerance_);
+                          update->ntimestep, named, tolerance_);
     cause = "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
             "are too many spheres";
   } else {
     message = fmt::format("step {}: {} iterations left an overlap of {:.4g} and a gap under a "
-                          "force of {:.4g}, where {:.4g} is allowed: {}",
+                          "force of {:.4g}, where {:.4g} is allowed{}",
                           update->ntimestep, result.iterations, result.residual.feasibility,
-                          result.residual.complementarity, tolerance_, worst_);
+                          result.residual.complementarity, tolerance_, named);
     cause = tolerance_ < NEAR_ROUND_OFF * result.round_off
         ? fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
                       NEAR_ROUND_OFF * result.round_off)

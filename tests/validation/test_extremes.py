@@ -603,7 +603,7 @@ def test_no_room(name: str, ranks: int, options: str, tmp_path: Path) -> None:
     )
     assert "leaves no room" in error
     assert float(found[2]) > EPS
-    assert seconds < 30
+    assert seconds < 60  # not minutes, on a busy machine either
     if not options:
         assert certain, error
     if name == "one sphere" and not options:
