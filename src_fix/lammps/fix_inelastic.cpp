@@ -90,8 +90,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), first_list_of_run_(false),
     list_(nullptr), margin_(-1.0), came_back_(false), relinearised_(false), relinearisations_(0),
-    phase_(Phase::CONTACT), bad_overlap_(false), state_(nullptr), largest_radius_(0.0),
-    one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
+    phase_(Phase::CONTACT), bad_overlap_(false), pushed_before_(false), state_(nullptr),
+    largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
     regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0),
     largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
     run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
@@ -210,7 +210,6 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
   FixInelastic::grow_arrays(atom->nmax);
   for (int i = 0; i < atom->nlocal; ++i) FixInelastic::set_arrays(i);
   atom->add_callback(Atom::GROW);
-  restart_peratom = 1;
   atom->add_callback(Atom::RESTART);
 }
 
@@ -295,6 +294,7 @@ void FixInelastic::init()
 
   regular_timestep_ = update->dt;
   expecting_ = false;
+  pushed_before_ = false;
   run_iterations_ = run_largest_overlap_ = run_largest_excess_ = 0.0;
   run_steps_ = run_unconverged_ = run_shortened_ = 0;
   run_constraint_iterations_ = 0.0;
@@ -375,6 +375,7 @@ void FixInelastic::post_run()
       atom->v[i][d] -= state_[i][PUSH_HELD + d];
       state_[i][PUSH_HELD + d] = 0.0;
     }
+  restart_peratom = 0;
   if (comm->me == 0) log_run();
   log_times();
 }
@@ -485,6 +486,9 @@ void FixInelastic::advance(int vflag, double kick_steps)
 
   update_outputs(result);
   apply_forces(kick_steps);
+  // A whole-step velocity holds half of the push before and half of the one after it.
+  restart_peratom = bad_overlap_ || pushed_before_;
+  pushed_before_ = bad_overlap_;
   remember_contacts();
 
   // Rebuild before the list could fall short, with room for the next step to be half as fast again.
@@ -1474,10 +1478,12 @@ int FixInelastic::unpack_exchange(int i, double *buffer)
 }
 
 // Restart files that are written during a run hold velocities with the push in them: it goes along,
-// with the velocity that it belongs to. Most atoms have none, and most files nothing but a size.
+// with the velocity that it belongs to. Most atoms have none. Where none has, the file holds nothing
+// of this fix: LAMMPS would refuse change_box after it.
 int FixInelastic::pack_restart(int i, double *buffer)
 {
   const int size = size_restart(i);
+  if (size == 0) return size;
   double *out = buffer;
   *out++ = size;
   if (size == 1) return size;
@@ -1501,6 +1507,7 @@ void FixInelastic::unpack_restart(int i, int nth)
 
 int FixInelastic::size_restart(int i)
 {
+  if (!restart_peratom) return 0;
   const double *const held = state_[i] + PUSH_HELD;
   const bool pushed = held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
   return pushed || (rigid_ && rigid_->has_held(i)) ? maxsize_restart() : 1;

@@ -110,6 +110,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   enum class Phase { CONTACT, PUSH };
   Phase phase_;
   bool bad_overlap_;
+  bool pushed_before_;                             // in the step before
   std::unordered_set<std::uint64_t> entangled_;    // pairs of bodies, deep in one another
 
   // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the

@@ -246,7 +246,7 @@ def test_a_restart_in_the_midst_of_pushing_apart_keeps_no_speed(
 def test_from_a_file_written_while_a_run_pushes_apart(
     step: int, ranks: int, undisturbed: FloatArray, tmp_path: Path, lmp: Runner
 ) -> None:
-    """Five spheres start 0.14 r deep in the lid, and three steps take them out."""
+    """Spheres start 0.14 r deep in the lid, and three steps take them out."""
     deck = cloud(tmp_path)
     first = lmp(deck + "thermo 1\nrestart 1 here.*.restart\nrun 5\n", ranks=3 - ranks)
     assert first.thermo["f_contact[4]"][2] > 0.01 * RADIUS

@@ -51,11 +51,21 @@ def uzawa(folder: Path) -> str:
     )
 
 
+def bad_start(folder: Path) -> str:
+    """A restart file that holds what pushes spheres out of a wall."""
+    start = of_spheres.cloud(folder)
+    first = f"{start}restart 1 here.*.restart\nrun 3\nclear\n"
+    return (
+        first + start.replace("read_data spheres.data", "read_restart here.2.restart") + "run 5\n"
+    )
+
+
 SCENES: dict[str, Callable[[Path], str]] = {
     "spheres": spheres,
     "point": lambda folder: bodies(folder, "point"),
     "solid": lambda folder: bodies(folder, "solid"),
     "uzawa": uzawa,
+    "bad start": bad_start,
 }
 REFUSED = {
     "argument": lambda folder: deck(folder) + "fix more all inelastic 1e-5 region nowhere\n",
