@@ -28,6 +28,7 @@ class Size:
     particles : of the scenes that settle with hard and with soft contacts
     diameter : of their spheres, length
     seeds : random starts
+    time : from the start to the end of these scenes
     growing : numbers of spheres, with which the iterations grow
     ranks : number of spheres for two ranks against one
     million : whether a million spheres are tried
@@ -36,13 +37,14 @@ class Size:
     particles: int
     diameter: float
     seeds: int
+    time: float
     growing: tuple[int, ...]
     ranks: int
     million: bool
 
 
-QUICK = Size(1_000, 0.11, 5, (1_000, 10_000), 10_000, False)
-FULL = Size(10_000, 0.052, 2, (1_000, 10_000, 100_000), 100_000, True)
+QUICK = Size(1_000, 0.11, 5, 3.0, (1_000, 10_000), 10_000, False)
+FULL = Size(10_000, 0.052, 2, 1.8, (1_000, 10_000, 100_000), 100_000, True)
 
 
 def main() -> int:
@@ -59,7 +61,7 @@ def main() -> int:
     parts: dict[str, Callable[[], None]] = {
         "machine": machine.measure,
         "settling": lambda: settling.compare(
-            out / "settling", size.particles, size.diameter, size.seeds
+            out / "settling", size.particles, size.diameter, size.seeds, size.time
         ),
         "recorded": lambda: recorded.measure(size.particles, size.diameter),
         "growth": lambda: settling.grow(out / "growth", size.growing, size.ranks),

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from million import diameter_of
 
-TIME = 1.8
+TIME = 2.0
 LOOSE = 0.005  # radii
 TOLERANCES = (LOOSE, 0.0005)
 DT = 0.01  # of spheres of this diameter; the step goes with the square root of the diameter
@@ -46,15 +46,25 @@ def tradeoff(folder: Path, *arguments: str) -> list[Run]:
         return [Run(row) for row in csv.DictReader(file)]
 
 
-def spread(values: Iterable[float], form: str = ".1f") -> str:
-    """Return median and range."""
-    known = list(values)
+def spread(values: Iterable[float], form: str = ".2g") -> str:
+    """Return median and range of those values that there are."""
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return "none"
     middle = statistics.median(known)
     return f"{middle:{form}} ({min(known):{form}} to {max(known):{form}})"
 
 
-def compare(folder: Path, particles: int, diameter: float, seeds: int) -> None:
-    """Print times to the plateau with hard and with soft contacts, and their ratios."""
+def compare(folder: Path, particles: int, diameter: float, seeds: int, time: float) -> None:
+    """Print times to the plateau with hard and with soft contacts, and their ratios.
+
+    Parameters
+    ----------
+    folder : where the runs are kept
+    particles, diameter : of the scenes; length
+    seeds : random starts
+    time : to the end of a run; a start that is not at rest by then is left out, and counted
+    """
     scenes = {
         f"{particles:,} spheres": ["--particle", "spheres"],
         f"{particles:,} dimers of L/d 1.5": ["--particle", "dimers", "--aspect-ratio", "1.5"],
@@ -65,7 +75,7 @@ def compare(folder: Path, particles: int, diameter: float, seeds: int) -> None:
             folder / chosen[1],
             *chosen,
             *("--particles", str(particles), "--diameter", str(diameter), "--seeds", str(seeds)),
-            *("--tolerances", both, "--soft-tolerances", both, "--time", str(TIME)),
+            *("--tolerances", both, "--soft-tolerances", both, "--time", str(time)),
         )
         for tolerance in TOLERANCES:
             hard, soft = (
@@ -79,16 +89,19 @@ def compare(folder: Path, particles: int, diameter: float, seeds: int) -> None:
             fast = {run.values["start"]: run.number("plateau_seconds") for run in hard}
             slow = {run.values["start"]: run.number("plateau_seconds") for run in soft}
             ratios = [slow[start] / fast[start] for start in fast]
+            known = sum(map(math.isfinite, ratios))
             print(
                 f"{name}, {tolerance:g} r (overlaps at rest: hard {_largest(hard)}, soft "
                 f"{_largest(soft)}): hard {spread(fast.values())} s to the plateau, soft "
-                f"{spread(slow.values())} s, {spread(ratios)} times as long",
+                f"{spread(slow.values())} s, {spread(ratios, '.3g')} times as long "
+                f"({known} of {seeds} starts)",
                 flush=True,
             )
 
 
 def _largest(runs: Sequence[Run]) -> str:
-    return f"{max(run.number('overlap_at_rest') for run in runs):.2g} r"
+    known = [run.number("overlap_at_rest") for run in runs]
+    return f"{max((one for one in known if math.isfinite(one)), default=math.nan):.2g} r"
 
 
 def grow(folder: Path, sizes: Sequence[int], parallel: int) -> None:
