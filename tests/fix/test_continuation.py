@@ -220,17 +220,16 @@ def test_the_tolerance_changes_between_runs(tmp_path: Path, lmp: Runner) -> None
     assert result.runs[3]["f_contact[1]"].max() <= usual + 5
 
 
+def deep_in_one_another(folder: Path) -> str:
+    """Return the deck of two spheres that are pushed apart for more than three steps."""
+    points = [[0.3, 0.5, 0.3], [0.36, 0.5, 0.3]]
+    return scene(points, RADIUS, folder, tolerance=1e-5, box=BOX, gravity=False)
+
+
 def test_a_restart_in_the_midst_of_pushing_apart_keeps_no_speed(
     tmp_path: Path, lmp: Runner
 ) -> None:
-    deck = scene(
-        [[0.3, 0.5, 0.3], [0.36, 0.5, 0.3]],
-        RADIUS,
-        tmp_path,
-        tolerance=1e-5,
-        box=BOX,
-        gravity=False,
-    )
+    deck = deep_in_one_another(tmp_path)
     lmp(deck + "run 3\nwrite_restart half.restart\n")
     second = deck.replace("read_data spheres.data", "read_restart half.restart")
     result = lmp(second + DUMP_PARTICLES + "run 60\n")
@@ -256,14 +255,7 @@ def test_from_a_file_written_while_a_run_pushes_apart(
 
 
 def test_velocities_set_after_reading_such_a_file_count(tmp_path: Path, lmp: Runner) -> None:
-    deck = scene(
-        [[0.3, 0.5, 0.3], [0.36, 0.5, 0.3]],
-        RADIUS,
-        tmp_path,
-        tolerance=1e-5,
-        box=BOX,
-        gravity=False,
-    )
+    deck = deep_in_one_another(tmp_path)
     lmp(deck + "restart 1 here.*.restart\nrun 3\n")
     second = deck.replace(
         "read_data spheres.data", "read_restart here.2.restart\nvelocity all set 0 0.25 0"

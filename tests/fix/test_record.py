@@ -322,7 +322,6 @@ def test_a_file_that_cannot_be_written(
     assert "No such file" in error
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_full_disk(ranks: int, tmp_path: Path, refused: Callable[..., str]) -> None:
     """Every file that is there is whole: those of the steps before, and those of a run before."""

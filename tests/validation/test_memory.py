@@ -104,6 +104,7 @@ def preloaded() -> str:
         )
         path = Path(said.stdout.strip())
         if not path.is_absolute():
+            # Other compilers link theirs into the program, and LAMMPS's program is not ours.
             pytest.skip(f"the compiler has no {name} to be loaded first (GCC has)")
         found.append(str(path.resolve()))
     return " ".join(found)
@@ -152,6 +153,7 @@ def test_sanitizers_when_something_is_refused(
     assert len(result.errors) == 1
 
 
+# A package of the system, which pip cannot install; the sanitizers above need only the compiler.
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
 @pytest.mark.parametrize("name", ["spheres", "point"])
 def test_valgrind(name: str, tmp_path: Path) -> None:

@@ -454,6 +454,7 @@ def test_starts_from_data_files(tmp_path):
 
 def test_two_ranks_are_kept_apart(tmp_path):
     if tradeoff_command.cores() < 2:
+        # The command refuses more ranks than cores, whose times would say nothing.
         pytest.skip("two ranks need two cores")
     out = tmp_path / "out"
     arguments = [*FEW, "--seeds", "1", "--tolerances", "0.005", "--soft-tolerances", "none"]
