@@ -266,6 +266,7 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
     sum_.assign(particles, Vector<Real>{});
     velocity_.assign(particles, Vector<Real>{});
     ahead_.assign(particles, Vector<Real>{});
+    choose_copies(problem, host);
     const Pass<Real> pass = passing(0.0, 0.0);
     scatter(pass, 0, count, pass.impulse);
     finish(host, 0.0);
@@ -281,7 +282,7 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
   // Ends an iteration: velocities of the impulses, and where this momentum leads to.
   void finish(Host &host, double momentum)
   {
-    host.sum_over_copies(reinterpret_cast<Real *>(sum_.data()), 4);
+    host.sum_over_chosen_copies(reinterpret_cast<Real *>(sum_.data()));
     if (!bodies_.empty()) turn_all(bodies_, members_.data(), sum_.data());
     move_all({velocity_.size(), inverse_mass_.data(), sum_.data(), velocity_.data(), ahead_.data(),
               static_cast<Real>(momentum)});
@@ -307,6 +308,26 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
             sum_.data(),
             static_cast<Real>(momentum),
             static_cast<Real>(step)};
+  }
+
+  // Those in contacts of this rank, and all of a body of which a particle is: most copies are in none.
+  void choose_copies(const ContactProblem &problem, Host &host)
+  {
+    const RigidBodies &rigid = problem.bodies;
+    needed_.assign(static_cast<std::size_t>(problem.particles) + 1, 0);
+    for (const Ends &ends : ends_) needed_[ends.first] = needed_[ends.second] = 1;
+    for (std::size_t b = 0; b < rigid.size(); ++b) {
+      const auto begin = rigid.member.begin() + rigid.start[b];
+      const auto end = rigid.member.begin() + rigid.start[b + 1];
+      const bool any = std::any_of(begin, end, [this](int i) {
+        return needed_[i] != 0;
+      });
+      if (any)
+        std::for_each(begin, end, [this](int i) {
+          needed_[i] = 1;
+        });
+    }
+    host.choose_copies(needed_);
   }
 
   void add_bodies(const ContactProblem &problem, double mobility_unit)
@@ -367,6 +388,7 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
   std::vector<Vector<Real>> normal_;
   std::vector<Real> diagonal_, impulse_, impulse_before_, gap_before_;
   std::vector<Real> inverse_mass_;
+  std::vector<char> needed_;    // per particle
   std::vector<Vector<Real>> sum_, velocity_, ahead_;
   std::vector<Body<Real>> bodies_;
   std::vector<Member<Real>> members_;

@@ -35,7 +35,6 @@ class AcceleratedProjectedGradient final : public Solver {
   void judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
              SolverResult &result);
 
-  GapOperator gap_operator_;
   // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
   double curvature_ = 0.0;
   std::vector<double> diagonal_;    // of A

@@ -87,7 +87,7 @@ void GapOperator::velocity_change(const ContactProblem &problem, const double *i
   double *const change = change_.data();
   std::fill(change_.begin(), change_.end(), 0.0);
   scatter_impulses(problem.contacts, impulse, change);
-  host.sum_over_copies(change, 3);
+  host.sum_over_copies(change);
   auto divide_by_mass = [&](std::size_t i) {
     const double w = problem.inverse_mass[i];
     change[3 * i] *= w;
@@ -110,7 +110,7 @@ GapOperator::Kick GapOperator::kick(const ContactProblem &problem, const double 
   // is squared.
   std::vector<double> sum(change_.size(), 0.0);
   scatter_impulses(problem.contacts, impulse, sum.data());
-  host.sum_over_copies(sum.data(), 3);
+  host.sum_over_copies(sum.data());
   velocity_change(problem, impulse, host);
   Kick kick = {0.0, 0.0};
   std::vector<char> pushed(static_cast<std::size_t>(problem.particles) + 1, 0);
@@ -153,6 +153,11 @@ void GapOperator::velocity(const ContactProblem &problem, const double *impulse,
                            Host &host)
 {
   velocity_change(problem, impulse, host);
+  velocity_applied(problem, velocity);
+}
+
+void GapOperator::velocity_applied(const ContactProblem &problem, double *velocity) const
+{
   for (std::size_t k = 0; k < 3 * static_cast<std::size_t>(problem.particles); ++k)
     velocity[k] = problem.predicted_velocity[k] + change_[k];
 }

@@ -57,6 +57,9 @@ class GapOperator {
   // Velocities V* + M^-1 G^T lambda of all particles, copies included.
   void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
 
+  // The same for the impulses of the last apply().
+  void velocity_applied(const ContactProblem &problem, double *velocity) const;
+
   // |G^T lambda|^2 in the norm of M^-1, this rank's share: twice the kinetic energy that the impulses
   // give to what is at rest. And the mass that they act on. Copies count as often as they are there.
   struct Kick {

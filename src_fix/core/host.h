@@ -3,17 +3,22 @@
 
 #pragma once
 
-#include <cstddef>
+#include <vector>
 
 namespace inelastic {
 
 class Host {
  public:
-  // Per-particle vectors (3 numbers each, the next particle's `stride` numbers further; owned
-  // particles first, then copies of particles that other ranks own): add the copies' values to their
-  // owners, then give every copy its owner's sum.
-  virtual void sum_over_copies(double *per_particle, int stride) = 0;
-  virtual void sum_over_copies(float *per_particle, int stride) = 0;
+  // Per-particle vectors (3 doubles each; owned particles first, then copies of particles that other
+  // ranks own): add the copies' values to their owners, then give every copy its owner's sum.
+  virtual void sum_over_copies(double *per_particle) = 0;
+
+  // The same for those copies alone that their rank has chosen, in the last call of choose_copies;
+  // the values of the others are neither added nor replaced. Particles have 4 numbers each here, of
+  // which the last has no meaning. `chosen` is per particle; what it says of owned ones has none.
+  virtual void choose_copies(const std::vector<char> &chosen) = 0;
+  virtual void sum_over_chosen_copies(double *per_particle) = 0;
+  virtual void sum_over_chosen_copies(float *per_particle) = 0;
 
   // Per-particle vectors (3 doubles each): give every copy its owner's value. For those who set up
   // a problem: the copies need predicted velocities too.
@@ -28,8 +33,10 @@ class Host {
 
 class SerialHost final : public Host {
  public:
-  void sum_over_copies(double *, int) override {}
-  void sum_over_copies(float *, int) override {}
+  void sum_over_copies(double *) override {}
+  void choose_copies(const std::vector<char> &) override {}
+  void sum_over_chosen_copies(double *) override {}
+  void sum_over_chosen_copies(float *) override {}
   void share_with_copies(double *) override {}
   void reduce(double *, int, double *, int) override {}
 };

@@ -27,7 +27,7 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
                          std::vector<double> &velocity)
 {
   ProjectionResult result;
-  GapOperator gap_operator;
+  GapOperator &gap_operator = solver.gap_operator();
   velocity.resize(3 * static_cast<std::size_t>(problem.particles));
   while (true) {
     const SolverLimits remaining = {limits.tolerance, limits.max_iterations - result.iterations,
@@ -42,8 +42,10 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
     result.round_off = solved.round_off;
 
     const std::size_t solved_for = problem.contacts.size();
-    gap_operator.prepare(problem);
-    gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
+    if (solved.converged)
+      gap_operator.velocity_applied(problem, velocity.data());
+    else
+      gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
     double changed = static_cast<double>(source.refine(velocity, problem));
     host.reduce(&changed, 1, nullptr, 0);
     result.complete = changed == 0.0;

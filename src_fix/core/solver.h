@@ -59,6 +59,13 @@ class Solver {
  public:
   virtual ~Solver() = default;
   virtual SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) = 0;
+
+  // Prepared for the problem of the last solve; if that has converged, its result is what the operator
+  // was last applied to.
+  GapOperator &gap_operator() { return gap_operator_; }
+
+ protected:
+  GapOperator gap_operator_;
 };
 
 // The paper's solver: projected gradient with a fixed step from zero impulses, which stops on
@@ -69,8 +76,7 @@ class Uzawa final : public Solver {
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
 
  private:
-  GapOperator gap_operator_;
-  std::vector<double> gap_, product_;
+  std::vector<double> gap_;
 };
 
 // Largest eigenvalue of A = h G M^-1 G^T [time / mass] by power iteration, from below and mostly to

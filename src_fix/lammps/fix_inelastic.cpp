@@ -95,8 +95,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0),
     largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
     run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
-    run_unconverged_(0), run_shortened_(0), run_constraint_iterations_(0.0), exchanged_{},
-    exchanging_memory_(false)
+    run_unconverged_(0), run_shortened_(0), run_constraint_iterations_(0.0),
+    exchanging_(Exchange::VECTORS), exchanged_(nullptr), exchanged_single_(nullptr)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -432,21 +432,16 @@ void FixInelastic::advance(int vflag, double kick_steps)
   if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
   if (expecting_) check_expected();
 
+  spread_at_start_ = spread_since_build(nullptr);
   inelastic::ProjectionResult result;
   while (true) {
     worst_.clear();
-    predict(kick_steps);
-    spread_at_start_ = spread_since_build(nullptr);
-    // The prediction moves nearly as far as the projection will: where the list cannot reach that
-    // far there is no use in solving first.
+    // Where the list cannot reach as far as atoms would move there is no use in solving first.
     if (shorten_ && spread_at_start_ < list_reach_) {
-      if (rigid_) rigid_->turn(problem_, problem_.predicted_velocity);
-      const std::vector<double> &towards = rigid_ ? rigid_->motion() : problem_.predicted_velocity;
-      if (!list_reaches(towards)) {
-        shorten_step(room_in_list(towards));
-        continue;
-      }
+      const std::vector<double> unhindered = unhindered_motion(kick_steps);
+      if (!list_reaches(unhindered)) shorten_step(room_in_list(unhindered));
     }
+    predict(kick_steps);
     phase_ = Phase::CONTACT;
     collect();
     result = project(max_iterations_);
@@ -1204,13 +1199,26 @@ double FixInelastic::spread(const double *values)
 
 // Pairs that are not listed were at least list_reach_ apart when the list was built.
 bool FixInelastic::list_reaches(const std::vector<double> &motion)
-{ return spread_at_start_ + problem_.timestep * spread(motion.data()) <= list_reach_; }
+{ return spread_at_start_ + update->dt * spread(motion.data()) <= list_reach_; }
 
 // The part of the time step for which the list would reach, with some reserve.
 double FixInelastic::room_in_list(const std::vector<double> &motion)
 {
   constexpr double RESERVE = 0.9;
-  return RESERVE * (list_reach_ - spread_at_start_) / (problem_.timestep * spread(motion.data()));
+  return RESERVE * (list_reach_ - spread_at_start_) / (update->dt * spread(motion.data()));
+}
+
+// Of this rank's atoms, 3 per atom: their velocities with the forces alone. Bodies turn in other ways:
+// this is about it.
+std::vector<double> FixInelastic::unhindered_motion(double kick_steps) const
+{
+  std::vector<double> motion(3 * static_cast<std::size_t>(atom->nlocal));
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const bool moves = (atom->mask[i] & groupbit) && !(atom->mask[i] & frozen_bit_);
+    const double kick_per_force = moves ? kick_steps * update->dt * force->ftm2v / mass(i) : 0.0;
+    for (int d = 0; d < 3; ++d) motion[3 * i + d] = atom->v[i][d] + kick_per_force * atom->f[i][d];
+  }
+  return motion;
 }
 
 // Spread of the displacements since the list was built, at present or after a step's motion.
@@ -1332,8 +1340,8 @@ void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
   size_local_rows = row;
   share_virial();
 
-  sum_over_copies(contact_force_.data(), 3);
-  sum_over_copies(contact_count_.data(), 3);
+  sum_over_copies(contact_force_.data());
+  sum_over_copies(contact_count_.data());
   for (int i = 0; i < nlocal; ++i) {
     array_atom[i][0] = contact_count_[3 * i];
     array_atom[i][1] = contact_count_[3 * i + 1];
@@ -1374,8 +1382,8 @@ void FixInelastic::tally_virial(int i, int j, const double *v)
 void FixInelastic::share_virial()
 {
   if (!vflag_atom) return;
-  sum_over_copies(virial_diagonal_.data(), 3);
-  sum_over_copies(virial_off_diagonal_.data(), 3);
+  sum_over_copies(virial_diagonal_.data());
+  sum_over_copies(virial_off_diagonal_.data());
   for (int i = 0; i < atom->nlocal; ++i)
     for (int k = 0; k < 3; ++k) {
       vatom[i][k] += virial_diagonal_[3 * i + k];
@@ -1417,12 +1425,7 @@ void FixInelastic::remember_contacts()
     memory_.remember(i, wall ? -wall : atom->tag[j], strength);
     if (!wall) memory_.remember(j, atom->tag[i], strength);
   }
-  if (has_copies()) {
-    const PhaseClock::Within communicating(clock_, PhaseClock::COMMUNICATE);
-    exchanging_memory_ = true;
-    comm->reverse_comm(this, ContactMemory::packed_size(SHARED_PARTNERS));
-    exchanging_memory_ = false;
-  }
+  exchange(Exchange::MEMORY, true, false, ContactMemory::packed_size(SHARED_PARTNERS));
   double most = 0.0;
   for (int i = 0; i < atom->nlocal; ++i)
     most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
@@ -1523,22 +1526,45 @@ int FixInelastic::maxsize_restart()
 bool FixInelastic::has_copies() const
 { return comm->nprocs > 1 || atom->nghost > 0; }
 
-void FixInelastic::sum_over_copies(double *per_particle, int stride)
-{ exchange({per_particle, nullptr, stride}, true); }
-
-void FixInelastic::sum_over_copies(float *per_particle, int stride)
-{ exchange({nullptr, per_particle, stride}, true); }
+void FixInelastic::sum_over_copies(double *per_particle)
+{
+  exchanged_ = per_particle;
+  exchange(Exchange::VECTORS, true, true, 3);
+}
 
 void FixInelastic::share_with_copies(double *per_particle)
-{ exchange({per_particle, nullptr, 3}, false); }
+{
+  exchanged_ = per_particle;
+  exchange(Exchange::VECTORS, false, true, 3);
+}
 
-void FixInelastic::exchange(const Exchanged &vectors, bool sum)
+void FixInelastic::choose_copies(const std::vector<char> &chosen)
+{
+  chosen_copies_.begin(chosen);
+  exchange(Exchange::CHOICE, true, false, 1);
+}
+
+void FixInelastic::sum_over_chosen_copies(double *per_particle)
+{
+  exchanged_ = per_particle;
+  exchange(Exchange::CHOSEN, true, true, 3);
+}
+
+void FixInelastic::sum_over_chosen_copies(float *per_particle)
+{
+  exchanged_single_ = per_particle;
+  exchange(Exchange::CHOSEN_SINGLE, true, true, 3);
+}
+
+// Copies tell their originals, then the originals their copies; `size` is at most that many numbers
+// per atom.
+void FixInelastic::exchange(Exchange what, bool reverse, bool forward, int size)
 {
   if (!has_copies()) return;
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
-  exchanged_ = vectors;
-  if (sum) comm->reverse_comm(this, 3);
-  comm->forward_comm(this);
+  exchanging_ = what;
+  if (reverse) comm->reverse_comm(this, size);
+  if (forward) comm->forward_comm(this, size);
 }
 
 void FixInelastic::reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima)
@@ -1557,34 +1583,70 @@ void FixInelastic::reduce(double *sums, int number_of_sums, double *maxima, int 
 
 int FixInelastic::pack_forward_comm(int n, int *list, double *buffer, int, int *)
 {
-  for (int k = 0; k < n; ++k) exchanged_.get(list[k], buffer + 3 * k);
+  if (n == 0) return 0;
+  if (exchanging_ == Exchange::CHOSEN)
+    return chosen_copies_.pack_originals(list, exchanged_, buffer);
+  if (exchanging_ == Exchange::CHOSEN_SINGLE)
+    return chosen_copies_.pack_originals(list, exchanged_single_, buffer);
+  for (int k = 0; k < n; ++k) std::copy_n(exchanged_ + 3 * list[k], 3, buffer + 3 * k);
   return 3 * n;
 }
 
 void FixInelastic::unpack_forward_comm(int n, int first, double *buffer)
 {
-  for (int k = 0; k < n; ++k) exchanged_.set(first + k, buffer + 3 * k);
+  if (n == 0) return;
+  if (exchanging_ == Exchange::CHOSEN)
+    chosen_copies_.set_copies(first, buffer, exchanged_);
+  else if (exchanging_ == Exchange::CHOSEN_SINGLE)
+    chosen_copies_.set_copies(first, buffer, exchanged_single_);
+  else
+    std::copy_n(buffer, 3 * n, exchanged_ + 3 * first);
 }
 
 int FixInelastic::pack_reverse_comm(int n, int first, double *buffer)
 {
-  if (exchanging_memory_) {
-    constexpr int SIZE = ContactMemory::packed_size(SHARED_PARTNERS);
-    for (int k = 0; k < n; ++k) memory_.pack(first + k, buffer + k * SIZE, SHARED_PARTNERS);
-    return n * SIZE;
+  constexpr int MEMORY_SIZE = ContactMemory::packed_size(SHARED_PARTNERS);
+  if (n == 0) return 0;
+  switch (exchanging_) {
+    case Exchange::MEMORY:
+      for (int k = 0; k < n; ++k)
+        memory_.pack(first + k, buffer + k * MEMORY_SIZE, SHARED_PARTNERS);
+      return n * MEMORY_SIZE;
+    case Exchange::CHOICE:
+      return chosen_copies_.pack_choice(n, first, buffer);
+    case Exchange::CHOSEN:
+      return chosen_copies_.pack_copies(first, exchanged_, buffer);
+    case Exchange::CHOSEN_SINGLE:
+      return chosen_copies_.pack_copies(first, exchanged_single_, buffer);
+    case Exchange::VECTORS:
+      break;
   }
-  for (int k = 0; k < n; ++k) exchanged_.get(first + k, buffer + 3 * k);
+  std::copy_n(exchanged_ + 3 * first, 3 * n, buffer);
   return 3 * n;
 }
 
 void FixInelastic::unpack_reverse_comm(int n, int *list, double *buffer)
 {
-  if (exchanging_memory_) {
-    constexpr int SIZE = ContactMemory::packed_size(SHARED_PARTNERS);
-    for (int k = 0; k < n; ++k) memory_.unpack(list[k], buffer + k * SIZE);
-    return;
+  constexpr int MEMORY_SIZE = ContactMemory::packed_size(SHARED_PARTNERS);
+  if (n == 0) return;
+  switch (exchanging_) {
+    case Exchange::MEMORY:
+      for (int k = 0; k < n; ++k) memory_.unpack(list[k], buffer + k * MEMORY_SIZE);
+      return;
+    case Exchange::CHOICE:
+      chosen_copies_.unpack_choice(n, list, buffer);
+      return;
+    case Exchange::CHOSEN:
+      chosen_copies_.add_to_originals(list, buffer, exchanged_);
+      return;
+    case Exchange::CHOSEN_SINGLE:
+      chosen_copies_.add_to_originals(list, buffer, exchanged_single_);
+      return;
+    case Exchange::VECTORS:
+      break;
   }
-  for (int k = 0; k < n; ++k) exchanged_.add(list[k], buffer + 3 * k);
+  for (int k = 0; k < n; ++k)
+    for (int d = 0; d < 3; ++d) exchanged_[3 * list[k] + d] += buffer[3 * k + d];
 }
 
 /* ----------------------------------------------------------------------

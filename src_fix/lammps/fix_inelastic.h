@@ -16,6 +16,7 @@ FixStyle(inelastic,FixInelastic);
 #ifndef LMP_FIX_INELASTIC_H
 #define LMP_FIX_INELASTIC_H
 
+#include "chosen_copies.h"
 #include "contact_memory.h"
 #include "fix.h"
 #include "host.h"
@@ -170,45 +171,24 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   PhaseClock clock_;
 
   // Communication
-  // Per-particle vectors that pack and unpack work on, in one precision or the other.
-  struct Exchanged {
-    double *values;
-    float *single;    // looked at where there are no `values`
-    int stride;       // numbers from one particle to the next
-
-    void get(int i, double *vector) const
-    {
-      for (int d = 0; d < 3; ++d)
-        vector[d] = values ? values[stride * i + d] : single[stride * i + d];
-    }
-    void set(int i, const double *vector) const
-    {
-      for (int d = 0; d < 3; ++d)
-        if (values)
-          values[stride * i + d] = vector[d];
-        else
-          single[stride * i + d] = static_cast<float>(vector[d]);
-    }
-    void add(int i, const double *vector) const
-    {
-      double sum[3];
-      get(i, sum);
-      for (int d = 0; d < 3; ++d) sum[d] += vector[d];
-      set(i, sum);
-    }
-  };
+  // What pack and unpack work on.
+  enum class Exchange { VECTORS, MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
-  Exchanged exchanged_;
-  bool exchanging_memory_;
+  Exchange exchanging_;
+  double *exchanged_;          // VECTORS: 3 numbers per particle; CHOSEN: 4
+  float *exchanged_single_;    // 4 numbers per particle
+  ChosenCopies chosen_copies_;
 
   // Host
-  void sum_over_copies(double *, int) override;
-  void sum_over_copies(float *, int) override;
+  void sum_over_copies(double *) override;
+  void choose_copies(const std::vector<char> &) override;
+  void sum_over_chosen_copies(double *) override;
+  void sum_over_chosen_copies(float *) override;
   void share_with_copies(double *) override;
   void reduce(double *, int, double *, int) override;
   bool has_copies() const;
-  void exchange(const Exchanged &, bool sum);
+  void exchange(Exchange what, bool reverse, bool forward, int size);
 
   // ConstraintSource
   long refine(const std::vector<double> &, inelastic::ContactProblem &) override;
@@ -262,6 +242,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double spread_since_build(const double *motion);
   bool list_reaches(const std::vector<double> &motion);
   double room_in_list(const std::vector<double> &motion);
+  std::vector<double> unhindered_motion(double kick_steps) const;
   void shorten_step(double factor);
   void set_timestep(double timestep);
 

@@ -231,16 +231,32 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
     if (tag[a] != tag[b]) return tag[a] < tag[b];
     return a < b;    // the owned sphere before its copies
   });
+  // Bodies in the order of their spheres: what is near in space is near in memory.
+  struct Group {
+    int earliest;
+    std::size_t begin, end;    // in `order`
+  };
+  std::vector<Group> groups;
+  for (std::size_t begin = 0, end; begin < order.size(); begin = end) {
+    Group group = {order[begin], begin, begin};
+    for (end = begin; end < order.size() && molecule[order[end]] == molecule[order[begin]]; ++end)
+      group.earliest = std::min(group.earliest, order[end]);
+    group.end = end;
+    groups.push_back(group);
+  }
+  std::sort(groups.begin(), groups.end(), [](const Group &a, const Group &b) {
+    return a.earliest < b.earliest;
+  });
 
   problem.bodies.clear(nall);
   copy_of_.clear();
   incomplete_.assign(nall, 0);
   std::string message;
-  for (std::size_t begin = 0, end; begin < order.size(); begin = end) {
-    const tagint id = molecule[order[begin]];
+  for (const Group &group : groups) {
+    const tagint id = molecule[order[group.begin]];
     std::vector<int> originals, copies, copy_of;
-    for (end = begin; end < order.size() && molecule[order[end]] == id; ++end) {
-      const int i = order[end];
+    for (std::size_t k = group.begin; k < group.end; ++k) {
+      const int i = order[k];
       if (originals.empty() || tag[originals.back()] != tag[i]) {
         originals.push_back(i);
       } else {
@@ -251,7 +267,7 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
     const int number = static_cast<int>(originals.size());
     const bool known = id < static_cast<tagint>(spheres_in_.size());
     if (!known || number != spheres_in_[id]) {
-      for (std::size_t k = begin; k < end; ++k) incomplete_[order[k]] = 1;
+      for (std::size_t k = group.begin; k < group.end; ++k) incomplete_[order[k]] = 1;
       for (const int i : originals)
         if (i < nlocal)
           message = fmt::format("the body of molecule {} has {} spheres, of which a rank sees {}: "

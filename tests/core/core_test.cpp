@@ -810,6 +810,7 @@ class Ranks {
     double *per_particle = nullptr;
     double *sums = nullptr, *maxima = nullptr;
     int number_of_sums = 0, number_of_maxima = 0;
+    const std::vector<char> *chosen = nullptr;    // copies that count; null = all
   };
 
   // Waits until every rank has made the same call, then does it for all of them.
@@ -848,6 +849,8 @@ class Ranks {
     });
   }
 
+  void choose_copies() {}    // every host keeps its own choice
+
   void share_with_copies()
   {
     std::vector<double> owned(3 * static_cast<std::size_t>(particles_), 0.0);
@@ -884,10 +887,13 @@ class Ranks {
       const Share &share = shares_[rank];
       const std::size_t count = owned_only ? static_cast<std::size_t>(share.owned)
                                            : share.particles.size();
-      for (std::size_t i = 0; i < count; ++i)
+      const std::vector<char> *const chosen = arrays_[rank].chosen;
+      for (std::size_t i = 0; i < count; ++i) {
+        if (chosen && i >= static_cast<std::size_t>(share.owned) && !(*chosen)[i]) continue;
         for (std::size_t d = 0; d < 3; ++d)
           visit(arrays_[rank].per_particle[3 * i + d],
                 3 * static_cast<std::size_t>(share.particles[i]) + d);
+      }
     }
   }
 
@@ -911,8 +917,15 @@ class RankHost final : public Host {
  public:
   RankHost(Ranks &ranks, std::size_t rank) : ranks_(ranks), rank_(rank) {}
 
-  void sum_over_copies(double *per_particle, int stride) override { sum(per_particle, stride); }
-  void sum_over_copies(float *per_particle, int stride) override { sum(per_particle, stride); }
+  void sum_over_copies(double *per_particle) override { sum(per_particle, 3, nullptr); }
+
+  void choose_copies(const std::vector<char> &chosen) override
+  {
+    chosen_ = chosen;
+    ranks_.call("choose_copies", rank_, {}, &Ranks::choose_copies);
+  }
+  void sum_over_chosen_copies(double *per_particle) override { sum(per_particle, 4, &chosen_); }
+  void sum_over_chosen_copies(float *per_particle) override { sum(per_particle, 4, &chosen_); }
 
   void share_with_copies(double *per_particle) override
   {
@@ -930,7 +943,7 @@ class RankHost final : public Host {
   }
 
  private:
-  template <typename Real> void sum(Real *per_particle, int stride)
+  template <typename Real> void sum(Real *per_particle, int stride, const std::vector<char> *chosen)
   {
     const std::size_t count = ranks_.shares()[rank_].particles.size();
     std::vector<double> packed(3 * count);
@@ -938,6 +951,7 @@ class RankHost final : public Host {
       for (std::size_t d = 0; d < 3; ++d) packed[3 * i + d] = per_particle[stride * i + d];
     Ranks::Arrays arrays;
     arrays.per_particle = packed.data();
+    arrays.chosen = chosen;
     ranks_.call("sum_over_copies", rank_, arrays, &Ranks::sum_over_copies);
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t d = 0; d < 3; ++d)
@@ -946,6 +960,7 @@ class RankHost final : public Host {
 
   Ranks &ranks_;
   std::size_t rank_;
+  std::vector<char> chosen_;
 };
 
 // The bodies among a rank's particles. The first time that a particle is there counts as the
