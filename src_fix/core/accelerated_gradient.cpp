@@ -310,24 +310,18 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
             static_cast<Real>(step)};
   }
 
-  // Those in contacts of this rank, and all of a body of which a particle is: most copies are in none.
+  // Those in contacts of this rank, and all of a body of which one is. Most copies are in none.
   void choose_copies(const ContactProblem &problem, Host &host)
   {
+    std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
+    for (const Ends &ends : ends_) chosen[ends.first] = chosen[ends.second] = 1;
     const RigidBodies &rigid = problem.bodies;
-    needed_.assign(static_cast<std::size_t>(problem.particles) + 1, 0);
-    for (const Ends &ends : ends_) needed_[ends.first] = needed_[ends.second] = 1;
     for (std::size_t b = 0; b < rigid.size(); ++b) {
-      const auto begin = rigid.member.begin() + rigid.start[b];
-      const auto end = rigid.member.begin() + rigid.start[b + 1];
-      const bool any = std::any_of(begin, end, [this](int i) {
-        return needed_[i] != 0;
-      });
-      if (any)
-        std::for_each(begin, end, [this](int i) {
-          needed_[i] = 1;
-        });
+      char any = 0;
+      for (int k = rigid.start[b]; k < rigid.start[b + 1]; ++k) any |= chosen[rigid.member[k]];
+      for (int k = rigid.start[b]; k < rigid.start[b + 1]; ++k) chosen[rigid.member[k]] = any;
     }
-    host.choose_copies(needed_);
+    host.choose_copies(chosen);
   }
 
   void add_bodies(const ContactProblem &problem, double mobility_unit)
@@ -388,7 +382,6 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
   std::vector<Vector<Real>> normal_;
   std::vector<Real> diagonal_, impulse_, impulse_before_, gap_before_;
   std::vector<Real> inverse_mass_;
-  std::vector<char> needed_;    // per particle
   std::vector<Vector<Real>> sum_, velocity_, ahead_;
   std::vector<Body<Real>> bodies_;
   std::vector<Member<Real>> members_;

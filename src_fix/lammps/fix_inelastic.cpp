@@ -197,7 +197,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
   force_reneighbor = 1;
   next_reneighbor = -1;
   comm_forward = 3;
-  // LAMMPS sizes its buffers by these; most exchanges are of 3 values.
+  // LAMMPS sizes its buffers by these; most messages are shorter.
   comm_reverse = ContactMemory::packed_size(SHARED_PARTNERS);
   maxexchange_dynamic = 1;
   create_attribute = 1;
@@ -1425,7 +1425,7 @@ void FixInelastic::remember_contacts()
     memory_.remember(i, wall ? -wall : atom->tag[j], strength);
     if (!wall) memory_.remember(j, atom->tag[i], strength);
   }
-  exchange(Exchange::MEMORY, true, false, ContactMemory::packed_size(SHARED_PARTNERS));
+  exchange(Exchange::MEMORY, true, false);
   double most = 0.0;
   for (int i = 0; i < atom->nlocal; ++i)
     most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
@@ -1529,42 +1529,41 @@ bool FixInelastic::has_copies() const
 void FixInelastic::sum_over_copies(double *per_particle)
 {
   exchanged_ = per_particle;
-  exchange(Exchange::VECTORS, true, true, 3);
+  exchange(Exchange::VECTORS, true, true);
 }
 
 void FixInelastic::share_with_copies(double *per_particle)
 {
   exchanged_ = per_particle;
-  exchange(Exchange::VECTORS, false, true, 3);
+  exchange(Exchange::VECTORS, false, true);
 }
 
 void FixInelastic::choose_copies(const std::vector<char> &chosen)
 {
   chosen_copies_.begin(chosen);
-  exchange(Exchange::CHOICE, true, false, 1);
+  exchange(Exchange::CHOICE, true, false);
 }
 
 void FixInelastic::sum_over_chosen_copies(double *per_particle)
 {
   exchanged_ = per_particle;
-  exchange(Exchange::CHOSEN, true, true, 3);
+  exchange(Exchange::CHOSEN, true, true);
 }
 
 void FixInelastic::sum_over_chosen_copies(float *per_particle)
 {
   exchanged_single_ = per_particle;
-  exchange(Exchange::CHOSEN_SINGLE, true, true, 3);
+  exchange(Exchange::CHOSEN_SINGLE, true, true);
 }
 
-// Copies tell their originals, then the originals their copies; `size` is at most that many numbers
-// per atom.
-void FixInelastic::exchange(Exchange what, bool reverse, bool forward, int size)
+// `reverse`: copies tell their originals; `forward`, after that: originals tell their copies.
+void FixInelastic::exchange(Exchange what, bool reverse, bool forward)
 {
   if (!has_copies()) return;
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
   exchanging_ = what;
-  if (reverse) comm->reverse_comm(this, size);
-  if (forward) comm->forward_comm(this, size);
+  if (reverse) comm->reverse_comm(this);
+  if (forward) comm->forward_comm(this);
 }
 
 void FixInelastic::reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima)

@@ -188,7 +188,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void share_with_copies(double *) override;
   void reduce(double *, int, double *, int) override;
   bool has_copies() const;
-  void exchange(Exchange what, bool reverse, bool forward, int size);
+  void exchange(Exchange what, bool reverse, bool forward);
 
   // ConstraintSource
   long refine(const std::vector<double> &, inelastic::ContactProblem &) override;
