@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,10 @@ def command(*arguments: object, ranks: int = 0) -> list[str]:
     return [*job, sys.executable, "-m", "lammps_inelastic.workflow.main", *map(str, arguments)]
 
 
-def inelastic(*arguments: object, ranks: int = 0) -> subprocess.CompletedProcess[str]:
-    """Run `inelastic` to its end."""
+def inelastic(
+    *arguments: object, ranks: int = 0, preparation: Callable[[], None] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run `inelastic` to its end; the preparation comes first in its process."""
     return subprocess.run(
         command(*arguments, ranks=ranks),
         env=ENVIRONMENT,
@@ -40,6 +42,7 @@ def inelastic(*arguments: object, ranks: int = 0) -> subprocess.CompletedProcess
         text=True,
         timeout=PATIENCE,
         check=False,
+        preexec_fn=preparation,
     )
 
 

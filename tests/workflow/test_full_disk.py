@@ -21,7 +21,7 @@ from few_spheres import TINY
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.store import read_studies
 from small_disk import mounted
-from study_run import ENVIRONMENT, PATIENCE, command, inelastic
+from study_run import inelastic
 
 EXPORTS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
 # What each of them needs to be small: 30 spheres, and no more than 27,000 voxels.
@@ -58,15 +58,9 @@ def limit(size: int) -> Iterator[None]:
 
 def within(size: int, *arguments: object) -> subprocess.CompletedProcess[str]:
     """Run `inelastic` as a process where no file may grow beyond a size."""
-    return subprocess.run(
-        command(*arguments),
-        env=ENVIRONMENT,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
+    return inelastic(
+        *arguments,
+        preparation=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
     )
 
 
