@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 namespace inelastic {
@@ -37,9 +38,22 @@ namespace {
     Lanes lanes;
   };
 
+  // Where the vectors of a constraint's two particles are: in bytes, as addresses take them.
   struct Ends {
-    int first, second;
+    std::uint32_t first, second;
   };
+
+  template <typename Real>
+  inline __attribute__((always_inline)) auto &at(Vector<Real> *vectors, std::uint32_t offset)
+  { return reinterpret_cast<Vector<Real> *>(reinterpret_cast<char *>(vectors) + offset)->lanes; }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) const auto &at(const Vector<Real> *vectors,
+                                                       std::uint32_t offset)
+  {
+    return reinterpret_cast<const Vector<Real> *>(reinterpret_cast<const char *>(vectors) + offset)
+        ->lanes;
+  }
 
   // One iteration's pass over the constraints. Lengths are in units of Scales::length, velocities
   // in those of length / h, impulses in those of Scales::impulse.
@@ -73,24 +87,61 @@ namespace {
   {
     for (std::size_t c = begin; c < end; ++c) {
       const auto push = pass.normal[c].lanes * impulse[c];
-      pass.sum[pass.ends[c].first].lanes += push;
-      pass.sum[pass.ends[c].second].lanes -= push;
+      auto &first = at(pass.sum, pass.ends[c].first);
+      auto &second = at(pass.sum, pass.ends[c].second);
+      const auto first_sum = first + push, second_sum = second - push;
+      first = first_sum;
+      second = second_sum;
     }
+  }
+
+  // What a gap consists of, in the lanes of a vector.
+  template <typename Real>
+  inline __attribute__((always_inline)) void split_gap(const Pass<Real> &pass, std::size_t c,
+                                                       Vector<Real> &terms)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    const Ends &ends = pass.ends[c];
+    const Lanes opening = at(pass.velocity, ends.first) - at(pass.velocity, ends.second);
+    terms.lanes = pass.normal[c].lanes * (opening + Lanes{0, 0, 0, 1});
+  }
+
+  // The sums over the lanes of each of four vectors.
+  template <typename Real>
+  inline __attribute__((always_inline)) void add_up(const Vector<Real> *terms, Vector<Real> &sums)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    const Lanes &a = terms[0].lanes, &b = terms[1].lanes, &c = terms[2].lanes, &d = terms[3].lanes;
+    const Lanes ab = Lanes{a[0], b[0], a[1], b[1]} + Lanes{a[2], b[2], a[3], b[3]};
+    const Lanes cd = Lanes{c[0], d[0], c[1], d[1]} + Lanes{c[2], d[2], c[3], d[3]};
+    sums.lanes = Lanes{ab[0], ab[1], cd[0], cd[1]} + Lanes{ab[2], ab[3], cd[2], cd[3]};
+  }
+
+  // Gaps of a block, four at a time; up to three more are written than there are.
+  template <typename Real>
+  inline __attribute__((always_inline)) void gather(const Pass<Real> &pass, std::size_t begin,
+                                                    std::size_t end, Vector<Real> *gap)
+  {
+    Vector<Real> terms[4];
+    std::size_t c = begin;
+    for (; c + 4 <= end; c += 4, ++gap) {
+      for (std::size_t k = 0; k < 4; ++k) split_gap(pass, c + k, terms[k]);
+      add_up(terms, *gap);
+    }
+    if (c == end) return;
+    for (std::size_t k = 0; k < 4; ++k) split_gap(pass, std::min(c + k, end - 1), terms[k]);
+    add_up(terms, *gap);
   }
 
   template <typename Real>
   inline __attribute__((always_inline)) Passed advance(const Pass<Real> &pass)
   {
     Passed passed;
-    Real gap[BLOCK];
+    Vector<Real> gaps[(BLOCK + 3) / 4];
+    const Real *const gap = reinterpret_cast<const Real *>(gaps);
     for (std::size_t begin = 0; begin < pass.count; begin += BLOCK) {
       const std::size_t end = std::min(begin + BLOCK, pass.count);
-      for (std::size_t c = begin; c < end; ++c) {
-        const auto normal = pass.normal[c].lanes;
-        const auto along = normal *
-            (pass.velocity[pass.ends[c].first].lanes - pass.velocity[pass.ends[c].second].lanes);
-        gap[c - begin] = normal[3] + (along[0] + along[1] + along[2]);
-      }
+      gather(pass, begin, end, gaps);
       Real uphill = 0, change_squared = 0, curved = 0, least = 0, most = 0, heaviest = 0;
       const Real *const impulse = pass.impulse + begin;
       Real *const next = pass.impulse_before + begin;
@@ -150,8 +201,8 @@ namespace {
   {
     using Lanes = typename Vector<Real>::Lanes;
     for (std::size_t i = 0; i < m.count; ++i) {
-      const Real w = m.inverse_mass[i];
-      const Lanes next = m.sum[i].lanes * Lanes{w, w, w, 0};
+      Lanes next = m.sum[i].lanes * m.inverse_mass[i];
+      next[3] = 0;
       m.ahead[i].lanes = next + (next - m.velocity[i].lanes) * m.momentum;
       m.velocity[i].lanes = next;
       m.sum[i].lanes = Lanes{0, 0, 0, 0};
@@ -247,7 +298,8 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
     for (std::size_t k = 0; k < count; ++k) {
       const std::size_t c = source_[k];
       const double *const n = &contacts.normal[3 * c];
-      ends_[k] = {contacts.first[c], contacts.second[c]};
+      ends_[k] = {static_cast<std::uint32_t>(contacts.first[c] * sizeof(Vector<Real>)),
+                  static_cast<std::uint32_t>(contacts.second[c] * sizeof(Vector<Real>))};
       normal_[k].lanes = typename Vector<Real>::Lanes{
           static_cast<Real>(n[0]), static_cast<Real>(n[1]), static_cast<Real>(n[2]),
           static_cast<Real>(free_gap[c] * per_length)};
@@ -314,7 +366,8 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
   void choose_copies(const ContactProblem &problem, Host &host)
   {
     std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
-    for (const Ends &ends : ends_) chosen[ends.first] = chosen[ends.second] = 1;
+    for (const int i : problem.contacts.first) chosen[i] = 1;
+    for (const int i : problem.contacts.second) chosen[i] = 1;
     const RigidBodies &rigid = problem.bodies;
     for (std::size_t b = 0; b < rigid.size(); ++b) {
       char any = 0;

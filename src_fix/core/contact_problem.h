@@ -1,7 +1,7 @@
 // One step's projection problem.
 //
-//   minimise over V:   1/2 (V - V*)^T M (V - V*)      subject to   gap_c + h G_c . V >= 0  for all
-// c
+//   minimise over V:   1/2 (V - V*)^T M (V - V*)
+//   subject to         gap_c + h G_c . V >= 0      for all c
 //
 // V* predicted velocities, M the mass matrix, G_c V = n_c . (v_first - v_second). Its dual has one
 // impulse per constraint:
@@ -74,8 +74,7 @@ class GapOperator {
   void velocity_change(const ContactProblem &problem, const double *impulse, Host &host);
 
   std::vector<double> free_gap_;
-  std::vector<int>
-      free_particles_;            // those in no body, the dummy too; only where there are bodies
+  std::vector<int> free_particles_;    // in no body, the dummy too; only where there are bodies
   std::vector<double> change_;    // impulse, then velocity change, of each particle and the dummy
 };
 

@@ -37,7 +37,6 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
     result.iterations += solved.iterations;
     result.residual = solved.residual;
     result.converged = solved.converged;
-
     result.infeasible = solved.infeasible;
     result.round_off = solved.round_off;
 

@@ -6,18 +6,6 @@
 
 namespace inelastic {
 
-namespace {
-
-  // y = A x for a symmetric A in the order xx yy zz xy xz yz.
-  inline void multiply(const double *a, const double *x, double *y)
-  {
-    y[0] = a[0] * x[0] + a[3] * x[1] + a[4] * x[2];
-    y[1] = a[3] * x[0] + a[1] * x[1] + a[5] * x[2];
-    y[2] = a[4] * x[0] + a[5] * x[1] + a[2] * x[2];
-  }
-
-}    // namespace
-
 void RigidBodies::clear(int number_of_particles)
 {
   start.assign(1, 0);

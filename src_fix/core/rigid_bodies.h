@@ -18,6 +18,14 @@
 
 namespace inelastic {
 
+// y = A x for a symmetric A in the order xx yy zz xy xz yz.
+inline void multiply(const double *a, const double *x, double *y)
+{
+  y[0] = a[0] * x[0] + a[3] * x[1] + a[4] * x[2];
+  y[1] = a[3] * x[0] + a[1] * x[1] + a[5] * x[2];
+  y[2] = a[4] * x[0] + a[5] * x[1] + a[2] * x[2];
+}
+
 struct RigidBodies {
   std::vector<int> start;    // of each body's members, then the number of all: bodies + 1 numbers
   std::vector<int> originals;    // per body: how many of its members, the first, are originals

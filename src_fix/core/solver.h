@@ -1,9 +1,8 @@
 // Solvers of the projection problem (contact_problem.h). All work on the dual: they look for the
 // impulses, and are judged by the same residual, in units of length:
 //
-//   feasibility       max over all constraints of       -w_c      (overlap left at the end of the
-// step)
-//   complementarity   max over constraints with impulse of w_c    (gap left where a force acts)
+//   feasibility       max over all constraints of       -w_c    (overlap at the end of the step)
+//   complementarity   max over constraints with impulse of w_c  (gap left where a force acts)
 //
 // A solver takes its first guess from ContactSet::impulse if it warm-starts (what is negative there
 // counts as zero), and leaves its result there.

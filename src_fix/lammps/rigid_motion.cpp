@@ -15,6 +15,7 @@
 #include <numeric>
 
 using namespace LAMMPS_NS;
+using inelastic::multiply;
 
 namespace {
 
@@ -41,13 +42,6 @@ double dot(const double *a, const double *b)
 { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Symmetric matrices are xx yy zz xy xz yz.
-void multiply(const double *a, const double *x, double *y)
-{
-  y[0] = a[0] * x[0] + a[3] * x[1] + a[4] * x[2];
-  y[1] = a[3] * x[0] + a[1] * x[1] + a[5] * x[2];
-  y[2] = a[4] * x[0] + a[5] * x[1] + a[2] * x[2];
-}
-
 double trace(const double *a)
 { return a[0] + a[1] + a[2]; }
 

@@ -86,17 +86,28 @@ def compare(folder: Path, particles: int, diameter: float, seeds: int, time: flo
                 ]
                 for contacts in ("hard", "soft")
             )
-            fast = {run.values["start"]: run.number("plateau_seconds") for run in hard}
-            slow = {run.values["start"]: run.number("plateau_seconds") for run in soft}
-            ratios = [slow[start] / fast[start] for start in fast]
-            known = sum(map(math.isfinite, ratios))
+            times = _ratios(hard, soft, "plateau_seconds")
+            overlaps = _ratios(hard, soft, "overlap_at_rest")
+            # Soft steps go as the root of the stiffness, overlaps as one over it.
+            equal = [time * math.sqrt(depth) for time, depth in zip(times, overlaps, strict=True)]
+            known = sum(map(math.isfinite, times))
             print(
                 f"{name}, {tolerance:g} r (overlaps at rest: hard {_largest(hard)}, soft "
-                f"{_largest(soft)}): hard {spread(fast.values())} s to the plateau, soft "
-                f"{spread(slow.values())} s, {spread(ratios, '.3g')} times as long "
-                f"({known} of {seeds} starts)",
+                f"{_largest(soft)}): hard {_seconds(hard)} s to the plateau, soft "
+                f"{_seconds(soft)} s, {spread(times, '.3g')} times as long; at equal overlaps "
+                f"{spread(equal, '.3g')} times ({known} of {seeds} starts)",
                 flush=True,
             )
+
+
+def _ratios(hard: Sequence[Run], soft: Sequence[Run], name: str) -> list[float]:
+    """Return soft over hard, start by start."""
+    of_hard = {run.values["start"]: run.number(name) for run in hard}
+    return [run.number(name) / of_hard[run.values["start"]] for run in soft]
+
+
+def _seconds(runs: Sequence[Run]) -> str:
+    return spread(run.number("plateau_seconds") for run in runs)
 
 
 def _largest(runs: Sequence[Run]) -> str:
