@@ -365,6 +365,7 @@ template <typename Real> class AcceleratedProjectedGradient::Iterations {
   // Those in contacts of this rank, and all of a body of which one is. Most copies are in none.
   void choose_copies(const ContactProblem &problem, Host &host)
   {
+    if (!host.has_copies()) return;
     std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
     for (const int i : problem.contacts.first) chosen[i] = 1;
     for (const int i : problem.contacts.second) chosen[i] = 1;

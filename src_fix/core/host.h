@@ -13,6 +13,9 @@ class Host {
   // ranks own): add the copies' values to their owners, then give every copy its owner's sum.
   virtual void sum_over_copies(double *per_particle) = 0;
 
+  // Whether there are copies at all, on any rank: where not, none need be chosen.
+  virtual bool has_copies() const = 0;
+
   // The same for those copies alone that their rank has chosen, in the last call of choose_copies;
   // the values of the others are neither added nor replaced. Particles have 4 numbers each here, of
   // which the last has no meaning. `chosen` is per particle; what it says of owned ones has none.
@@ -34,6 +37,7 @@ class Host {
 class SerialHost final : public Host {
  public:
   void sum_over_copies(double *) override {}
+  bool has_copies() const override { return false; }
   void choose_copies(const std::vector<char> &) override {}
   void sum_over_chosen_copies(double *) override {}
   void sum_over_chosen_copies(float *) override {}

@@ -187,7 +187,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void sum_over_chosen_copies(float *) override;
   void share_with_copies(double *) override;
   void reduce(double *, int, double *, int) override;
-  bool has_copies() const;
+  bool has_copies() const override;
   void exchange(Exchange what, bool reverse, bool forward);
 
   // ConstraintSource

@@ -919,6 +919,7 @@ class RankHost final : public Host {
 
   void sum_over_copies(double *per_particle) override { sum(per_particle, 3, nullptr); }
 
+  bool has_copies() const override { return true; }
   void choose_copies(const std::vector<char> &chosen) override
   {
     chosen_ = chosen;
