@@ -246,9 +246,13 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
   copy_of_.clear();
   incomplete_.assign(nall, 0);
   std::string message;
+  std::vector<int> originals, copies, copy_of;
+  std::vector<double> nothing;
   for (const Group &group : groups) {
     const tagint id = molecule[order[group.begin]];
-    std::vector<int> originals, copies, copy_of;
+    originals.clear();
+    copies.clear();
+    copy_of.clear();
     for (std::size_t k = group.begin; k < group.end; ++k) {
       const int i = order[k];
       if (originals.empty() || tag[originals.back()] != tag[i]) {
@@ -272,7 +276,7 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
     for (int k = 0; k < number; ++k) copy_of_.push_back(k);
     copy_of_.insert(copy_of_.end(), copy_of.begin(), copy_of.end());
     originals.insert(originals.end(), copies.begin(), copies.end());
-    const std::vector<double> nothing(3 * originals.size() + 6, 0.0);
+    nothing.assign(3 * originals.size() + 6, 0.0);
     problem.bodies.add(originals.data(), nothing.data(), static_cast<int>(originals.size()), number,
                        0.0, nothing.data());
   }
