@@ -136,6 +136,8 @@ def test_sanitizers(name: str, ranks: int, tmp_path: Path, sanitized: Path, prel
     assert "Sanitizer" not in result.screen, result.screen[-5000:]
     assert result.status == 0, result.screen[-5000:]
     assert not result.errors
+    steps = sum(len(run["Step"]) for run in result.runs)
+    print(f"{name}, {ranks} ranks: no report of the sanitizers, {steps} lines of thermo output")
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -151,6 +153,7 @@ def test_sanitizers_when_something_is_refused(
     assert "runtime error" not in result.screen, result.screen[-5000:]
     assert "Sanitizer" not in result.screen, result.screen[-5000:]
     assert len(result.errors) == 1
+    print(f"{name}: refused, no report of the sanitizers")
 
 
 # A package of the system, which pip cannot install; the sanitizers above need only the compiler.
@@ -178,6 +181,7 @@ def test_valgrind(name: str, tmp_path: Path) -> None:
         if any("inelastic" in (frame.findtext("obj") or "") for frame in error.iter("frame"))
     ]
     assert not ours, ours[0][:3000]
+    print(f"{name}: {len(tree.findall('error'))} reports of memcheck, none of the plugin")
 
 
 GROWTH = """
@@ -215,9 +219,8 @@ def test_memory_does_not_grow(kind: str, ranks: int, tmp_path: Path) -> None:
         command = [str(BIN / "mpiexec"), "-bind-to", "core", "-n", str(ranks), *command]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    for rank in range(ranks):
-        before, after = json.loads((tmp_path / f"{rank}.json").read_text())
-        print(
-            f"{kind}, rank {rank} of {ranks}: {before} kB after 1,000 steps, {after} after 10,000"
-        )
+    memory = [json.loads((tmp_path / f"{rank}.json").read_text()) for rank in range(ranks)]
+    each = "; ".join(f"{before} and {after} kB" for before, after in memory)
+    print(f"{kind}, {ranks} ranks: memory after 1,000 and 10,000 steps {each}")
+    for before, after in memory:
         assert after - before <= GROWN

@@ -44,7 +44,10 @@ def test_contacts_and_neighbours_of_dimers(aspect_ratio: float, poured) -> None:
     packings = [poured(aspect_ratio, "random", seed) for seed in SEEDS]
     contacts = [packing.coordination_number.mean for packing in packings]
     neighbours = [packing.neighbours.mean for packing in packings]
-    print(f"L/d {aspect_ratio}: contacts {contacts}, neighbours {neighbours}")
+    print(
+        f"L/d {aspect_ratio}: contacts {np.round(contacts, 2)}, "
+        f"neighbours {np.round(neighbours, 2)}"
+    )
     assert abs(np.mean(contacts) - PAPER_Z) < PAPER_Z_TOLERANCE
     assert max(neighbours) < PAPER_Z
 
@@ -58,7 +61,11 @@ def test_no_memory_of_the_start(poured) -> None:
         # Of the mean square, from those of its root
         errors = [2 * o.components * o.standard_errors for o in found]
         directions[start] = squares, np.sqrt(np.sum(np.square(errors), axis=0)) / len(found)
-        print(start, np.sqrt(squares) / DIAMETER)
+    means = (
+        f"{start} {np.round(np.sqrt(squares) / DIAMETER, 3)}"
+        for start, (squares, _) in directions.items()
+    )
+    print(f"L/d 1.95, lengths along x, y, z in diameters from two starts: {', '.join(means)}")
     (random, random_error), (regular, regular_error) = directions.values()
     assert np.all(np.abs(random - regular) < FAR * np.hypot(random_error, regular_error))
     for squares, errors in directions.values():

@@ -47,8 +47,10 @@ def test_table_1(tmp_path: Path) -> None:
         packing = measure(folder)
         phi.append(100 * packing.packing_fraction.value)
         z.append(packing.coordination_number.mean)
-    print(f"phi {np.mean(phi):.2f} ± {np.std(phi, ddof=1):.2f}")
-    print(f"z {np.mean(z):.3f} ± {np.std(z, ddof=1):.3f}")
+    print(
+        f"1,000 spheres, {len(phi)} seeds: phi {np.mean(phi):.2f} ± {np.std(phi, ddof=1):.2f}, "
+        f"z {np.mean(z):.3f} ± {np.std(z, ddof=1):.3f}"
+    )
     standard_error = np.hypot(
         PAPER_PHI_STD / PAPER_RUNS**0.5, np.std(phi, ddof=1) / len(phi) ** 0.5
     )
@@ -66,8 +68,10 @@ def test_10000_spheres(tmp_path: Path) -> None:
     )
     packing = measure(tmp_path)
     counts = packing.coordination_number
-    print(f"phi {100 * packing.packing_fraction.value:.2f}, z {counts.mean:.3f}")
-    print(f"distribution of contacts {np.round(counts.distribution, 4)}")
+    print(
+        f"10,000 spheres: phi {100 * packing.packing_fraction.value:.2f}, z {counts.mean:.3f}, "
+        f"{100 * counts.distribution.max():.1f} % have {counts.distribution.argmax()} contacts"
+    )
     assert abs(100 * packing.packing_fraction.value - PHI_10000) < PHI_10000_TOLERANCE
     assert abs(counts.mean - Z_10000) < Z_10000_TOLERANCE
     assert counts.particles_with(0, 1) == 0
@@ -257,10 +261,12 @@ def test_projection_against_a_quadratic_programming_library(tight_records: list[
         off = np.linalg.norm(problem.arrays["velocity"] - reference, axis=1) / largest
         off_further = np.linalg.norm(further.velocity - reference, axis=1) / largest
         errors.append((np.sqrt(np.mean(off**2)), off_further.max()))
-        print(
-            f"step {int(problem.arrays['step'])}: {errors[-1][0]:.1e} of the largest predicted "
-            f"velocity in the mean, {off.max():.1e} at most, solved further {errors[-1][1]:.1e}"
-        )
+    steps = ", ".join(str(int(problem.arrays["step"])) for problem in tight_records)
+    print(
+        f"projections of steps {steps}: off by "
+        f"{', '.join(f'{mean:.1e}' for mean, _ in errors)} of the largest predicted velocity in "
+        f"the mean, at most {max(most for _, most in errors):.1e} when solved further"
+    )
     # What the library leaves is about 1e-7 of the largest velocity.
     assert max(mean for mean, _ in errors) < 2e-7
     assert max(most for _, most in errors) < 1e-6
@@ -279,6 +285,7 @@ def test_kinetic_energy_and_momentum(tmp_path: Path) -> None:
             "steps_measuring": 0,
         },
     )
+    largest = 0.0
     for path in records(tmp_path):
         problem = read_record(path)
         a = problem.arrays
@@ -295,3 +302,8 @@ def test_kinetic_energy_and_momentum(tmp_path: Path) -> None:
         change = (mass * (after - before)).sum(axis=0)
         size = float(np.abs(mass * before).sum()) + float(a["impulse"].sum())
         assert np.allclose(change, from_walls, rtol=0, atol=1e-13 * size)  # round-off of the sums
+        largest = max(largest, np.abs(change - from_walls).max() / size)
+    print(
+        f"1,000 spheres, {len(records(tmp_path))} steps: no energy from nothing, momentum kept to "
+        f"{largest:.1e}"
+    )
