@@ -434,6 +434,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
 
   spread_at_start_ = spread_since_build(nullptr);
   inelastic::ProjectionResult result;
+  bool no_room = false;    // for certain, in this step as long as it was at first
   while (true) {
     worst_.clear();
     // Where the list cannot reach as far as atoms would move there is no use in solving first.
@@ -453,13 +454,14 @@ void FixInelastic::advance(int vflag, double kick_steps)
       record_problem(result);
     if (bad_overlap_) push_apart(result);
     if (!result.converged || !result.complete) {
+      no_room = no_room || result.infeasible;
       // Where the gaps at the end of the step were not to be had, those of a shorter one may be.
       if (shorten_ && (relinearised_ || result.infeasible) &&
           update->dt > SHORTEST_UNSOLVED * regular_timestep_) {
         shorten_step(0.5);
         continue;
       }
-      unconverged(result);
+      unconverged(result, no_room);
     }
     if (!list_reaches(motion())) {
       if (!shorten_ || spread_at_start_ >= list_reach_) {
@@ -1697,17 +1699,21 @@ void FixInelastic::note_worst(const inelastic::ProjectionResult &result)
   MPI_Bcast(worst_.data(), length, MPI_CHAR, worst.rank, world);
 }
 
-void FixInelastic::unconverged(const inelastic::ProjectionResult &result)
+void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool no_room)
 {
   // Up to here a residual can come down, but need not.
   constexpr double NEAR_ROUND_OFF = 10.0;
   ++run_unconverged_;
   const std::string named = worst_.empty() ? "" : ": " + worst_;    // numbers may not be finite
   std::string message, cause;
-  if (result.infeasible) {
-    message = fmt::format("step {}: no velocities keep the surfaces apart{}, where {:.4g} is "
+  if (no_room) {
+    const std::string shorter = result.infeasible
+        ? ""
+        : fmt::format(", and {} iterations found none for a time step of only {:.3g}",
+                      result.iterations, update->dt);
+    message = fmt::format("step {}: no velocities keep the surfaces apart{}{}, where {:.4g} is "
                           "allowed",
-                          update->ntimestep, named, tolerance_);
+                          update->ntimestep, shorter, named, tolerance_);
     cause = "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
             "are too many spheres";
   } else {

@@ -249,7 +249,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void tally_virial(int i, int j, const double *virial);
   void share_virial();
   void note_worst(const inelastic::ProjectionResult &);
-  void unconverged(const inelastic::ProjectionResult &);
+  void unconverged(const inelastic::ProjectionResult &, bool no_room);
   void fail_together(const std::string &message);
   std::vector<double> gather(std::vector<double> mine) const;
   double mass(int i) const;

@@ -604,7 +604,8 @@ def test_no_room(name: str, ranks: int, options: str, tmp_path: Path) -> None:
     assert "leaves no room" in error
     assert float(found[2]) > EPS
     assert seconds < 60  # not minutes, on a busy machine either
-    if not options:
+    # With shorter steps spheres can be so fast in the end that nothing is certain.
+    if not options or name != "spheres":
         assert certain, error
     if name == "one sphere" and not options:
         # The lid comes down by 0.015 in this step, the sphere and the floor share what is missing.
