@@ -348,6 +348,8 @@ void FixInelastic::post_neighbor()
 void FixInelastic::setup(int vflag)
 {
   expecting_ = false;
+  // Without diameters a run sets up bodies of point masses, and does no more.
+  if (rigid_ && largest_radius_ == 0.0) return;
   if (rigid_) {
     rigid_->measure(problem_);
     fail_together(rigid_->disagreement(problem_));
