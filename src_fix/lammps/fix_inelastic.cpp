@@ -354,6 +354,7 @@ void FixInelastic::setup(int vflag)
     rigid_->measure(problem_);
     fail_together(rigid_->disagreement(problem_));
   }
+  check_volume();
   advance(vflag, 0.5);
   if (!rigid_) return;
   // Fix rigid/small takes the forces of its first half kick in its own setup. Where it is defined
@@ -362,6 +363,28 @@ void FixInelastic::setup(int vflag)
     if (fix == this) return;
     if (fix == rigid_->fix()) return fix->setup(vflag);
   }
+}
+
+// Far too many spheres would be found out too, but only after very long solves. Those in bodies and
+// frozen ones may overlap one another, and out of a box without walls they may be pushed.
+void FixInelastic::check_volume()
+{
+  const bool closed = !domain->nonperiodic || (walls_ && domain->nonperiodic == 1);
+  if (warn_only_ || !closed || domain->dimension == 2) return;
+  const double unit_sphere = 4.0 / 3.0 * std::acos(-1.0);
+  double volume = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if ((atom->mask[i] & groupbit) && !(atom->mask[i] & frozen_bit_) && !is_member(i))
+      volume += unit_sphere * std::pow(atom->radius[i], 3);
+  reduce(&volume, 1, nullptr, 0);
+  // Centres are in the box.
+  const double widest = 2.0 * largest_radius_;
+  const double room = (domain->xprd + widest) * (domain->yprd + widest) * (domain->zprd + widest);
+  if (volume > room)
+    error->all(FLERR,
+               "Fix inelastic: the scene leaves no room for the spheres: they have a volume of "
+               "{:.4g}, the box of {:.4g}. Fewer or smaller ones, or a larger box, are needed",
+               volume, domain->xprd * domain->yprd * domain->zprd);
 }
 
 void FixInelastic::post_force(int vflag)

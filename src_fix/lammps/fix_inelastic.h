@@ -196,6 +196,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   // One step
   void advance(int vflag, double kick_steps);
   void check_expected();
+  void check_volume();
   void predict(double kick_steps);
   void collect();
   inelastic::ProjectionResult project(long max_iterations);

@@ -55,6 +55,8 @@ def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
         ({"dt": 0}, "timestep greater than 0"),
         # 1,000 spheres of this size fill the container more than completely.
         ({"diameter": 0.22}, "leaves no room"),
+        # So many that no solver needs to be asked: 100,000 pi / 6 x 0.11^3 = 69.7.
+        ({"particles": 100000}, "a volume of 69.69, the box of 5"),
     ],
 )
 def test_wrong_parameters(
