@@ -16,7 +16,7 @@ void ContactSet::add(int first_particle, int second_particle, const double *unit
 {
   first.push_back(first_particle);
   second.push_back(second_particle);
-  normal.insert(normal.end(), unit_normal, unit_normal + 3);
+  for (int d = 0; d < 3; ++d) normal.push_back(unit_normal[d]);
   gap.push_back(gap_value);
   impulse.push_back(impulse_guess);
 }

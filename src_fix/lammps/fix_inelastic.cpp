@@ -45,6 +45,7 @@ constexpr double EXPECTED_RELATIVE =
 constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon();
 constexpr double SIMILAR_RADII = 1.1;    // up to here one cutoff for all pairs wastes little
 
+constexpr double NEAR = 0.2;             // of the largest radius: pairs to be looked at again
 constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
 constexpr double EXTREME = 1.0e300;      // below or above every value that is compared
 constexpr int SHARED_PARTNERS = 16;    // that a copy tells its owner; more lose only a first guess
@@ -89,14 +90,15 @@ bool ends_beyond(double reach, const double *away, double h, const double *openi
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), first_list_of_run_(false),
-    list_(nullptr), margin_(-1.0), came_back_(false), relinearised_(false), relinearisations_(0),
-    phase_(Phase::CONTACT), bad_overlap_(false), pushed_before_(false), state_(nullptr),
-    largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
-    regular_timestep_(0.0), setting_timestep_(false), expecting_(false), kick_(0.0),
-    largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
-    run_iterations_(0.0), run_largest_overlap_(0.0), run_largest_excess_(0.0), run_steps_(0),
-    run_unconverged_(0), run_shortened_(0), run_constraint_iterations_(0.0),
-    exchanging_(Exchange::VECTORS), exchanged_(nullptr), exchanged_single_(nullptr)
+    list_(nullptr), margin_(-1.0), came_back_(false), relinearised_(false), looked_(false),
+    relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false), pushed_before_(false),
+    state_(nullptr), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
+    spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false),
+    expecting_(false), kick_(0.0), largest_kick_(0.0), output_{}, wall_force_step_(-1),
+    max_atoms_(0), max_contacts_(0), run_iterations_(0.0), run_largest_overlap_(0.0),
+    run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0), run_shortened_(0),
+    run_constraint_iterations_(0.0), exchanging_(Exchange::VECTORS), exchanged_(nullptr),
+    exchanged_single_(nullptr)
 {
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
@@ -583,7 +585,7 @@ void FixInelastic::collect()
   bad_overlap_ = false;
   output_[OVERLAP] = output_[EXCESS] = 0.0;
   relinearisations_ = 0;
-  came_back_ = relinearised_ = false;
+  came_back_ = relinearised_ = looked_ = false;
   collect_pairs();
   if (!walls_->empty()) collect_walls();
 
@@ -693,41 +695,51 @@ void FixInelastic::note_overlap(double gap)
 }
 
 // Looks at the walls from where atoms are, as far as the step takes them.
-std::vector<RegionWalls::Look> FixInelastic::looks(const double *velocity, double beyond) const
+const std::vector<RegionWalls::Look> &FixInelastic::looks(const double *velocity, double beyond)
 {
-  std::vector<RegionWalls::Look> looks;
+  looks_.clear();
   const double h = problem_.timestep;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (problem_.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
-    const double *const v = velocity + 3 * i;
-    looks.push_back({i, {x[0], x[1], x[2]}, atom->radius[i] + beyond + h * norm(v)});
+    const double reach = atom->radius[i] + beyond + h * norm(velocity + 3 * i);
+    if (reach >= clear_of_walls_[i]) looks_.push_back({i, {x[0], x[1], x[2]}, reach});
   }
-  return looks;
+  return looks_;
 }
 
 // Looks from where the step takes those atoms for which the constraint of a wall may be inexact.
-std::vector<RegionWalls::Look> FixInelastic::looks_at_end(const std::vector<double> &velocity) const
+const std::vector<RegionWalls::Look> &
+FixInelastic::looks_at_end(const std::vector<double> &velocity)
 {
   const std::vector<double> &moved = rigid_ ? rigid_->motion() : velocity;
-  std::vector<RegionWalls::Look> looks;
+  looks_.clear();
   const double h = problem_.timestep;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (problem_.inverse_mass[i] == 0.0 || (walls_->exact() && !is_member(i))) continue;
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
     const double reach = atom->radius[i] + (rigid_ ? margin_ : 0.0);
-    looks.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
+    if (reach + h * norm(v) < clear_of_walls_[i]) continue;
+    looks_.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
   }
-  return looks;
+  return looks_;
 }
 
 void FixInelastic::collect_walls()
 {
   const double *const velocity = problem_.predicted_velocity.data();
+  // A look further than needed tells for most atoms that no other is, in this step. (Not where parts
+  // of a region hide others.)
+  const double further = walls_->exact() ? 2.0 * largest_radius_ : 0.0;
+  clear_of_walls_.assign(atom->nlocal, 0.0);
+  const std::vector<RegionWalls::Look> &far = looks(velocity, margin_ + further);
+  if (walls_->exact())
+    for (const RegionWalls::Look &look : far) clear_of_walls_[look.atom] = look.reach;
   walls_->view(
-      looks(velocity, margin_), false,
+      far, false,
       [&](const RegionWalls::Look &look, const WallView &view) {
+        clear_of_walls_[look.atom] = 0.0;
         const double gap = view.distance - atom->radius[look.atom];
         note_overlap(view.distance_now - atom->radius[look.atom]);
         const double opening = problem_.timestep * dot(view.normal, velocity + 3 * look.atom);
@@ -774,6 +786,8 @@ long FixInelastic::refine(const std::vector<double> &velocity, inelastic::Contac
   return added + relinearised;
 }
 
+// After the first look of a step only pairs that were near each other then need another one, as long
+// as no end of the step has moved far since.
 long FixInelastic::add_violated_pairs(const std::vector<double> &velocity)
 {
   const double *const *const x = atom->x;
@@ -786,19 +800,50 @@ long FixInelastic::add_violated_pairs(const std::vector<double> &velocity)
       away[d] = x[i][d] - x[j][d] + h * (moved[3 * i + d] - moved[3 * j + d]);
     return dot(away, away);
   };
-  const std::size_t before = problem_.contacts.size();
-  for_each_listed_pair([&](std::size_t slot, int i, int j) {
-    if (listed_pair_taken_[slot]) return;
+  auto stays_apart = [&](int i, int j, double distance) {
     const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
     const double opening[3] = {velocity[3 * i] - velocity[3 * j],
                                velocity[3 * i + 1] - velocity[3 * j + 1],
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
+    return ends_beyond(distance, away, h, opening) &&
+        !(rigid_ && square_at_end(i, j) < distance * distance);
+  };
+  const std::size_t before = problem_.contacts.size();
+  auto look_at = [&](std::size_t slot, int i, int j) {
     const double touching = radius[i] + radius[j] - tolerance_;
-    const bool apart = ends_beyond(touching, away, h, opening) &&
-        !(rigid_ && square_at_end(i, j) < touching * touching);
-    if (!apart && !is_entangled(i, j)) take_pair(slot, i, j);
-  });
+    if (!stays_apart(i, j, touching) && !is_entangled(i, j)) take_pair(slot, i, j);
+  };
+  const double near = NEAR * largest_radius_;
+  if (looked_ && 2.0 * h * change_since_look(velocity) < near) {
+    for (const NearPair &pair : near_pairs_)
+      if (!listed_pair_taken_[pair.slot]) look_at(pair.slot, pair.first, pair.second);
+  } else {
+    near_pairs_.clear();
+    for_each_listed_pair([&](std::size_t slot, int i, int j) {
+      if (listed_pair_taken_[slot] || stays_apart(i, j, radius[i] + radius[j] + near)) return;
+      near_pairs_.push_back({slot, i, j});
+      look_at(slot, i, j);
+    });
+    looked_ = true;
+    velocity_looked_at_ = velocity;
+    if (rigid_) motion_looked_at_ = motion();
+  }
   return static_cast<long>(problem_.contacts.size() - before);
+}
+
+// Largest change of a velocity, or of a motion, since all pairs were looked at.
+double FixInelastic::change_since_look(const std::vector<double> &velocity) const
+{
+  auto largest = [](const std::vector<double> &a, const std::vector<double> &b) {
+    double most = 0.0;
+    for (std::size_t k = 0; k < a.size(); k += 3) {
+      const double change[3] = {a[k] - b[k], a[k + 1] - b[k + 1], a[k + 2] - b[k + 2]};
+      most = std::max(most, dot(change, change));
+    }
+    return std::sqrt(most);
+  };
+  const double change = largest(velocity, velocity_looked_at_);
+  return rigid_ ? std::max(change, largest(motion(), motion_looked_at_)) : change;
 }
 
 long FixInelastic::add_violated_walls(const std::vector<double> &velocity)
@@ -942,7 +987,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     origin_.push_back({view.wall, gap_now, atom->radius[i], wall_motion});
   };
 
-  const std::vector<RegionWalls::Look> ends = looks_at_end(velocity);
+  const std::vector<RegionWalls::Look> &ends = looks_at_end(velocity);
   const bool inexact_only = !rigid_;
   std::vector<RegionWalls::Look> beyond;
   walls_->view(

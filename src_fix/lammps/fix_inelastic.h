@@ -100,6 +100,15 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::vector<Origin> origin_;
   std::vector<char> listed_pair_taken_;    // per pair of the neighbour list: is it in the problem?
   std::unordered_map<std::uint64_t, std::size_t> wall_constraint_;    // atom and wall -> constraint
+  struct NearPair {
+    std::size_t slot;    // in listed_pair_taken_
+    int first, second;
+  };
+  std::vector<NearPair> near_pairs_;    // when all pairs were looked at ...
+  bool looked_;                         // ... in this step, ...
+  std::vector<double> velocity_looked_at_, motion_looked_at_;    // ... with these
+  std::vector<RegionWalls::Look> looks_;                         // room for them
+  std::vector<double> clear_of_walls_;    // per local atom: in this step no wall is as near as this
   double margin_;           // what comes closer than this is in the problem from the start
   bool came_back_;          // for constraints that were not in the problem from the start
   bool relinearised_;       // about the end of the step, any of them
@@ -222,12 +231,13 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void take_pair(std::size_t slot, int i, int j);
   void take_wall(const RegionWalls::Look &, const WallView &);
   long add_violated_pairs(const std::vector<double> &velocity);
+  double change_since_look(const std::vector<double> &velocity) const;
   long add_violated_walls(const std::vector<double> &velocity);
   long relinearise_pairs(const std::vector<double> &velocity);
   long relinearise_walls(const std::vector<double> &velocity);
   std::vector<RegionWalls::Look> last_inside(const std::vector<RegionWalls::Look> &beyond);
-  std::vector<RegionWalls::Look> looks(const double *velocity, double beyond) const;
-  std::vector<RegionWalls::Look> looks_at_end(const std::vector<double> &velocity) const;
+  const std::vector<RegionWalls::Look> &looks(const double *velocity, double beyond);
+  const std::vector<RegionWalls::Look> &looks_at_end(const std::vector<double> &velocity);
   bool same_plane(std::size_t c, const double *normal) const;
   double effective_gap(double gap_now, double size) const;
   double wanted_gap(double gap_now, double size) const;

@@ -215,46 +215,46 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
     linear_[3 * i] = body[i] >= 0 && (atom->mask[i] & groupbit) ? 1.0 : 0.0;
   host.share_with_copies(linear_.data());
 
-  std::vector<int> order;
-  for (int i = 0; i < nall; ++i)
-    if (linear_[3 * i] > 0.0) order.push_back(i);
+  // The spheres of a body as a chain, and bodies in the order of their first ones: what is near in
+  // space is near in memory.
+  constexpr int NONE = -1;
   const tagint *const molecule = atom->molecule;
   const tagint *const tag = atom->tag;
-  std::sort(order.begin(), order.end(), [&](int a, int b) {
-    if (molecule[a] != molecule[b]) return molecule[a] < molecule[b];
-    if (tag[a] != tag[b]) return tag[a] < tag[b];
-    return a < b;    // the owned sphere before its copies
-  });
-  // Bodies in the order of their spheres: what is near in space is near in memory.
-  struct Group {
-    int earliest;
-    std::size_t begin, end;    // in `order`
-  };
-  std::vector<Group> groups;
-  for (std::size_t begin = 0, end; begin < order.size(); begin = end) {
-    Group group = {order[begin], begin, begin};
-    for (end = begin; end < order.size() && molecule[order[end]] == molecule[order[begin]]; ++end)
-      group.earliest = std::min(group.earliest, order[end]);
-    group.end = end;
-    groups.push_back(group);
+  tagint largest_id = 0;
+  for (int i = 0; i < nall; ++i)
+    if (linear_[3 * i] > 0.0) largest_id = std::max(largest_id, molecule[i]);
+  std::vector<int> first_spheres, next(nall, NONE);
+  if (last_sphere_.size() <= static_cast<std::size_t>(largest_id))
+    last_sphere_.resize(static_cast<std::size_t>(largest_id) + 1, NONE);
+  for (int i = 0; i < nall; ++i) {
+    if (!(linear_[3 * i] > 0.0)) continue;
+    int &before = last_sphere_[molecule[i]];
+    if (before == NONE)
+      first_spheres.push_back(i);
+    else
+      next[before] = i;
+    before = i;
   }
-  std::sort(groups.begin(), groups.end(), [](const Group &a, const Group &b) {
-    return a.earliest < b.earliest;
-  });
 
   problem.bodies.clear(nall);
   copy_of_.clear();
   incomplete_.assign(nall, 0);
   std::string message;
-  std::vector<int> originals, copies, copy_of;
+  std::vector<int> spheres, originals, copies, copy_of;
   std::vector<double> nothing;
-  for (const Group &group : groups) {
-    const tagint id = molecule[order[group.begin]];
+  for (const int first_sphere : first_spheres) {
+    const tagint id = molecule[first_sphere];
+    last_sphere_[id] = NONE;
+    spheres.clear();
+    for (int i = first_sphere; i != NONE; i = next[i]) spheres.push_back(i);
+    // The owned sphere before its copies.
+    std::sort(spheres.begin(), spheres.end(), [&](int a, int b) {
+      return tag[a] != tag[b] ? tag[a] < tag[b] : a < b;
+    });
     originals.clear();
     copies.clear();
     copy_of.clear();
-    for (std::size_t k = group.begin; k < group.end; ++k) {
-      const int i = order[k];
+    for (const int i : spheres) {
       if (originals.empty() || tag[originals.back()] != tag[i]) {
         originals.push_back(i);
       } else {
@@ -265,7 +265,7 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
     const int number = static_cast<int>(originals.size());
     const bool known = id < static_cast<tagint>(spheres_in_.size());
     if (!known || number != spheres_in_[id]) {
-      for (std::size_t k = group.begin; k < group.end; ++k) incomplete_[order[k]] = 1;
+      for (const int i : spheres) incomplete_[i] = 1;
       for (const int i : originals)
         if (i < nlocal)
           message = fmt::format("the body of molecule {} has {} spheres, of which a rank sees {}: "

@@ -147,6 +147,7 @@ class RigidMotion : protected Pointers {
   Inertia inertia_;
   Fix *fix_;
   std::vector<int> spheres_in_;     // per molecule ID, all ranks
+  std::vector<int> last_sphere_;    // per molecule ID: room for find_bodies, -1 = none
   std::vector<int> copy_of_;        // per member: which of the body's originals it is
   std::vector<Body> bodies_;        // beside those of the problem
   std::vector<char> incomplete_;    // per particle: of a body of which this rank has only a part

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,6 +29,13 @@ def three_times(given: Problem) -> Problem:
     return given.with_contacts(np.repeat(np.arange(given.gap.size), 3))
 
 
+def lopsided(given: Problem, seed: int) -> Problem:
+    """Give the bodies inertias that have nothing to do with where their spheres are."""
+    root = np.random.default_rng(seed).normal(size=given.bodies.inverse_inertia.shape)
+    inertia = root @ root.transpose(0, 2, 1) + np.eye(3)
+    return replace(given, bodies=replace(given.bodies, inverse_inertia=inertia))
+
+
 PAIRS = [2] * 25  # and 10 single spheres
 MIXED = [2] * 8 + [3] * 8 + [4] * 8  # and 28 single spheres
 
@@ -45,6 +54,7 @@ PROBLEMS = {
     "dense crystal, every contact three times": three_times(dense_crystal(4, 14)),
     **{f"dimers, overlapping {k}": heap(20 + k, bodies=PAIRS, overlap=0.002) for k in range(3)},
     **{f"solid dimers {k}": heap(23 + k, bodies=PAIRS, radius=0.5) for k in range(3)},
+    **{f"lopsided dimers {k}": lopsided(heap(43 + k, bodies=PAIRS), k) for k in range(3)},
     **{f"trimers {k}": heap(26 + k, bodies=[3] * 18) for k in range(3)},
     **{f"tetrahedra {k}": heap(29 + k, bodies=[4] * 13) for k in range(3)},
     **{f"mixed, frozen {k}": heap(32 + k, 100, bodies=MIXED, frozen=8) for k in range(3)},
