@@ -28,9 +28,11 @@ using namespace FixConst;
 
 namespace {
 
-constexpr int MAX_ROUNDS = 100;             // of adding constraints; a handful is usual
-constexpr int MAX_RELINEARISATIONS = 20;    // per step; each one squares the error
-constexpr double REGULAR_OVERLAP = 2.0;     // in eps; more is a bad start
+constexpr int MAX_ROUNDS = 100;    // of adding constraints; a handful is usual
+// Per step. Each one squares the error where a body turns little; one that turns by a radian takes
+// up to twenty.
+constexpr int MAX_RELINEARISATIONS = 40;
+constexpr double REGULAR_OVERLAP = 2.0;    // in eps; more is a bad start
 constexpr double PUSH_LIMIT =
     0.05;    // of the sum of radii, per regular step, out of a bad overlap
 constexpr double RELINEARISE_BEYOND = 1.1;    // in eps, overlap at the end of the step
@@ -917,22 +919,18 @@ bool FixInelastic::ends_too_deep(double gap_now, double size, double gap_at_end)
 
 // Sets the gap of a constraint to one that is exact for the present velocity, or to the linearised
 // one if that is smaller. One that was set for an earlier velocity is set again, so that no force
-// keeps apart what has moved on meanwhile. (Not of bodies that spin fast: it would take many rounds,
-// for nothing, because their next step is another matter.) Returns how many constraints changed.
+// keeps apart what has moved on meanwhile, and the step does not depend on how it was found. Returns
+// how many constraints changed.
 long FixInelastic::follow(std::size_t c, double exact_gap, bool too_deep)
 {
-  constexpr double SLOW = 0.5;    // turn in a step [radians]
   inelastic::ContactSet &contacts = problem_.contacts;
   Origin &origin = origin_[c];
   const double linear_gap = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
   const double gap = std::min(exact_gap, linear_gap);
   if (!too_deep) {
-    const bool is_wall = origin.wall != 0;
     const bool worth_it = contacts.impulse[c] > 0.0 &&
         gap - contacts.gap[c] > RELINEARISE_BEYOND * tolerance_ &&
-        relinearisations_ <= MAX_RELINEARISATIONS / 2 &&
-        rigid_->angle(problem_, contacts.first[c]) < SLOW &&
-        (is_wall || rigid_->angle(problem_, contacts.second[c]) < SLOW);
+        relinearisations_ <= MAX_RELINEARISATIONS / 2;
     if (!worth_it) return 0;
   }
   contacts.gap[c] = gap;
@@ -984,7 +982,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     ++changed;
     wall_constraint_[wall_key(i, view.wall)] = problem_.contacts.size();
     problem_.contacts.add(i, problem_.particles, view.normal, gap, 0.0);
-    origin_.push_back({view.wall, gap_now, atom->radius[i], wall_motion});
+    origin_.push_back({view.wall, gap_now, atom->radius[i], wall_motion, is_member(i)});
   };
 
   const std::vector<RegionWalls::Look> &ends = looks_at_end(velocity);

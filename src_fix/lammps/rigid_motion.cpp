@@ -502,13 +502,6 @@ void RigidMotion::turn(const inelastic::ContactProblem &problem,
   }
 }
 
-double RigidMotion::angle(const inelastic::ContactProblem &problem, int i) const
-{
-  if (!is_member(problem, i)) return 0.0;
-  const double *const q = bodies_[problem.bodies.body[i]].turned;
-  return 2.0 * std::atan2(std::sqrt(dot(q + 1, q + 1)), std::abs(q[0]));
-}
-
 void RigidMotion::velocity_after(const inelastic::ContactProblem &problem, int i,
                                  double *velocity) const
 {

@@ -159,12 +159,12 @@ def test_fall_impact_and_rest(
 def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
     """Steps that are far too long, and may not be shortened."""
     largest = 0.0
-    for mixture in ("dimers-2", "rods", "mixture"):
+    for mixture in ("dimers-1.5", "dimers-2", "rods", "mixture"):
         folder = tmp_path / mixture
         deck = pour(
             mixture,
-            "cylinder",
-            "point",
+            "block",
+            "solid",
             10,
             folder,
             fixes="fix drag all viscous 0.004",
@@ -172,7 +172,7 @@ def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
             timestep=0.05,
         )
         result = lmp(deck + DUMP_BODY_SPHERES + "run 40\n", into=mixture)
-        overlap = np.maximum(*overlaps(folder, "cylinder"))
+        overlap = np.maximum(*overlaps(folder, "block"))
         assert result.thermo["f_contact[4]"] == pytest.approx(overlap, abs=1e-6 * EPS)
         regular = overlap[:-1] <= 2 * EPS * SLACK
         excess = result.thermo["f_contact[11]"][:-1]

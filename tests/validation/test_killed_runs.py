@@ -127,3 +127,21 @@ def test_killed_at_random_steps(
         "apart"
     )
     assert max(far) <= 0.0005
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_from_the_restart_file_of_any_step(
+    kind: str, undisturbed: dict[str, FloatArray], tmp_path: Path
+) -> None:
+    """A run starts with half a kick: it must find the same step from another prediction."""
+    deck = SCENES[kind](tmp_path)
+    run_lmp(tmp_path, f"{deck}restart 1 whole.*.restart\nrun {STEPS}\n")
+    far = []
+    for step in range(1, STEPS):
+        second = deck.replace("read_data spheres.data", f"read_restart whole.{step}.restart")
+        run_lmp(tmp_path, second + of_spheres.DUMP_LAST + f"run {STEPS - step}\n")
+        apart = np.abs(of_spheres.last_positions(tmp_path) - undisturbed[kind]).max()
+        far.append(apart / of_spheres.RADIUS)
+    worst = int(np.argmax(far))
+    print(f"{kind}, from each of {STEPS - 1} steps: at most {far[worst]:.2g} r apart ({worst + 1})")
+    assert max(far) <= 0.0005
