@@ -36,7 +36,7 @@ BODIES: list[Cut] = [
     ),
     (FIX, "rigid_ = std::make_unique<RigidMotion>(", "(void) std::make_unique<RigidMotion>("),
     ("src_fix/core/rigid_bodies.h", "return inverse_mass.empty();", "return true;"),
-    (CORE, "if (!bodies_.empty()) turn_all(", "if (false) turn_all("),
+    (CORE, "if (!rods_.empty() || !bodies_.empty()) turn_all(", "if (false) turn_all("),
 ]
 WALLS: list[Cut] = [("src_fix/lammps/region_walls.h", "return ids_.empty();", "return true;")]
 OUTPUT: list[Cut] = [
