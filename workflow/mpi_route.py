@@ -36,6 +36,8 @@ REFUSED, ENDED = "the_deck_has_refused", "the_deck_has_ended"
 CUT_SHORT = "Wall time limit reached"
 # Ranks that wait do not keep their cores busy.
 SLEEP = 0.02
+# [s] An abort makes the launcher drop what it has not yet passed on.
+HEARD = 0.5
 NOTHING, RUN, MEASURE = 0, 1, 2
 
 
@@ -64,6 +66,7 @@ def run_in_job(
                 if world.size > 1:
                     # Such as a full disk. The other ranks would wait for this one for ever.
                     print(f"inelastic: {case.name}: {_last(error)}", file=sys.stderr, flush=True)
+                    time.sleep(HEARD)
                     world.Abort(2)
                 raise
         elif group.agree(NOTHING) == RUN:
@@ -161,6 +164,7 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
                 if group.ranks.size > 1:
                     # The other ranks of the group wait for this one for ever.
                     print(f"inelastic: {case.name}: {error}", flush=True)
+                    time.sleep(HEARD)
                     MPI.COMM_WORLD.Abort(1)
                 return _last(error)
             # LAMMPS's own errors have no class of their own, and come on all ranks.
