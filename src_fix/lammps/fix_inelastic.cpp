@@ -373,7 +373,7 @@ void FixInelastic::setup(int vflag)
 // frozen ones may overlap one another, and out of a box without walls they may be pushed.
 void FixInelastic::check_volume()
 {
-  const bool closed = !domain->nonperiodic || (walls_ && domain->nonperiodic == 1);
+  const bool closed = !domain->nonperiodic || (!walls_->empty() && domain->nonperiodic == 1);
   if (warn_only_ || !closed || domain->dimension == 2) return;
   const double unit_sphere = 4.0 / 3.0 * std::acos(-1.0);
   double volume = 0.0;

@@ -149,16 +149,19 @@ void RigidMotion::count_spheres(int groupbit, int frozen_bit)
 {
   const int *const body = bodies_of_atoms(fix_);
   const int *const mask = atom->mask;
-  tagint largest = 0, most = 0;
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (body[i] >= 0) largest = std::max(largest, atom->molecule[i]);
-  MPI_Allreduce(&largest, &most, 1, MPI_LMP_TAGINT, MPI_MAX, world);
-
-  if (most > MOST_MOLECULES)
+  tagint extremes[2] = {0, 0}, of_all[2];    // minus the smallest, the largest
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (body[i] < 0) continue;
+    extremes[0] = std::max(extremes[0], -atom->molecule[i]);
+    extremes[1] = std::max(extremes[1], atom->molecule[i]);
+  }
+  MPI_Allreduce(extremes, of_all, 2, MPI_LMP_TAGINT, MPI_MAX, world);
+  const tagint most = of_all[1];
+  if (of_all[0] > 0 || most > MOST_MOLECULES)
     error->all(FLERR,
-               "Fix inelastic rigid: molecule ID {} is too large, at most {} is allowed: use "
+               "Fix inelastic rigid: molecule ID {} of a body must be from 0 to {}: use "
                "reset_atoms mol",
-               most, MOST_MOLECULES);
+               of_all[0] > 0 ? -of_all[0] : most, MOST_MOLECULES);
   const std::size_t molecules = static_cast<std::size_t>(most) + 1;
   std::vector<int> mine(3 * molecules, 0), all(3 * molecules);
   for (int i = 0; i < atom->nlocal; ++i) {

@@ -116,6 +116,15 @@ def test_walls_push_too(tmp_path: Path, lmp: Runner) -> None:
     assert np.abs(frames[-1].velocities).max() <= 2 * EPS / STEP
 
 
+def test_a_box_without_walls_may_hold_less_than_the_spheres(tmp_path: Path, lmp: Runner) -> None:
+    """They can be pushed out of it, as far as LAMMPS lets them."""
+    points = np.random.default_rng(3).uniform(0.1, 0.4, (40, 3))
+    box = ((-0.5, 1.0), (-0.5, 1.0), (-0.5, 1.0))  # the scene's box is larger by 1
+    deck = scene(points, 1.2, tmp_path, tolerance=EPS, box=box, gravity=False, skin=1.2, options="")
+    result = lmp(deck + "run 2\n")
+    assert np.all(np.diff(result.thermo["f_contact[4]"]) < 0)
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_coincident_centres_are_refused(
     ranks: int, tmp_path: Path, refused: Callable[..., str]

@@ -169,6 +169,20 @@ def test_bodies_that_are_no_molecules(ranks: int, tmp_path: Path, refused: Refus
     assert "bodies must be molecules" in error, error
 
 
+@pytest.mark.parametrize("molecule", [-3, 100000001])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_molecule_ids_out_of_range(
+    ranks: int, molecule: int, tmp_path: Path, refused: Refused
+) -> None:
+    """LAMMPS reads any. Of one body only, which one rank alone may own."""
+    text = changed(deck(tmp_path), "group bodies molecule > 0", "group bodies molecule != 0")
+    data = tmp_path / "spheres.data"
+    last = f" 1.0 {BODIES.molecules.max()}\n"
+    data.write_text(changed(data.read_text(), last, f" 1.0 {molecule}\n"))
+    error = refused(text + "run 3\n", ranks=ranks)
+    assert f"molecule ID {molecule} of a body must be from 0 to 100000000" in error, error
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("inertia", INERTIAS)
 def test_the_two_fixes_have_another_inertia(
