@@ -468,8 +468,9 @@ void FixInelastic::advance(int vflag, double kick_steps)
     worst_.clear();
     // Where the list cannot reach as far as atoms would move there is no use in solving first.
     if (shorten_ && spread_at_start_ < list_reach_) {
-      const std::vector<double> unhindered = unhindered_motion(kick_steps);
-      if (!list_reaches(unhindered)) shorten_step(room_in_list(unhindered));
+      const double motion = unhindered_spread(kick_steps);
+      if (spread_at_start_ + update->dt * motion > list_reach_)
+        shorten_step(unhindered_part(kick_steps, motion));
     }
     predict(kick_steps);
     phase_ = Phase::CONTACT;
@@ -502,7 +503,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
             "least {:.6g}, or lower the timestep, or use shorten yes",
             update->ntimestep, needed, list_reach_, 1.2 * needed);
       }
-      shorten_step(room_in_list(motion()));
+      shorten_step(room_in_list() / spread(motion().data()));
     } else if (shorten_ && output_[EXCESS] > 0.0) {
       shorten_step(0.5);
     } else {
@@ -1271,24 +1272,47 @@ double FixInelastic::spread(const double *values)
 bool FixInelastic::list_reaches(const std::vector<double> &motion)
 { return spread_at_start_ + update->dt * spread(motion.data()) <= list_reach_; }
 
-// The part of the time step for which the list would reach, with some reserve.
-double FixInelastic::room_in_list(const std::vector<double> &motion)
+// The largest relative velocity for which the list reaches in this time step, with some reserve.
+double FixInelastic::room_in_list() const
 {
   constexpr double RESERVE = 0.9;
-  return RESERVE * (list_reach_ - spread_at_start_) / (update->dt * spread(motion.data()));
+  return RESERVE * (list_reach_ - spread_at_start_) / update->dt;
 }
 
-// Of this rank's atoms, 3 per atom: their velocities with the forces alone. Bodies turn in other ways:
-// this is about it.
-std::vector<double> FixInelastic::unhindered_motion(double kick_steps) const
+// The spread of the velocities with the forces alone. Bodies turn in other ways: this is about it.
+double FixInelastic::unhindered_spread(double kick_steps)
 {
-  std::vector<double> motion(3 * static_cast<std::size_t>(atom->nlocal));
+  unhindered_.resize(3 * static_cast<std::size_t>(atom->nlocal));
   for (int i = 0; i < atom->nlocal; ++i) {
     const bool moves = (atom->mask[i] & groupbit) && !(atom->mask[i] & frozen_bit_);
     const double kick_per_force = moves ? kick_steps * update->dt * force->ftm2v / mass(i) : 0.0;
-    for (int d = 0; d < 3; ++d) motion[3 * i + d] = atom->v[i][d] + kick_per_force * atom->f[i][d];
+    for (int d = 0; d < 3; ++d)
+      unhindered_[3 * i + d] = atom->v[i][d] + kick_per_force * atom->f[i][d];
   }
-  return motion;
+  return spread(unhindered_.data());
+}
+
+// The part of the time step for which the list would reach with the forces alone, where it does not
+// for the whole one, whose spread is given. A shorter step has a smaller kick, too.
+double FixInelastic::unhindered_part(double kick_steps, double whole)
+{
+  constexpr double WELL_USED = 0.95;
+  constexpr int TRIALS = 3;
+  const double room = room_in_list();
+  // In a part s the spread is at most (1 - s) none + s whole.
+  const double none = unhindered_spread(0.0);
+  double part = 2.0 * room / (none + std::sqrt(none * none + 4.0 * (whole - none) * room));
+  double motion = part * unhindered_spread(part * kick_steps);
+  double too_long = 1.0, too_far = whole;
+  for (int k = 0; k < TRIALS && motion > 0.0 && motion < WELL_USED * room; ++k) {
+    const double power = std::log(too_far / motion) / std::log(too_long / part);
+    const double between = part * std::pow(room / motion, 1.0 / power);
+    const double motion_between = between * unhindered_spread(between * kick_steps);
+    const bool reaches = motion_between <= room;
+    (reaches ? part : too_long) = between;
+    (reaches ? motion : too_far) = motion_between;
+  }
+  return part;
 }
 
 // Spread of the displacements since the list was built, at present or after a step's motion.
@@ -1330,7 +1354,9 @@ void FixInelastic::shorten_step(double factor)
   const double timestep = factor * update->dt;
   if (timestep < SHORTEST_STEP * regular_timestep_)
     error->all(FLERR, "Fix inelastic: step {}: no time step above {:.3g} keeps the spheres apart{}",
-               update->ntimestep, timestep, worst_.empty() ? "" : ": " + worst_);
+               update->ntimestep, timestep,
+               worst_.empty() ? " and within reach of the neighbour list: lower the timestep"
+                              : ": " + worst_);
   if (update->dt == regular_timestep_) {
     output_[SHORTENED_STEPS] += 1.0;
     run_shortened_ += 1;

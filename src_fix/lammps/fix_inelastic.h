@@ -141,7 +141,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double list_reach_;         // gap beyond which a pair may be missing from a fresh list
   double spread_at_start_;    // largest relative displacement since the list was built
   double growth_;             // of a radius since then
-  std::vector<double> position_at_build_, radius_at_build_, displacement_;
+  std::vector<double> position_at_build_, radius_at_build_, displacement_, unhindered_;
 
   double regular_timestep_;    // as the deck sets it
   bool setting_timestep_;      // the fix itself is changing it
@@ -252,8 +252,9 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double spread(const double *values);
   double spread_since_build(const double *motion);
   bool list_reaches(const std::vector<double> &motion);
-  double room_in_list(const std::vector<double> &motion);
-  std::vector<double> unhindered_motion(double kick_steps) const;
+  double room_in_list() const;
+  double unhindered_spread(double kick_steps);
+  double unhindered_part(double kick_steps, double whole);
   void shorten_step(double factor);
   void set_timestep(double timestep);
 

@@ -226,16 +226,19 @@ def test_tolerance_below_the_round_off_of_forces(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("timestep", "skin", "options"),
+    ("timestep", "skin", "options", "force"),
     [
-        (1e-6, 0.1, ""),
-        (1e-4, 0.1, ""),
-        (0.05, 2, ""),
-        (1.0, 30, ""),  # g h^2 is twice the height of the box
-        (1e4, 0.1, "shorten yes"),
+        (1e-6, 0.1, "", 0),
+        (1e-4, 0.1, "", 0),
+        (0.05, 2, "", 0),
+        (1.0, 30, "", 0),  # g h^2 is twice the height of the box
+        (1e4, 0.1, "shorten yes", 0),
+        (1e4, 0.1, "shorten yes", 3 * GRAVITY),
     ],
 )
-def test_time_step(timestep: float, skin: float, options: str, tmp_path: Path) -> None:
+def test_time_step(
+    timestep: float, skin: float, options: str, force: float, tmp_path: Path
+) -> None:
     points = crystal(4, 2 * RADIUS + 1e-6)
     speeds = np.random.default_rng(1).normal(0, 1, points.shape)
     deck = scene(
@@ -246,12 +249,14 @@ def test_time_step(timestep: float, skin: float, options: str, tmp_path: Path) -
         timestep=timestep,
         velocities=speeds,
         skin=skin,
+        fixes=f"fix shake all random/force {force} 4711" if force else "",
         options=f"region container {options} {RECORD}",
     )
     thermo = run(tmp_path, deck + DUMP_PARTICLES + "run 60\n").thermo
     result = measured(tmp_path, EPS)
     contacts = thermo["f_contact[5]"].max()
-    print(f"time step {timestep:g} {options}: {result}, up to {contacts:.0f} contacts")
+    shaken = f", random force of {force / GRAVITY:g} g" if force else ""
+    print(f"time step {timestep:g} {options}{shaken}: {result}, up to {contacts:.0f} contacts")
     assert contacts > 20
     assert_sound(result)
 
