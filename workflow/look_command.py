@@ -57,12 +57,16 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         f"{CONTACT_DUMP}, and draw it as {PICTURE}. Any dump custom of spheres will do with "
         "--dump, --contact-gap and --radius.",
     )
-    look.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a run")
+    look.add_argument(
+        "folder",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of a run, or a particle dump in one",
+    )
     look.add_argument(
         "--dump",
         type=Path,
         metavar="FILE",
-        default=Path(PARTICLE_DUMP),
         help=f"particle dump in the folder (default: {PARTICLE_DUMP})",
     )
     look.add_argument(
@@ -175,7 +179,12 @@ def run(options: argparse.Namespace) -> int:
     if options.contact_gap is not None and not 0 <= options.contact_gap < np.inf:
         raise AnalysisError(f"--contact-gap must be 0 or more, not {options.contact_gap:g}")
     folder: Path = options.folder
-    dump, contact_dump = folder / options.dump, folder / CONTACT_DUMP
+    name = PARTICLE_DUMP if options.dump is None else options.dump
+    if folder.is_file():
+        if options.dump is not None:
+            raise AnalysisError(f"{folder}: is a file; --dump names one in a folder")
+        folder, name = folder.parent, folder.name
+    dump, contact_dump = folder / name, folder / CONTACT_DUMP
     frame = read_particle_frame(dump, radius=options.radius)
     if any("p" in flags for flags in frame.boundaries):
         raise AnalysisError(

@@ -287,6 +287,14 @@ def test_no_folder(tmp_path, capsys):
     assert "no such file" in failure_of(["look", str(tmp_path / "nowhere")], capsys)
 
 
+def test_a_dump_stands_for_its_folder(run, capsys):
+    dump = str(run / "particles.lammpsdump")
+    numbers_of_folder = [main(["look", str(run), "--json"]), capsys.readouterr().out]
+    assert [main(["look", dump, "--json"]), capsys.readouterr().out] == numbers_of_folder
+    assert numbers_of_folder[0] == 0
+    assert "is a file" in failure_of(["look", dump, "--dump", "other"], capsys)
+
+
 def test_no_contacts(run, capsys):
     (run / "contacts.lammpsdump").unlink()
     error = failure_of(["look", str(run)], capsys)
