@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -24,32 +25,43 @@ from .errors import StudyError, WorkflowError
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand; 0 if all went well, else one line on stderr for each thing that did not.
 
-    1: cases of a study have failed; 2: bad input; 130: interrupted.
+    1: cases of a study have failed; 2: bad input; 130: interrupted; 141: whoever reads the
+    output has gone.
     """
     options = _parser().parse_args(arguments)
     try:
-        if options.command == "look":
-            return look_command.run(options)
-        if options.command == "export":
-            return export_command.run(options)
-        if options.command == "report":
-            return report_command.run(options)
-        if options.command == "reproduce":
-            return reproduce_command.run(options)
-        if options.command == "tradeoff":
-            return tradeoff_command.run(options)
-        return study_commands.run_command(options)
+        status = _run(options)
+        sys.stdout.flush()
+        return status
     except StudyError as error:
         # Every rank of an MPI job finds the same mistakes.
         for mistake in error.mistakes if os.environ.get("PMI_RANK", "0") == "0" else ():
             _complain(mistake)
         return 2
+    except BrokenPipeError:
+        # Such as `| head`, which has what it wanted. What is still buffered would fail at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
     except (AnalysisError, WorkflowError, OSError) as error:
         _complain(str(error))
         return 2
     except KeyboardInterrupt:
         _complain("interrupted")
         return 130
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.command == "look":
+        return look_command.run(options)
+    if options.command == "export":
+        return export_command.run(options)
+    if options.command == "report":
+        return report_command.run(options)
+    if options.command == "reproduce":
+        return reproduce_command.run(options)
+    if options.command == "tradeoff":
+        return tradeoff_command.run(options)
+    return study_commands.run_command(options)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 
 import numpy as np
@@ -293,6 +295,22 @@ def test_a_dump_stands_for_its_folder(run, capsys):
     assert [main(["look", dump, "--json"]), capsys.readouterr().out] == numbers_of_folder
     assert numbers_of_folder[0] == 0
     assert "is a file" in failure_of(["look", dump, "--dump", "other"], capsys)
+
+
+def test_a_reader_that_has_gone(run):
+    """Such as `| head -1`: no message."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        gone = subprocess.run(
+            [sys.executable, "-m", "lammps_inelastic.workflow.main", "look", str(run)],
+            stdout=writer,
+            stderr=subprocess.PIPE,
+            check=False,
+        )
+    finally:
+        os.close(writer)
+    assert (gone.returncode, gone.stderr) == (141, b"")
 
 
 def test_no_contacts(run, capsys):
