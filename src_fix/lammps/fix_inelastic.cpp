@@ -470,7 +470,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (shorten_ && spread_at_start_ < list_reach_) {
       const double motion = unhindered_spread(kick_steps);
       if (spread_at_start_ + update->dt * motion > list_reach_)
-        shorten_step(unhindered_part(kick_steps, motion));
+        shorten_step(room_in_list(unhindered_spread(0.0), motion));
     }
     predict(kick_steps);
     phase_ = Phase::CONTACT;
@@ -503,7 +503,8 @@ void FixInelastic::advance(int vflag, double kick_steps)
             "least {:.6g}, or lower the timestep, or use shorten yes",
             update->ntimestep, needed, list_reach_, 1.2 * needed);
       }
-      shorten_step(room_in_list() / spread(motion().data()));
+      const double motion_found = spread(motion().data());
+      shorten_step(room_in_list(motion_found, motion_found));
     } else if (shorten_ && output_[EXCESS] > 0.0) {
       shorten_step(0.5);
     } else {
@@ -1272,11 +1273,14 @@ double FixInelastic::spread(const double *values)
 bool FixInelastic::list_reaches(const std::vector<double> &motion)
 { return spread_at_start_ + update->dt * spread(motion.data()) <= list_reach_; }
 
-// The largest relative velocity for which the list reaches in this time step, with some reserve.
-double FixInelastic::room_in_list() const
+// The part of the time step for which the list would reach, with some reserve, where velocities have
+// the spread `whole` in the whole step and `none` before its forces: in a part s, whose kick is
+// smaller, they have at most (1 - s) none + s whole.
+double FixInelastic::room_in_list(double none, double whole) const
 {
   constexpr double RESERVE = 0.9;
-  return RESERVE * (list_reach_ - spread_at_start_) / update->dt;
+  const double room = RESERVE * (list_reach_ - spread_at_start_) / update->dt;
+  return 2.0 * room / (none + std::sqrt(none * none + 4.0 * (whole - none) * room));
 }
 
 // The spread of the velocities with the forces alone. Bodies turn in other ways: this is about it.
@@ -1290,29 +1294,6 @@ double FixInelastic::unhindered_spread(double kick_steps)
       unhindered_[3 * i + d] = atom->v[i][d] + kick_per_force * atom->f[i][d];
   }
   return spread(unhindered_.data());
-}
-
-// The part of the time step for which the list would reach with the forces alone, where it does not
-// for the whole one, whose spread is given. A shorter step has a smaller kick, too.
-double FixInelastic::unhindered_part(double kick_steps, double whole)
-{
-  constexpr double WELL_USED = 0.95;
-  constexpr int TRIALS = 3;
-  const double room = room_in_list();
-  // In a part s the spread is at most (1 - s) none + s whole.
-  const double none = unhindered_spread(0.0);
-  double part = 2.0 * room / (none + std::sqrt(none * none + 4.0 * (whole - none) * room));
-  double motion = part * unhindered_spread(part * kick_steps);
-  double too_long = 1.0, too_far = whole;
-  for (int k = 0; k < TRIALS && motion > 0.0 && motion < WELL_USED * room; ++k) {
-    const double power = std::log(too_far / motion) / std::log(too_long / part);
-    const double between = part * std::pow(room / motion, 1.0 / power);
-    const double motion_between = between * unhindered_spread(between * kick_steps);
-    const bool reaches = motion_between <= room;
-    (reaches ? part : too_long) = between;
-    (reaches ? motion : too_far) = motion_between;
-  }
-  return part;
 }
 
 // Spread of the displacements since the list was built, at present or after a step's motion.

@@ -252,9 +252,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double spread(const double *values);
   double spread_since_build(const double *motion);
   bool list_reaches(const std::vector<double> &motion);
-  double room_in_list() const;
+  double room_in_list(double none, double whole) const;
   double unhindered_spread(double kick_steps);
-  double unhindered_part(double kick_steps, double whole);
   void shorten_step(double factor);
   void set_timestep(double timestep);
 

@@ -26,7 +26,7 @@ dump all all custom 60 particles.dump id type x y z radius mass &
 dump_modify all sort id format float %.17g colname 8 fx colname 9 fy colname 10 fz
 run 60
 """
-# Acceleration of a unit of mass by a unit of force, where it is not 1 (LAMMPS's update.cpp: ftm2v).
+# Acceleration of a unit of mass by a unit of force (LAMMPS's update.cpp: ftm2v); 1 in `lj`.
 ACCELERATIONS = {
     "real": 1 / 48.88821291**2,
     "metal": 1 / 1.0364269e-4,
