@@ -91,17 +91,17 @@ bool ends_beyond(double reach, const double *away, double h, const double *openi
 
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
-    warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), first_list_of_run_(false),
-    list_(nullptr), margin_(-1.0), came_back_(false), relinearised_(false), looked_(false),
-    relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false), pushed_before_(false),
-    state_(nullptr), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
-    spread_at_start_(0.0), growth_(0.0), regular_timestep_(0.0), setting_timestep_(false),
-    expecting_(false), kick_(0.0), largest_kick_(0.0), output_{}, wall_force_step_(-1),
-    max_atoms_(0), max_contacts_(0), run_iterations_(0.0), run_largest_overlap_(0.0),
-    run_largest_excess_(0.0), run_steps_(0), run_unconverged_(0), run_shortened_(0),
-    run_constraint_iterations_(0.0), exchanging_(Exchange::VECTORS), exchanged_(nullptr),
+    warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), scene_(lmp),
+    first_list_of_run_(false), list_(nullptr), looked_(false), margin_(-1.0), came_back_(false),
+    relinearised_(false), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
+    pushed_before_(false), left_overlap_(EXTREME), unexpected_overlap_(0.0), state_(nullptr),
+    largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
+    regular_timestep_(0.0), setting_timestep_(false), expecting_(false), goes_on_(false),
+    kick_(0.0), largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0),
+    max_contacts_(0), exchanging_(Exchange::VECTORS), exchanged_(nullptr),
     exchanged_single_(nullptr)
 {
+  begin_summary();
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
 
   tolerance_ = utils::numeric(FLERR, arg[3], false, lmp);
@@ -220,6 +220,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
 FixInelastic::~FixInelastic()
 {
   if (copymode) return;
+  // LAMMPS is ending where there is no update any more.
+  if (update && update->dt != regular_timestep_ && restart_global) set_timestep(regular_timestep_);
   atom->delete_callback(id, Atom::GROW);
   atom->delete_callback(id, Atom::RESTART);
   memory->destroy(state_);
@@ -270,8 +272,19 @@ void FixInelastic::init()
   if (!(update->dt > 0.0))
     error->all(FLERR, "Fix inelastic needs a timestep greater than 0, not {}", update->dt);
 
+  const int walls_before = walls_->number_of_walls();
   walls_->init();
+  if (walls_->number_of_walls() != walls_before)
+    error->all(FLERR,
+               "Fix inelastic: its regions have {} walls, and had {} when the fix was defined: define "
+               "fix {} again after its regions",
+               walls_->number_of_walls(), walls_before, id);
   walls_->warn();
+  scene_.init({groupbit, frozen_bit_, rigid_ != nullptr});
+  // With newton off LAMMPS makes its buffers for reverse communication as large as the pair style
+  // needs them, whatever fixes need.
+  if (!force->newton && force->pair)
+    force->pair->comm_reverse_off = std::max(force->pair->comm_reverse_off, comm_reverse);
   if (rigid_) rigid_->init();
   first_list_of_run_ = true;
   wall_force_.assign(3 * static_cast<std::size_t>(walls_->number_of_walls()), 0.0);
@@ -290,19 +303,23 @@ void FixInelastic::init()
   if (largest_radius_ > 0.0 && !(smallest_radius > 0.0))
     error->all(FLERR, "Fix inelastic: an atom of group {} has no radius: set its diameter",
                group->names[igroup]);
+  if (largest_radius_ > 0.0 && tolerance_ >= smallest_radius)
+    error->all(FLERR,
+               "Fix inelastic: the tolerance {:.4g}, the largest overlap allowed, must be below the "
+               "smallest radius of group {}, {:.4g}",
+               tolerance_, group->names[igroup], smallest_radius);
   if (margin_ < 0.0 && largest_radius_ > 0.0) margin_ = FIRST_MARGIN * smallest_radius;
 
   // With equal radii the pair style's own list serves, and no second one is built.
   one_cutoff_ = largest_radius_ <= SIMILAR_RADII * smallest_radius;
   neighbor->add_request(this, one_cutoff_ ? NeighConst::REQ_DEFAULT : NeighConst::REQ_SIZE);
 
+  restore_timestep();
   regular_timestep_ = update->dt;
   expecting_ = false;
+  if (pushed_before_) left_overlap_ = EXTREME;
   pushed_before_ = false;
-  run_iterations_ = run_largest_overlap_ = run_largest_excess_ = 0.0;
-  run_steps_ = run_unconverged_ = run_shortened_ = 0;
-  run_constraint_iterations_ = 0.0;
-  clock_.reset();
+  begin_summary();
 }
 
 void FixInelastic::init_list(int, NeighList *list)
@@ -352,6 +369,8 @@ void FixInelastic::post_neighbor()
 void FixInelastic::setup(int vflag)
 {
   expecting_ = false;
+  goes_on_ = true;
+  scene_.remember_box();
   // Without diameters a run sets up bodies of point masses, and does no more.
   if (rigid_ && largest_radius_ == 0.0) return;
   if (rigid_) {
@@ -394,9 +413,11 @@ void FixInelastic::check_volume()
 void FixInelastic::post_force(int vflag)
 { advance(vflag, 1.0); }
 
+// A shortened time step stays until the next step, which `run pre no` takes with it, and restart files
+// tell the regular one.
 void FixInelastic::post_run()
 {
-  if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
+  goes_on_ = false;
   // Restart files and the next run start from the momentum alone.
   // (Bodies: the last step has done so, because fix rigid/small is out of reach here.)
   for (int i = 0; i < atom->nlocal; ++i)
@@ -407,6 +428,15 @@ void FixInelastic::post_run()
   restart_peratom = 0;
   if (comm->me == 0) log_run();
   log_times();
+  begin_summary();
+}
+
+void FixInelastic::begin_summary()
+{
+  run_iterations_ = run_largest_overlap_ = run_largest_excess_ = run_deepest_start_ = 0.0;
+  run_steps_ = run_unconverged_ = run_shortened_ = run_pushed_ = run_unexpected_ = 0;
+  run_constraint_iterations_ = 0.0;
+  clock_.reset();
 }
 
 void FixInelastic::log_run() const
@@ -424,6 +454,11 @@ void FixInelastic::log_run() const
         "yes, avoids them\n",
         rigid_ ? "turning bodies, or the curvature of walls," : "the curvature of walls",
         run_largest_excess_);
+  if (run_pushed_ > 0)
+    utils::logmesg(lmp,
+                   "  {} steps began with overlaps of more than 2 tolerances, up to {:.6g}, and pushed "
+                   "them apart; in {} of them such an overlap had appeared that no step had left\n",
+                   run_pushed_, run_deepest_start_, run_unexpected_);
   if (run_unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
                    run_unconverged_);
@@ -458,12 +493,15 @@ void FixInelastic::advance(int vflag, double kick_steps)
 {
   const PhaseClock::Within within(clock_, PhaseClock::CHECK);
   v_init(vflag);
-  if (update->dt != regular_timestep_) set_timestep(regular_timestep_);
+  check_continuation();
+  restore_timestep();
+  check_finite(kick_steps);
   if (expecting_) check_expected();
 
   spread_at_start_ = spread_since_build(nullptr);
   inelastic::ProjectionResult result;
-  bool no_room = false;    // for certain, in this step as long as it was at first
+  bool no_room = false;     // for certain, in this step as long as it was at first
+  bool appeared = false;    // on any rank, an overlap that no step has left
   while (true) {
     worst_.clear();
     // Where the list cannot reach as far as atoms would move there is no use in solving first.
@@ -476,10 +514,11 @@ void FixInelastic::advance(int vflag, double kick_steps)
     phase_ = Phase::CONTACT;
     collect();
     result = project(max_iterations_);
-    double maxima[2] = {bad_overlap_ ? 1.0 : 0.0, output_[OVERLAP]};
-    reduce(nullptr, 0, maxima, 2);
+    double maxima[3] = {bad_overlap_ ? 1.0 : 0.0, output_[OVERLAP], unexpected_overlap_};
+    reduce(nullptr, 0, maxima, 3);
     bad_overlap_ = maxima[0] > 0.0;
     output_[OVERLAP] = maxima[1];
+    appeared = maxima[2] > 0.0;
     if (record_every_ > 0 && kick_steps == 1.0 && update->ntimestep % record_every_ == 0)
       record_problem(result);
     if (bad_overlap_) push_apart(result);
@@ -512,11 +551,17 @@ void FixInelastic::advance(int vflag, double kick_steps)
     }
   }
 
+  if (appeared) warn_of_unexpected_overlap();
   update_outputs(result);
   apply_forces(kick_steps);
   // A whole-step velocity holds half of the push before and half of the one after it.
   restart_peratom = bad_overlap_ || pushed_before_;
   pushed_before_ = bad_overlap_;
+  const bool certain = result.converged && result.complete && entangled_.empty();
+  left_overlap_ = certain ? REGULAR_OVERLAP * tolerance_ + (bad_overlap_ ? output_[OVERLAP] : 0.0) +
+          output_[EXCESS]
+                          : EXTREME;
+  restart_global = update->dt != regular_timestep_;
   remember_contacts();
 
   // Rebuild before the list could fall short, with room for the next step to be half as fast again.
@@ -543,6 +588,40 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   run_constraint_iterations_ +=
       static_cast<double>(result.iterations) * static_cast<double>(problem_.contacts.size());
   return result;
+}
+
+// A time step is shortened and a motion bounded by numbers alone: nothing else must come before this.
+void FixInelastic::check_finite(double kick_steps)
+{
+  std::string message;
+  for (int i = 0; i < atom->nlocal && message.empty(); ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    const bool moves = !(atom->mask[i] & frozen_bit_);
+    const double kick = moves ? kick_steps * update->dt * force->ftm2v / mass(i) : 0.0;
+    const double *const v = atom->v[i];
+    const double *const f = atom->f[i];
+    const double after[3] = {v[0] + kick * f[0], v[1] + kick * f[1], v[2] + kick * f[2]};
+    if (std::isfinite(norm(v)) && std::isfinite(norm(after))) continue;
+    message = !std::isfinite(norm(v))
+        ? fmt::format("the velocity of atom {} is not a finite number", atom->tag[i])
+        : fmt::format("the force on atom {} is not a finite number, or too large to be one",
+                      atom->tag[i]);
+  }
+  fail_together(message);
+}
+
+// Without a setup the next step follows from the last one's forces: what the end of the run has taken
+// out of the velocities, or somebody has changed since, is missing.
+void FixInelastic::check_continuation()
+{
+  std::string message;
+  if (expecting_ && !goes_on_) {
+    if (pushed_before_)
+      message = "run pre no cannot go on from a step that was pushing overlaps apart: leave out pre no";
+    goes_on_ = true;
+  }
+  if (expecting_ && message.empty()) message = scene_.change_of_box();
+  fail_together(message);
 }
 
 // Every other fix and force has done its work: the velocities that the step would end with.
@@ -574,10 +653,6 @@ void FixInelastic::predict(double kick_steps)
     rigid_->predict(problem_, *this, kick_ * force->ftm2v, expecting_, state_, EXPECTED_V);
   }
   message_.clear();
-  for (int i = 0; i < nlocal; ++i)
-    if (!std::isfinite(norm(&problem_.predicted_velocity[3 * i])))
-      message_ =
-          fmt::format("the force on atom {} or its velocity is not a finite number", atom->tag[i]);
 }
 
 void FixInelastic::collect()
@@ -587,6 +662,7 @@ void FixInelastic::collect()
   origin_.clear();
   wall_constraint_.clear();
   bad_overlap_ = false;
+  unexpected_overlap_ = 0.0;
   output_[OVERLAP] = output_[EXCESS] = 0.0;
   relinearisations_ = 0;
   came_back_ = relinearised_ = looked_ = false;
@@ -674,7 +750,7 @@ void FixInelastic::take_pair(std::size_t slot, int i, int j)
   }
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
   const double gap = distance - size;
-  note_overlap(gap);
+  note_overlap(gap, i, atom->tag[j]);
   if (rigid_ && (rigid_->is_incomplete(i) || rigid_->is_incomplete(j))) {
     message_ = fmt::format("atoms {} and {} meet where a rank does not see all of their bodies: "
                            "raise comm_modify cutoff",
@@ -692,10 +768,36 @@ void FixInelastic::take_pair(std::size_t slot, int i, int j)
   origin_.push_back({0, gap, size, 0.0});
 }
 
-void FixInelastic::note_overlap(double gap)
+// Of a sphere with another one, or with a wall (minus its number).
+void FixInelastic::note_overlap(double gap, int i, tagint partner)
 {
   output_[OVERLAP] = std::max(output_[OVERLAP], -gap);
-  if (is_bad(gap)) bad_overlap_ = true;
+  if (!is_bad(gap)) return;
+  bad_overlap_ = true;
+  if (-gap <= std::max(left_overlap_, unexpected_overlap_)) return;
+  unexpected_overlap_ = -gap;
+  unexpected_ = partner < 0
+      ? fmt::format("atom {} overlaps wall {}", atom->tag[i], -partner)
+      : fmt::format("atoms {} and {} overlap", atom->tag[i], partner);
+}
+
+// Collective. Once a run; the summary counts the steps.
+void FixInelastic::warn_of_unexpected_overlap()
+{
+  if (++run_unexpected_ > 1) return;
+  struct {
+    double depth;
+    int rank;
+  } mine = {unexpected_overlap_, comm->me}, deepest;
+  MPI_Allreduce(&mine, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, world);
+  const std::string who = said_by(deepest.rank, unexpected_);
+  if (comm->me == 0)
+    error->warning(FLERR,
+                   "Fix inelastic: step {}: {} by {:.4g} ({:.3g} tolerances), which no earlier step has "
+                   "left: something else has moved or changed the spheres, the box, a region or the "
+                   "group. Such overlaps are pushed apart without momentum; the summary counts the "
+                   "steps",
+                   update->ntimestep, who, deepest.depth, deepest.depth / tolerance_);
 }
 
 // Looks at the walls from where atoms are, as far as the step takes them.
@@ -745,7 +847,7 @@ void FixInelastic::collect_walls()
       [&](const RegionWalls::Look &look, const WallView &view) {
         clear_of_walls_[look.atom] = 0.0;
         const double gap = view.distance - atom->radius[look.atom];
-        note_overlap(view.distance_now - atom->radius[look.atom]);
+        note_overlap(view.distance_now - atom->radius[look.atom], look.atom, -view.wall);
         const double opening = problem_.timestep * dot(view.normal, velocity + 3 * look.atom);
         if (gap + std::min(0.0, opening) <= margin_) take_wall(look, view);
       },
@@ -971,7 +1073,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     const double wall_motion = view.distance_now - view.distance;
     const double gap_now = known ? origin_[existing->second].gap_now : gap_here + wall_motion;
     // A region can show a wall late: from inside one part of a union the others are not seen.
-    note_overlap(gap_now);
+    note_overlap(gap_now, i, -view.wall);
     // Exact for this motion, also where a body turns.
     const double turning = is_member(i) ? h * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]))
                                         : 0.0;
@@ -1142,6 +1244,7 @@ void FixInelastic::apply_forces(double kick_steps)
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(mask[i] & groupbit)) continue;
     double *const state = state_[i];
+    state[EXPECTED_RADIUS] = atom->radius[i];
     if (is_member(i)) {
       for (int d = 0; d < 3; ++d) {
         atom->f[i][d] += contact_force_[3 * i + d];
@@ -1179,6 +1282,14 @@ void FixInelastic::check_expected()
   for (int i = 0; i < atom->nlocal && message.empty(); ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
     const double *const state = state_[i];
+    if (atom->radius[i] != state[EXPECTED_RADIUS]) {
+      const std::string changing = scene_.fixes_that_change_radii();
+      message = fmt::format("the radius of atom {} has changed during the run by {:.3g}, and the "
+                            "contacts do not follow it: change radii between runs{}{}",
+                            atom->tag[i], atom->radius[i] - state[EXPECTED_RADIUS],
+                            changing.empty() ? "" : ". Fixes that may have:", changing);
+      break;
+    }
     double off[3] = {atom->x[i][0] - state[EXPECTED_X], atom->x[i][1] - state[EXPECTED_X + 1],
                      atom->x[i][2] - state[EXPECTED_X + 2]};
     domain->minimum_image(FLERR, off);
@@ -1311,6 +1422,13 @@ double FixInelastic::spread_since_build(const double *motion)
   return spread(displacement_.data()) + 2.0 * growth_;
 }
 
+// After a shortened step.
+void FixInelastic::restore_timestep()
+{
+  if (restart_global && update->dt != regular_timestep_) set_timestep(regular_timestep_);
+  restart_global = 0;
+}
+
 // The timestep command, also where no init() follows (run pre no). The fix's own changes return to
 // the regular step.
 void FixInelastic::reset_dt()
@@ -1440,6 +1558,10 @@ void FixInelastic::update_outputs(const inelastic::ProjectionResult &result)
   run_iterations_ += static_cast<double>(result.iterations);
   run_largest_overlap_ = std::max(run_largest_overlap_, output_[OVERLAP]);
   run_largest_excess_ = std::max(run_largest_excess_, output_[EXCESS]);
+  if (bad_overlap_) {
+    ++run_pushed_;
+    run_deepest_start_ = std::max(run_deepest_start_, output_[OVERLAP]);
+  }
 }
 
 // Half to each side; a wall's half goes to the sphere as well.
@@ -1536,6 +1658,7 @@ void FixInelastic::set_arrays(int i)
   // An atom that is created during a run moves on from where it is.
   std::copy_n(atom->x[i], 3, state_[i] + EXPECTED_X);
   std::copy_n(atom->v[i], 3, state_[i] + EXPECTED_V);
+  state_[i][EXPECTED_RADIUS] = atom->radius[i];
 }
 
 int FixInelastic::pack_exchange(int i, double *buffer)
@@ -1595,6 +1718,25 @@ int FixInelastic::size_restart(int i)
 
 int FixInelastic::maxsize_restart()
 { return 7 + (rigid_ ? RigidMotion::HELD_SIZE : 0); }
+
+// A file that is written while a step is shortened holds its time step: the regular one goes along.
+// In other files there is nothing of this fix.
+void FixInelastic::write_restart(FILE *file)
+{
+  if (comm->me != 0) return;
+  const double timesteps[2] = {update->dt, regular_timestep_};
+  const int size = sizeof(timesteps);
+  fwrite(&size, sizeof(size), 1, file);
+  fwrite(timesteps, sizeof(timesteps), 1, file);
+}
+
+// A time step that was set since stays.
+void FixInelastic::restart(char *buffer)
+{
+  double timesteps[2];
+  std::memcpy(timesteps, buffer, sizeof(timesteps));
+  if (update->dt == timesteps[0]) set_timestep(timesteps[1]);
+}
 
 /* ----------------------------------------------------------------------
    communication
@@ -1739,12 +1881,17 @@ void FixInelastic::fail_together(const std::string &message)
     MPI_Allreduce(&mine, &speaker, 1, MPI_INT, MPI_MIN, world);
   }
   if (speaker == comm->nprocs) return;
-  int length = static_cast<int>(message.size());
-  MPI_Bcast(&length, 1, MPI_INT, speaker, world);
-  std::string text = message;
+  error->all(FLERR, "Fix inelastic: step {}: {}", update->ntimestep, said_by(speaker, message));
+}
+
+// Collective: the text of one of the ranks.
+std::string FixInelastic::said_by(int rank, std::string text) const
+{
+  int length = static_cast<int>(text.size());
+  MPI_Bcast(&length, 1, MPI_INT, rank, world);
   text.resize(length);
-  MPI_Bcast(text.data(), length, MPI_CHAR, speaker, world);
-  error->all(FLERR, "Fix inelastic: step {}: {}", update->ntimestep, text);
+  MPI_Bcast(text.data(), length, MPI_CHAR, rank, world);
+  return text;
 }
 
 // Collective: the constraint of all ranks that is farthest from being met.
@@ -1768,10 +1915,7 @@ void FixInelastic::note_worst(const inelastic::ProjectionResult &result)
         : fmt::format("{} keep a gap of {:.4g} under a force", sides, mine.size);
   }
   MPI_Allreduce(&mine, &worst, 1, MPI_DOUBLE_INT, MPI_MAXLOC, world);
-  int length = static_cast<int>(worst_.size());
-  MPI_Bcast(&length, 1, MPI_INT, worst.rank, world);
-  worst_.resize(length);
-  MPI_Bcast(worst_.data(), length, MPI_CHAR, worst.rank, world);
+  worst_ = said_by(worst.rank, worst_);
 }
 
 void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool no_room)

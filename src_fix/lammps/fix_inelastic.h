@@ -24,6 +24,7 @@ FixStyle(inelastic,FixInelastic);
 #include "projection.h"
 #include "region_walls.h"
 #include "rigid_motion.h"
+#include "scene_check.h"
 
 #include <cstdint>
 #include <memory>
@@ -67,6 +68,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double compute_vector(int) override;
   double compute_array(int, int) override;
   int modify_param(int, char **) override;
+  void write_restart(FILE *) override;
+  void restart(char *) override;
   double memory_usage() override;
 
  private:
@@ -86,6 +89,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::vector<double> velocity_;    // the projection, 3 per atom, copies included
   std::unique_ptr<RegionWalls> walls_;
   std::unique_ptr<RigidMotion> rigid_;    // null in a scene of free spheres
+  SceneCheck scene_;
   bool first_list_of_run_;
   class NeighList *list_;
 
@@ -121,6 +125,10 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   Phase phase_;
   bool bad_overlap_;
   bool pushed_before_;                             // in the step before
+  // The largest overlap that the last step may have left behind; infinite where one may have left any.
+  double left_overlap_;
+  double unexpected_overlap_;    // the largest that no step has left, at the start of this one
+  std::string unexpected_;       // who overlaps so
   std::unordered_set<std::uint64_t> entangled_;    // pairs of bodies, deep in one another
 
   // Per atom, travelling with it. PUSH: the part of its velocity that is no momentum, after the
@@ -130,7 +138,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
     EXPECTED_V = 3,
     PUSH_NEXT = 6,
     PUSH_HELD = 9,
-    STATE_SIZE = 12
+    EXPECTED_RADIUS = 12,
+    STATE_SIZE = 13
   };
   double **state_;
   ContactMemory memory_;
@@ -146,6 +155,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double regular_timestep_;    // as the deck sets it
   bool setting_timestep_;      // the fix itself is changing it
   bool expecting_;             // state_ holds a prediction to compare with
+  bool goes_on_;               // between setup and the end of the run
   double kick_;                // time for which the force acts before the next move
   double largest_kick_;        // [velocity] that one of the last contacts gave, on any rank
 
@@ -175,7 +185,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   // Summary of a run
   double run_iterations_, run_largest_overlap_, run_largest_excess_;
-  long run_steps_, run_unconverged_, run_shortened_;
+  double run_deepest_start_;    // of the overlaps that were pushed apart
+  long run_steps_, run_unconverged_, run_shortened_, run_pushed_, run_unexpected_;
   double run_constraint_iterations_;    // constraints of this rank, once for each iteration
   PhaseClock clock_;
 
@@ -204,6 +215,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   // One step
   void advance(int vflag, double kick_steps);
+  void check_continuation();
+  void check_finite(double kick_steps);
   void check_expected();
   void check_volume();
   void predict(double kick_steps);
@@ -244,7 +257,9 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool ends_too_deep(double gap_now, double size, double gap_at_end);
   long follow(std::size_t c, double exact_gap, bool too_deep);
   bool is_bad(double gap) const;
-  void note_overlap(double gap);
+  void note_overlap(double gap, int i, tagint partner);
+  void warn_of_unexpected_overlap();
+  void begin_summary();
   std::uint64_t wall_key(int i, int wall) const
   { return static_cast<std::uint64_t>(i) * (walls_->number_of_walls() + 1) + wall; }
 
@@ -256,12 +271,14 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double unhindered_spread(double kick_steps);
   void shorten_step(double factor);
   void set_timestep(double timestep);
+  void restore_timestep();
 
   void tally_virial(int i, int j, const double *virial);
   void share_virial();
   void note_worst(const inelastic::ProjectionResult &);
   void unconverged(const inelastic::ProjectionResult &, bool no_room);
   void fail_together(const std::string &message);
+  std::string said_by(int rank, std::string text) const;
   std::vector<double> gather(std::vector<double> mine) const;
   double mass(int i) const;
   int carried_size() const { return STATE_SIZE + (rigid_ ? RigidMotion::CARRIED_SIZE : 0); }

@@ -1,0 +1,142 @@
+#include "scene_check.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "fix.h"
+#include "force.h"
+#include "group.h"
+#include "modify.h"
+#include "neighbor.h"
+
+using namespace LAMMPS_NS;
+
+// Along a direction that is not periodic the box is no part of any gap.
+bool SceneCheck::changes_periods(const Fix *fix) const
+{
+  int matters = Fix::BOX_CHANGE_ANY | Fix::BOX_CHANGE_SHAPE;
+  if (domain->xperiodic) matters |= Fix::BOX_CHANGE_X;
+  if (domain->yperiodic) matters |= Fix::BOX_CHANGE_Y;
+  if (domain->zperiodic) matters |= Fix::BOX_CHANGE_Z;
+  return (fix->box_change & matters) != 0;
+}
+
+void SceneCheck::init(const Group &group) const
+{
+  // LAMMPS accepts neigh_modify include and comm_modify group for the group of atom_modify first alone.
+  if (neighbor->includegroup)
+    error->all(FLERR,
+               "Fix inelastic does not work with neigh_modify include {}, which keeps pairs of other "
+               "spheres out of the neighbour list: leave it out",
+               this->group->names[neighbor->includegroup]);
+  if (atom->firstgroupname)
+    error->all(FLERR,
+               "Fix inelastic does not work with atom_modify first {}, nor with comm_modify group and "
+               "neigh_modify include, which need it and hide spheres: leave it out",
+               atom->firstgroupname);
+  for (const Fix *fix : modify->get_fix_list()) {
+    if (changes_periods(fix))
+      error->all(FLERR,
+                 "Fix inelastic: fix {} ({}) changes the box during a run, and the contacts do not "
+                 "follow it: use many short runs with change_box between them, or walls that move",
+                 fix->id, fix->style);
+    if (fix->diam_flag && fix->nevery > 0)
+      error->all(FLERR,
+                 "Fix inelastic: fix {} ({}) changes diameters during a run, and the contacts do not "
+                 "follow them: use many short runs and change the diameters between them (adapt 0)",
+                 fix->id, fix->style);
+  }
+  warn_of_hidden_pairs(group);
+}
+
+// Collective.
+bool SceneCheck::any(bool here) const
+{
+  int mine = here, all = 0;
+  MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_MAX, world);
+  return all != 0;
+}
+
+void SceneCheck::warn_of_hidden_pairs(const Group &group) const
+{
+  // Pairs of two frozen spheres may be hidden.
+  auto hides = [&](auto &&on_one_side, auto &&on_the_other) {
+    bool one = false, other = false, one_moves = false, other_moves = false;
+    for (int i = 0; i < atom->nlocal; ++i) {
+      if (!(atom->mask[i] & group.bit)) continue;
+      const bool moves = !(atom->mask[i] & group.frozen_bit);
+      if (on_one_side(i)) {
+        one = true;
+        one_moves = one_moves || moves;
+      }
+      if (on_the_other(i)) {
+        other = true;
+        other_moves = other_moves || moves;
+      }
+    }
+    const bool sides = any(one) && any(other);
+    return (any(one_moves) || any(other_moves)) && sides;
+  };
+  auto warn = [&](const std::string &what) {
+    if (comm->me == 0)
+      error->warning(FLERR,
+                     "Fix inelastic does not see pairs of its group that {} keeps out of the "
+                     "neighbour list: they can overlap",
+                     what);
+  };
+
+  for (int k = 0; k < neighbor->nex_group; ++k)
+    if (hides([&](int i) { return (atom->mask[i] & neighbor->ex1_bit[k]) != 0; },
+              [&](int i) { return (atom->mask[i] & neighbor->ex2_bit[k]) != 0; }))
+      warn(fmt::format("neigh_modify exclude group {} {}",
+                       this->group->names[neighbor->ex1_group[k]],
+                       this->group->names[neighbor->ex2_group[k]]));
+  for (int k = 0; k < neighbor->nex_type; ++k)
+    if (hides([&](int i) { return atom->type[i] == neighbor->ex1_type[k]; },
+              [&](int i) { return atom->type[i] == neighbor->ex2_type[k]; }))
+      warn(fmt::format("neigh_modify exclude type {} {}", neighbor->ex1_type[k],
+                       neighbor->ex2_type[k]));
+  for (int k = 0; k < neighbor->nex_mol; ++k) {
+    // The spheres of one body are kept apart anyway; free spheres are looked at with the bodies.
+    if (neighbor->ex_mol_intra[k] && group.bodies) continue;
+    auto chosen = [&](int i) { return (atom->mask[i] & neighbor->ex_mol_bit[k]) != 0; };
+    if (hides(chosen, chosen))
+      warn(fmt::format("neigh_modify exclude molecule/{} {}",
+                       neighbor->ex_mol_intra[k] ? "intra" : "inter",
+                       this->group->names[neighbor->ex_mol_group[k]]));
+  }
+  const bool bonds = atom->nbonds > 0 || atom->nangles > 0 || atom->ndihedrals > 0;
+  for (int k = 1; k <= 3 && bonds; ++k)
+    if (force->special_lj[k] == 0.0 && force->special_coul[k] == 0.0) {
+      warn("special_bonds with a factor of 0");
+      break;
+    }
+}
+
+std::vector<double> SceneCheck::box() const
+{
+  std::vector<double> sizes;
+  for (int d = 0; d < 3; ++d)
+    if (domain->periodicity[d]) sizes.push_back(domain->prd[d]);
+  sizes.insert(sizes.end(), {domain->xy, domain->xz, domain->yz});
+  return sizes;
+}
+
+void SceneCheck::remember_box()
+{ box_at_start_ = box(); }
+
+std::string SceneCheck::change_of_box() const
+{
+  if (box() == box_at_start_) return "";
+  return "the periodic box has changed during the run, and the contacts do not follow it: change it "
+         "between runs (change_box)";
+}
+
+std::string SceneCheck::fixes_that_change_radii() const
+{
+  std::string names;
+  for (const Fix *fix : modify->get_fix_list())
+    if (fix->diam_flag) names += fmt::format(" {} ({})", fix->id, fix->style);
+  return names;
+}

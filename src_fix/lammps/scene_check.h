@@ -1,0 +1,52 @@
+// What other commands and fixes of a deck must not do, because fix inelastic would not see it: hide
+// spheres or pairs from it, or change the box or the radii while a run lasts.
+
+#ifndef INELASTIC_SCENE_CHECK_H
+#define INELASTIC_SCENE_CHECK_H
+
+#include "pointers.h"
+
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class Fix;
+
+class SceneCheck : protected Pointers {
+ public:
+  explicit SceneCheck(class LAMMPS *lmp) : Pointers(lmp) {}
+
+  struct Group {
+    int bit;           // of the spheres that the fix sees
+    int frozen_bit;    // of those that nothing moves; 0 = none
+    bool bodies;       // the keyword rigid is given
+  };
+
+  // At the start of a run. Errors: settings that keep spheres out of the neighbour list or ghosts away,
+  // and fixes that will change the box or radii. Warnings: settings that keep pairs apart. Collective.
+  void init(const Group &group) const;
+
+  // Remembers the box as it is at the start of a run.
+  void remember_box();
+
+  // Says what has changed about the box since then; empty if nothing has.
+  std::string change_of_box() const;
+
+  // Names the fixes that may have changed the radius of a sphere; empty if there are none.
+  std::string fixes_that_change_radii() const;
+
+ private:
+  // The periods of the directions that are periodic, and the three tilts.
+  std::vector<double> box() const;
+
+  bool changes_periods(const Fix *fix) const;
+  void warn_of_hidden_pairs(const Group &group) const;
+  bool any(bool here) const;
+
+  std::vector<double> box_at_start_;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
