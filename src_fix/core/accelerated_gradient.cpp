@@ -574,6 +574,7 @@ void AcceleratedProjectedGradient::iterate(Iterations<Real> &iterations, Contact
     if (sums[2] > curvature_ * change_squared && change_squared > 0.0)
       curvature_ = MARGIN * sums[2] / change_squared;
     change_squared = sums[1];
+    result.trend.see(result.iterations, scales.length * std::max(maxima[0], maxima[1]));
 
     if (std::max(maxima[0], maxima[1]) <= tolerance && result.iterations >= next_check) {
       iterations.impulses_before(scales, problem.contacts.impulse);

@@ -39,6 +39,7 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
     result.converged = solved.converged;
     result.infeasible = solved.infeasible;
     result.round_off = solved.round_off;
+    result.trend = solved.trend;
 
     const std::size_t solved_for = problem.contacts.size();
     if (solved.converged)

@@ -34,6 +34,7 @@ struct ProjectionResult {
   int rounds = 0;
   Residual residual;         // over all constraints that came to light
   double round_off = 0.0;    // [length] of the last solve: see SolverResult
+  ResidualTrend trend;       // likewise
 
   // Unless converged and complete, and where this rank has any: the constraint that is farthest
   // from being met, and the gap [length] that it leaves at the end of the step.

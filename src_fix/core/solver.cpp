@@ -107,6 +107,7 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
     if (result.converged || result.iterations >= limits.max_iterations ||
         !std::isfinite(result.residual.feasibility))
       return result;
+    if (result.iterations > 0) result.trend.see(result.iterations, result.residual.feasibility);
     if (result.iterations > 0 && result.iterations % CHECK_EVERY == 0) {
       result.infeasible = is_infeasible(problem, gap_operator_, limits, host);
       if (result.infeasible) return result;

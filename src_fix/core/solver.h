@@ -11,6 +11,7 @@
 
 #include "contact_problem.h"
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <string>
@@ -25,6 +26,30 @@ struct Residual {
 // Local to this rank unless a host reduces it. Infinite when a number is not finite.
 Residual residual(const double *gap_at_end, const double *impulse, std::size_t count);
 
+// How the larger of the two residuals comes down while a solver iterates. Where it no longer does,
+// more iterations are of no use.
+class ResidualTrend {
+ public:
+  // Iterations count from 1.
+  void see(long iteration, double residual)
+  {
+    least_ = std::min(least_, residual);
+    if (iteration < 2 * mark_) return;
+    before_mark_ = at_mark_;
+    at_mark_ = least_;
+    mark_ = iteration;
+  }
+
+  double least() const { return least_; }
+  // The least one after a quarter to a half of the iterations; infinite where those were too few.
+  double earlier() const { return before_mark_; }
+
+ private:
+  static constexpr double NONE = std::numeric_limits<double>::infinity();
+  long mark_ = 1;
+  double least_ = NONE, at_mark_ = NONE, before_mark_ = NONE;
+};
+
 struct SolverLimits {
   double tolerance = 0.0;    // [length], both residuals must come down to it
   long max_iterations = 0;
@@ -38,6 +63,7 @@ struct SolverResult {
   long iterations = 0;
   Residual residual;
   double round_off = 0.0;    // [length] of the gaps where impulses act; no residual goes below it
+  ResidualTrend trend;
 };
 
 // Whether the impulses at hand, whatever they are, prove that there are no admissible velocities.

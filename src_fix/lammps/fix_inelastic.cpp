@@ -45,10 +45,13 @@ constexpr double EXPECTED_RELATIVE =
 // Of the largest coordinate: an overlap of two spheres is not known better than that. Each of the
 // three coordinates of either is rounded by up to half of the machine epsilon.
 constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon();
+// Of the part of the box that a rank owns: LAMMPS brings an atom back from the next part alone.
+constexpr double MOST_STRAYED = 0.5;
 constexpr double SIMILAR_RADII = 1.1;    // up to here one cutoff for all pairs wastes little
 
 constexpr double NEAR = 0.2;             // of the largest radius: pairs to be looked at again
 constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
+constexpr double OUTSIDE = -1.0;         // in place of the radius of a sphere outside the group
 constexpr double EXTREME = 1.0e300;      // below or above every value that is compared
 constexpr int SHARED_PARTNERS = 16;    // that a copy tells its owner; more lose only a first guess
 constexpr int REDUCED_SUMS = 4;
@@ -96,7 +99,9 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     relinearised_(false), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
     pushed_before_(false), left_overlap_(EXTREME), unexpected_overlap_(0.0), state_(nullptr),
     largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
+    strayed_(0.0), own_width_{EXTREME, EXTREME, EXTREME},
     regular_timestep_(0.0), setting_timestep_(false), expecting_(false), goes_on_(false),
+    ended_pushing_(false),
     kick_(0.0), largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0),
     max_contacts_(0), exchanging_(Exchange::VECTORS), exchanged_(nullptr),
     exchanged_single_(nullptr)
@@ -357,6 +362,15 @@ void FixInelastic::post_neighbor()
         "Fix inelastic: the neighbour list reaches {:.6g} between centres but needs {:.6g}: give "
         "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
         listed, widest, 2.0 * largest_radius_);
+  // A motion that all share costs no reach, but takes atoms away from their rank and their box.
+  for (int d = 0; d < 3; ++d) {
+    own_width_[d] = EXTREME;
+    if (domain->periodicity[d] || comm->procgrid[d] > 1) {
+      const double part = domain->triclinic ? domain->subhi_lamda[d] - domain->sublo_lamda[d]
+                                            : (domain->subhi[d] - domain->sublo[d]) / domain->prd[d];
+      own_width_[d] = part * domain->prd[d];
+    }
+  }
   list_reach_ = one_cutoff_ ? listed - 2.0 * largest_radius_ : neighbor->skin;
   if (rigid_)
     fail_together(rigid_->find_bodies(problem_, *this, groupbit, frozen_bit_, first_list_of_run_));
@@ -418,6 +432,7 @@ void FixInelastic::post_force(int vflag)
 void FixInelastic::post_run()
 {
   goes_on_ = false;
+  ended_pushing_ = restart_peratom != 0;
   // Restart files and the next run start from the momentum alone.
   // (Bodies: the last step has done so, because fix rigid/small is out of reach here.)
   for (int i = 0; i < atom->nlocal; ++i)
@@ -568,7 +583,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
   const double next_start = spread_since_build(motion().data());
   const double next_motion = problem_.timestep * spread(motion().data());
   const bool short_of_reach = next_start + 1.5 * next_motion > list_reach_ || growth_ > 0.0;
-  next_reneighbor = short_of_reach ? update->ntimestep + 1 : -1;
+  next_reneighbor = short_of_reach || strayed_ > MOST_STRAYED ? update->ntimestep + 1 : -1;
 
   // More pairs at once when the last projection had to come back for some, fewer otherwise.
   margin_ *= came_back_ ? 1.1 : 0.95;
@@ -616,7 +631,7 @@ void FixInelastic::check_continuation()
 {
   std::string message;
   if (expecting_ && !goes_on_) {
-    if (pushed_before_)
+    if (ended_pushing_)
       message = "run pre no cannot go on from a step that was pushing overlaps apart: leave out pre no";
     goes_on_ = true;
   }
@@ -1242,8 +1257,11 @@ void FixInelastic::apply_forces(double kick_steps)
   const double h = problem_.timestep;
   const int *const mask = atom->mask;
   for (int i = 0; i < atom->nlocal; ++i) {
-    if (!(mask[i] & groupbit)) continue;
     double *const state = state_[i];
+    if (!(mask[i] & groupbit)) {
+      state[EXPECTED_RADIUS] = OUTSIDE;
+      continue;
+    }
     state[EXPECTED_RADIUS] = atom->radius[i];
     if (is_member(i)) {
       for (int d = 0; d < 3; ++d) {
@@ -1282,6 +1300,11 @@ void FixInelastic::check_expected()
   for (int i = 0; i < atom->nlocal && message.empty(); ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
     const double *const state = state_[i];
+    if (state[EXPECTED_RADIUS] == OUTSIDE) {
+      message = fmt::format("atom {} has joined group {} during the run: change groups between runs",
+                            atom->tag[i], group->names[igroup]);
+      break;
+    }
     if (atom->radius[i] != state[EXPECTED_RADIUS]) {
       const std::string changing = scene_.fixes_that_change_radii();
       message = fmt::format("the radius of atom {} has changed during the run by {:.3g}, and the "
@@ -1321,6 +1344,16 @@ void FixInelastic::check_expected()
         passed = true;
       else if ((passed && (modify->fmask[k] & POST_FORCE)) || (modify->fmask[k] & END_OF_STEP))
         later += fmt::format(" {} ({})", fixes[k]->id, fixes[k]->style);
+    }
+    std::string unfrozen;
+    for (const Fix *fix : modify->get_fix_by_style("^move$"))
+      if (atom->mask[i] & fix->groupbit)
+        unfrozen = fmt::format("atom {} is moved by fix {} (move) and is not frozen: name its group "
+                               "with the keyword frozen",
+                               atom->tag[i], fix->id);
+    if (!unfrozen.empty()) {
+      message = unfrozen;
+      break;
     }
     const std::string mover = !is_member(i) ? "nve or nve/sphere"
                                             : fmt::format("{} (without its keywords gravity and "
@@ -1415,10 +1448,16 @@ double FixInelastic::spread_since_build(const double *motion)
     for (int d = 0; d < 3; ++d)
       displacement_[3 * i + d] = atom->x[i][d] - position_at_build_[3 * i + d] +
           (motion ? problem_.timestep * motion[3 * i + d] : 0.0);
-  growth_ = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i)
+  growth_ = strayed_ = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
     growth_ = std::max(growth_, atom->radius[i] - radius_at_build_[i]);
-  reduce(nullptr, 0, &growth_, 1);
+    for (int d = 0; d < 3; ++d)
+      strayed_ = std::max(strayed_, std::abs(displacement_[3 * i + d]) / own_width_[d]);
+  }
+  double maxima[2] = {growth_, strayed_};
+  reduce(nullptr, 0, maxima, 2);
+  growth_ = maxima[0];
+  strayed_ = maxima[1];
   return spread(displacement_.data()) + 2.0 * growth_;
 }
 
@@ -1922,6 +1961,8 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
 {
   // Up to here a residual can come down, but need not.
   constexpr double NEAR_ROUND_OFF = 10.0;
+  // In half of the iterations or more; without room it stays, and otherwise falls by half or faster.
+  constexpr double STILL_FALLS = 0.7;
   ++run_unconverged_;
   const std::string named = worst_.empty() ? "" : ": " + worst_;    // numbers may not be finite
   std::string message, cause;
@@ -1940,12 +1981,23 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
                           "force of {:.4g}, where {:.4g} is allowed{}",
                           update->ntimestep, result.iterations, result.residual.feasibility,
                           result.residual.complementarity, tolerance_, named);
-    cause = tolerance_ < NEAR_ROUND_OFF * result.round_off
-        ? fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
-                      NEAR_ROUND_OFF * result.round_off)
-        : fmt::format("Either the scene leaves no room for the spheres, or: raise maxiter ({}), "
-                      "raise the tolerance, or lower the timestep",
-                      max_iterations_);
+    const std::string help =
+        fmt::format("raise maxiter ({}), raise the tolerance, or lower the timestep",
+                    max_iterations_);
+    const double before = result.trend.earlier(), now = result.trend.least();
+    if (tolerance_ < NEAR_ROUND_OFF * result.round_off)
+      cause = fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
+                          NEAR_ROUND_OFF * result.round_off);
+    else if (now < STILL_FALLS * before && std::isfinite(before))
+      cause = fmt::format("There is room as far as one can tell: the residual is still coming down "
+                          "(from {:.3g} to {:.3g} lately): {}",
+                          before, now, help);
+    else if (std::isfinite(before))
+      cause = fmt::format("The residual no longer comes down (from {:.3g} to {:.3g} lately): the scene "
+                          "leaves no room for the spheres, or needs far more iterations: {}",
+                          before, now, help);
+    else
+      cause = fmt::format("These were too few to tell whether there is room: {}", help);
   }
   if (!warn_only_) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);

@@ -150,12 +150,15 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double list_reach_;         // gap beyond which a pair may be missing from a fresh list
   double spread_at_start_;    // largest relative displacement since the list was built
   double growth_;             // of a radius since then
+  double strayed_;            // largest displacement since then, of the width that a rank owns
+  double own_width_[3];       // of the box, by this rank; no limit where nothing is beyond
   std::vector<double> position_at_build_, radius_at_build_, displacement_, unhindered_;
 
   double regular_timestep_;    // as the deck sets it
   bool setting_timestep_;      // the fix itself is changing it
   bool expecting_;             // state_ holds a prediction to compare with
   bool goes_on_;               // between setup and the end of the run
+  bool ended_pushing_;         // what the end of the last run took out of velocities is missing there
   double kick_;                // time for which the force acts before the next move
   double largest_kick_;        // [velocity] that one of the last contacts gave, on any rank
 

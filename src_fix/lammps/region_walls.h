@@ -28,7 +28,8 @@ class RegionWalls : protected Pointers {
  public:
   RegionWalls(class LAMMPS *lmp, std::vector<std::string> region_ids);
 
-  // Finds the regions and numbers their walls. Errors: a region that does not exist, an ellipsoid.
+  // Finds the regions and numbers their walls. Errors: a region that does not exist, or one whose walls
+  // LAMMPS does not show (an ellipsoid, a union with side out).
   void init();
 
   bool empty() const { return ids_.empty(); }

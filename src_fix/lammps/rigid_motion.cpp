@@ -12,7 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 
 using namespace LAMMPS_NS;
 using inelastic::multiply;
@@ -21,7 +21,9 @@ namespace {
 
 constexpr double SPHERE_MOMENT = 0.4;    // of a solid ball, in m R^2
 constexpr double COLLINEAR = 1.0e-7;     // smallest moment over the others; LAMMPS drops it there
-constexpr tagint MOST_MOLECULES = 100000000;    // every rank counts them all
+// Of the largest coordinate, times the machine epsilon: point masses nearer to one another than this
+// have an inertia, and turn, as the round-off of their positions will have it.
+constexpr double RESOLVED_ARM = 1.0e7;
 constexpr double AGREEMENT = 1.0e-6;    // relative, of masses and moments computed in two ways
 
 // Per owned atom: its body, -1 = in none.
@@ -40,6 +42,9 @@ void cross(const double *a, const double *b, double *c)
 
 double dot(const double *a, const double *b)
 { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+double norm(const double *a)
+{ return std::sqrt(dot(a, a)); }
 
 // Symmetric matrices are xx yy zz xy xz yz.
 double trace(const double *a)
@@ -149,44 +154,29 @@ void RigidMotion::count_spheres(int groupbit, int frozen_bit)
 {
   const int *const body = bodies_of_atoms(fix_);
   const int *const mask = atom->mask;
-  tagint extremes[2] = {0, 0}, of_all[2];    // minus the smallest, the largest
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (body[i] < 0) continue;
-    extremes[0] = std::max(extremes[0], -atom->molecule[i]);
-    extremes[1] = std::max(extremes[1], atom->molecule[i]);
-  }
-  MPI_Allreduce(extremes, of_all, 2, MPI_LMP_TAGINT, MPI_MAX, world);
-  const tagint most = of_all[1];
-  if (of_all[0] > 0 || most > MOST_MOLECULES)
-    error->all(FLERR,
-               "Fix inelastic rigid: molecule ID {} of a body must be from 0 to {}: use "
-               "reset_atoms mol",
-               of_all[0] > 0 ? -of_all[0] : most, MOST_MOLECULES);
-  const std::size_t molecules = static_cast<std::size_t>(most) + 1;
-  std::vector<int> mine(3 * molecules, 0), all(3 * molecules);
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (body[i] < 0) continue;
-    const tagint molecule = atom->molecule[i];
-    ++mine[molecule];
-    if (!(mask[i] & groupbit)) ++mine[molecules + molecule];
-    if (mask[i] & frozen_bit) ++mine[2 * molecules + molecule];
-  }
-  MPI_Allreduce(mine.data(), all.data(), static_cast<int>(all.size()), MPI_INT, MPI_SUM, world);
-  for (std::size_t m = 0; m < molecules; ++m) {
-    const int outside = all[molecules + m];
-    if (outside > 0 && outside < all[m])
+  std::vector<MoleculeSizes::Molecule> mine;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (body[i] >= 0)
+      mine.push_back({atom->molecule[i], 1, !(mask[i] & groupbit), (mask[i] & frozen_bit) != 0});
+  molecules_.count(std::move(mine), world);
+  for (const MoleculeSizes::Molecule &molecule : molecules_.all()) {
+    if (molecule.id < 0)
+      error->all(FLERR,
+                 "Fix inelastic rigid: molecule ID {} of a body must not be negative: use "
+                 "reset_atoms mol",
+                 molecule.id);
+    if (molecule.outside > 0 && molecule.outside < molecule.spheres)
       error->all(FLERR,
                  "Fix inelastic rigid: the body of molecule {} is partly outside the fix's group: "
                  "put all its spheres in, or none",
-                 m);
-    if (all[2 * molecules + m] > 0)
+                 molecule.id);
+    if (molecule.frozen > 0)
       error->all(FLERR,
                  "Fix inelastic rigid: a sphere of molecule {} is frozen: frozen spheres cannot "
                  "belong to a body",
-                 m);
+                 molecule.id);
   }
-  all.resize(molecules);
-  spheres_in_ = all;
+  last_sphere_.assign(molecules_.all().size(), NONE);
 
   // Free spheres have no molecule of their own: LAMMPS takes all of them for one.
   int unseen = 0, any_unseen = 0;
@@ -220,18 +210,22 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
 
   // The spheres of a body as a chain, and bodies in the order of their first ones: what is near in
   // space is near in memory.
-  constexpr int NONE = -1;
   const tagint *const molecule = atom->molecule;
   const tagint *const tag = atom->tag;
-  tagint largest_id = 0;
-  for (int i = 0; i < nall; ++i)
-    if (linear_[3 * i] > 0.0) largest_id = std::max(largest_id, molecule[i]);
   std::vector<int> first_spheres, next(nall, NONE);
-  if (last_sphere_.size() <= static_cast<std::size_t>(largest_id))
-    last_sphere_.resize(static_cast<std::size_t>(largest_id) + 1, NONE);
+  incomplete_.assign(nall, 0);
+  std::string message;
   for (int i = 0; i < nall; ++i) {
     if (!(linear_[3 * i] > 0.0)) continue;
-    int &before = last_sphere_[molecule[i]];
+    const int place = molecules_.place(molecule[i]);
+    if (place == MoleculeSizes::NONE) {
+      incomplete_[i] = 1;
+      message = fmt::format("molecule {} had no body when the run began: create no bodies during a "
+                            "run, and change no molecule ID",
+                            molecule[i]);
+      continue;
+    }
+    int &before = last_sphere_[place];
     if (before == NONE)
       first_spheres.push_back(i);
     else
@@ -241,13 +235,12 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
 
   problem.bodies.clear(nall);
   copy_of_.clear();
-  incomplete_.assign(nall, 0);
-  std::string message;
   std::vector<int> spheres, originals, copies, copy_of;
   std::vector<double> nothing;
   for (const int first_sphere : first_spheres) {
     const tagint id = molecule[first_sphere];
-    last_sphere_[id] = NONE;
+    const int place = molecules_.place(id);
+    last_sphere_[place] = NONE;
     spheres.clear();
     for (int i = first_sphere; i != NONE; i = next[i]) spheres.push_back(i);
     // The owned sphere before its copies.
@@ -266,14 +259,14 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
       }
     }
     const int number = static_cast<int>(originals.size());
-    const bool known = id < static_cast<tagint>(spheres_in_.size());
-    if (!known || number != spheres_in_[id]) {
+    const auto all = static_cast<int>(molecules_.all()[place].spheres);
+    if (number != all) {
       for (const int i : spheres) incomplete_[i] = 1;
       for (const int i : originals)
         if (i < nlocal)
           message = fmt::format("the body of molecule {} has {} spheres, of which a rank sees {}: "
                                 "raise comm_modify cutoff, and create no bodies during a run",
-                                id, known ? spheres_in_[id] : 0, number);
+                                id, all, number);
       continue;
     }
     for (int k = 0; k < number; ++k) copy_of_.push_back(k);
@@ -284,6 +277,7 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
                        0.0, nothing.data());
   }
   bodies_.resize(problem.bodies.size());
+  message = explained(message, host);
   if (!first_of_run) return message;
   measure(problem);
   double extent = 0.0;
@@ -293,6 +287,24 @@ std::string RigidMotion::find_bodies(inelastic::ContactProblem &problem, inelast
   host.reduce(nullptr, 0, &extent, 1);
   check_reach(extent);
   return message;
+}
+
+// A body may be seen in part because a sphere of it is not there any more. Collective.
+std::string RigidMotion::explained(const std::string &message, inelastic::Host &host) const
+{
+  const int *const body = bodies_of_atoms(fix_);
+  double sums[2] = {message.empty() ? 0.0 : 1.0, 0.0};
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (body[i] >= 0) sums[1] += 1.0;
+  host.reduce(sums, 2, nullptr, 0);
+  double expected = 0.0;
+  for (const MoleculeSizes::Molecule &molecule : molecules_.all())
+    expected += static_cast<double>(molecule.spheres);
+  if (message.empty() || sums[1] >= expected) return message;
+  return fmt::format("{:.0f} of the {:.0f} spheres of bodies are lost, because they left the box or were "
+                     "deleted: walls must keep bodies inside of the box, and whole bodies alone may be "
+                     "deleted, between runs",
+                     expected - sums[1], expected);
 }
 
 // A sphere of another rank that touches one of this rank's brings its whole body with it.
@@ -658,8 +670,17 @@ std::string RigidMotion::disagreement(const inelastic::ContactProblem &problem)
       message =
           fmt::format("fix {} gives the body of molecule {} the mass {:.6g}, its spheres have "
                       "{:.6g}: bodies must be molecules (rigid/small molecule), their masses "
-                      "set before fix {}",
+                      "set before fix {}, with no other ones in an infile",
                       fix_id_, molecule, found[1], body.mass, fix_id_);
+      continue;
+    }
+    const double extent = std::sqrt(trace(body.point_inertia) / body.mass);
+    const double rounded = std::numeric_limits<double>::epsilon() * norm(atom->x[i]);
+    if (inertia_ == Inertia::POINT && extent < RESOLVED_ARM * rounded) {
+      message = fmt::format("the spheres of molecule {} are about {:.2g} apart, too near to one another "
+                            "for point masses at coordinates that are rounded by {:.1g}: at least {:.1g} "
+                            "is needed, or rigid {} solid, or one sphere in their place",
+                            molecule, extent, rounded, RESOLVED_ARM * rounded, fix_id_);
       continue;
     }
     const double *const moments = found + 2;
@@ -678,7 +699,8 @@ std::string RigidMotion::disagreement(const inelastic::ContactProblem &problem)
     message = fmt::format(
         "fix {} turns the body of molecule {} with the moments of inertia {:.6g}, {:.6g}, {:.6g}, "
         "{}, where fix inelastic has rigid {} {}. Spheres count as point masses for rigid/small if "
-        "their diameter is 0 when its bodies are set up",
+        "their diameter is 0 when its bodies are set up; moments from an infile must be one or the "
+        "other",
         fix_id_, molecule, moments[0], moments[1], moments[2], kind, fix_id_,
         inertia_ == Inertia::POINT ? "point" : "solid");
   }

@@ -16,6 +16,7 @@
 
 #include "contact_problem.h"
 #include "host.h"
+#include "molecule_sizes.h"
 #include "pointers.h"
 
 #include <array>
@@ -143,8 +144,9 @@ class RigidMotion : protected Pointers {
   std::string fix_id_;
   Inertia inertia_;
   Fix *fix_;
-  std::vector<int> spheres_in_;     // per molecule ID, all ranks
-  std::vector<int> last_sphere_;    // per molecule ID: room for find_bodies, -1 = none
+  static constexpr int NONE = -1;
+  MoleculeSizes molecules_;
+  std::vector<int> last_sphere_;    // per molecule: room for find_bodies, NONE between its calls
   std::vector<int> copy_of_;        // per member: which of the body's originals it is
   std::vector<Body> bodies_;        // beside those of the problem
   std::vector<char> incomplete_;    // per particle: of a body of which this rank has only a part
@@ -157,6 +159,7 @@ class RigidMotion : protected Pointers {
   double mass(int i) const;
   void count_spheres(int groupbit, int frozen_bit);
   void check_reach(double extent) const;
+  std::string explained(const std::string &message, inelastic::Host &host) const;
   void difference(const inelastic::RigidBodies &bodies, std::size_t b, const double *velocity,
                   const double *reference, Push &push) const;
 };

@@ -86,12 +86,16 @@ void SceneCheck::warn_of_hidden_pairs(const Group &group) const
                      what);
   };
 
-  for (int k = 0; k < neighbor->nex_group; ++k)
-    if (hides([&](int i) { return (atom->mask[i] & neighbor->ex1_bit[k]) != 0; },
-              [&](int i) { return (atom->mask[i] & neighbor->ex2_bit[k]) != 0; }))
-      warn(fmt::format("neigh_modify exclude group {} {}",
-                       this->group->names[neighbor->ex1_group[k]],
-                       this->group->names[neighbor->ex2_group[k]]));
+  // LAMMPS has the bits of excluded groups only after this.
+  auto in_group = [&](int i, int number) {
+    return (atom->mask[i] & this->group->bitmask[number]) != 0;
+  };
+  for (int k = 0; k < neighbor->nex_group; ++k) {
+    const int one = neighbor->ex1_group[k], other = neighbor->ex2_group[k];
+    if (hides([&](int i) { return in_group(i, one); }, [&](int i) { return in_group(i, other); }))
+      warn(fmt::format("neigh_modify exclude group {} {}", this->group->names[one],
+                       this->group->names[other]));
+  }
   for (int k = 0; k < neighbor->nex_type; ++k)
     if (hides([&](int i) { return atom->type[i] == neighbor->ex1_type[k]; },
               [&](int i) { return atom->type[i] == neighbor->ex2_type[k]; }))
@@ -100,7 +104,7 @@ void SceneCheck::warn_of_hidden_pairs(const Group &group) const
   for (int k = 0; k < neighbor->nex_mol; ++k) {
     // The spheres of one body are kept apart anyway; free spheres are looked at with the bodies.
     if (neighbor->ex_mol_intra[k] && group.bodies) continue;
-    auto chosen = [&](int i) { return (atom->mask[i] & neighbor->ex_mol_bit[k]) != 0; };
+    auto chosen = [&](int i) { return in_group(i, neighbor->ex_mol_group[k]); };
     if (hides(chosen, chosen))
       warn(fmt::format("neigh_modify exclude molecule/{} {}",
                        neighbor->ex_mol_intra[k] ? "intra" : "inter",

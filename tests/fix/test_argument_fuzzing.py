@@ -143,7 +143,7 @@ WRONG = {
     "colour": ["", "red"],
     "1e-5": [""],
 }
-LENGTHS = ["1e-5", "2.5E-4", "+1e-3", "1", ".001", "1e-3"]
+LENGTHS = ["1e-5", "2.5E-4", "+1e-3", "1e-02", ".001", "1e-3"]
 
 
 def options(table: dict[str, list[str]]) -> st.SearchStrategy[str]:

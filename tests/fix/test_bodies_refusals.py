@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from bodies import (
     rigid_velocities,
 )
 from lammps_run import Runner
-from scenes import read_dump
+from scenes import mass, read_dump
 
 RADIUS = 0.05
 EPS = 0.0005 * RADIUS
@@ -169,18 +170,90 @@ def test_bodies_that_are_no_molecules(ranks: int, tmp_path: Path, refused: Refus
     assert "bodies must be molecules" in error, error
 
 
-@pytest.mark.parametrize("molecule", [-3, 100000001])
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_molecule_ids_out_of_range(
-    ranks: int, molecule: int, tmp_path: Path, refused: Refused
-) -> None:
-    """LAMMPS reads any. Of one body only, which one rank alone may own."""
-    text = changed(deck(tmp_path), "group bodies molecule > 0", "group bodies molecule != 0")
-    data = tmp_path / "spheres.data"
+def with_molecule(folder: Path, molecule: int) -> str:
+    """Return the scene with another ID for its last body."""
+    text = changed(deck(folder), "group bodies molecule > 0", "group bodies molecule != 0")
+    data = folder / "spheres.data"
     last = f" 1.0 {BODIES.molecules.max()}\n"
     data.write_text(changed(data.read_text(), last, f" 1.0 {molecule}\n"))
-    error = refused(text + "run 3\n", ranks=ranks)
-    assert f"molecule ID {molecule} of a body must be from 0 to 100000000" in error, error
+    return text
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_negative_molecule_id(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    """LAMMPS reads any. Of one body only, which one rank alone may own."""
+    error = refused(with_molecule(tmp_path, -3) + "run 3\n", ranks=ranks)
+    assert "molecule ID -3 of a body must not be negative" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_large_molecule_id_costs_nothing(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    """Same motion, and no memory for the IDs in between, of which there are two thousand million."""
+    small = lmp(deck(tmp_path / "small") + DUMP_BODY_SPHERES + "run 3\n", into="small", ranks=ranks)
+    text = with_molecule(tmp_path / "large", 2_000_000_000)
+    large = lmp(text + DUMP_BODY_SPHERES + "run 3\n", into="large", ranks=ranks)
+    ends = [
+        read_dump(tmp_path / name / "particles.dump")[-1].positions for name in ("small", "large")
+    ]
+    assert (ends[0] == ends[1]).all()
+    used = [
+        re.findall(r"memory allocation .* = .* \| (\S+) Mbytes", run.screen)[-1]
+        for run in (small, large)
+    ]
+    # [MB] One number for each ID would be 8,000.
+    assert float(used[1]) < float(used[0]) + 1
+
+
+def test_a_body_that_loses_a_sphere(tmp_path: Path, refused: Refused) -> None:
+    """It is deleted between two runs, and fix rigid/small does not look again."""
+    text = deck(tmp_path, rigid_options="reinit no") + "run 3\n"
+    lost = f"group last id {len(BODIES.molecules)}\ndelete_atoms group last compress no\nrun 3\n"
+    error = refused(text + lost)
+    assert "fix bodies gives the body of molecule" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_body_that_leaves_the_box(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    centres = ((0.2, 0.8), (0.2, 0.8), (0.2, 0.8))
+    dimers = random_bodies([dimer(1.5)] * 6, RADIUS, centres, seed=1)
+    text = body_scene(
+        dimers,
+        RADIUS,
+        tmp_path,
+        inertia="solid",
+        tolerance=EPS,
+        boundary="f f f",
+        options="shorten yes",
+    )
+    error = refused(text + "thermo 1000\nrun 1000\n", ranks=ranks)
+    assert re.search(
+        r"\d+ of the 12 spheres of bodies are lost, because they left the box", error
+    ), error
+
+
+@pytest.mark.parametrize("distance", [1e-9, 1e-12, 1e-15])
+def test_point_masses_too_near_one_another(
+    distance: float, tmp_path: Path, refused: Refused
+) -> None:
+    """Their inertia, and so how they turn, is round-off."""
+    pair = Bodies(np.array([[0.3, 0.3, 0.3], [0.3 + distance, 0.3, 0.3]]), np.array([1, 1]))
+    text = body_scene(pair, RADIUS, tmp_path, inertia="point", tolerance=EPS)
+    error = refused(text + "run 20\n")
+    assert "the spheres of molecule 1 are about" in error, error
+    assert "too near to one another for point masses" in error, error
+
+
+def test_an_infile_with_other_values(tmp_path: Path, refused: Refused) -> None:
+    dimers = random_bodies([dimer(1.5)], RADIUS, ((0.2, 0.4),) * 3, seed=1)
+    centre = " ".join(f"{x:.17g}" for x in dimers.positions.mean(axis=0))
+    (tmp_path / "bodies.txt").write_text(
+        f"1\n1 {2 * mass(RADIUS):.17g} {centre} 1e-6 1e-6 1e-6 0 0 0 0 0 0 0 0 0 0 0 0\n"
+    )
+    text = body_scene(
+        dimers, RADIUS, tmp_path, inertia="solid", tolerance=EPS, rigid_options="infile bodies.txt"
+    )
+    error = refused(text + "run 1\n")
+    assert "moments from an infile must be one or the other" in error, error
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

@@ -273,7 +273,7 @@ def test_a_list_that_does_not_reach(
     thermo = "step time dt ke f_contact[4] f_contact[10]"
     text = deck(tmp_path, options="region container shorten yes", thermo=thermo, **fast)
     text += DUMP_PARTICLES + "run 300\nrun 10\n"
-    text += 'print "regular step $(dt:%.3f)"\n'
+    text += 'unfix contact\nprint "regular step $(dt:%.3f)"\n'
     result = lmp(text, ranks=ranks)
     for frame in read_dump(tmp_path / "particles.dump"):
         radii = frame["radius"]
@@ -347,27 +347,77 @@ def test_a_wall_that_jumps_over_a_centre_is_no_silent_mistake(
     assert "region lift" in error
 
 
-@pytest.mark.parametrize("cutoff", [0.1, 1])
-def test_radii_that_grow(cutoff: float, tmp_path: Path, refused: Refused, lmp: Runner) -> None:
-    """Growth is no motion that the fix can foresee: seen in its overlap, or refused; not missed."""
-    text = scene(
-        [[0.1, 0.5, 0.2], [0.4, 0.5, 0.2]],
-        RADIUS,
-        tmp_path,
-        tolerance=EPS,
-        box=((0, 2), (0, 2), (0, 2)),
-        gravity=False,
-        style="atom_style sphere 1",
-        setup="variable wide equal 0.1+0.2*time",
-        fixes="fix grow all adapt 1 atom diameter v_wide mass no",
-        options="",
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_union_seen_from_outside(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    """LAMMPS shows no wall of parts that do not lie in one another."""
+    setup = (
+        "region a sphere 0 0 0 0.01\nregion b sphere 0.5 0 0 0.01\nregion ab union 2 a b side out"
     )
-    text = re.sub(r"pair_style zero \S+", f"pair_style zero {cutoff}", text)
-    result = lmp(text + DUMP_PARTICLES + "run 300\n", must_pass=False)
-    frames = read_dump(tmp_path / "particles.dump")
-    true = [deepest_pair(frame.positions, frame["radius"]) for frame in frames]
-    if result.status == 0:
-        assert result.thermo["f_contact[4]"] == pytest.approx(true, abs=1e-9)  # round-off
-    else:
-        assert "neighbour list" in result.errors[0]
-        assert max(true) <= EPS
+    text = deck(tmp_path, setup=setup, options="region container ab")
+    error = refused(text + "run 1\n", ranks=ranks)
+    assert "region ab is a union with side out" in error, error
+    assert "list the parts instead" in error, error
+
+
+MESSAGES = {
+    "a force that is not finite": (
+        {"fixes": "variable f atom id*1e305\nfix blow all addforce v_f 0 0"},
+        ["the force on atom 1 is not a finite number"],
+    ),
+    "the same where steps are shortened": (
+        {
+            "fixes": "variable f atom id*1e305\nfix blow all addforce v_f 0 0",
+            "options": "region container shorten yes",
+        },
+        ["the force on atom 1 is not a finite number"],
+    ),
+    "fix move without frozen": (
+        {
+            "fixes": "group moved id 3\ngroup still subtract all moved\n"
+            "fix lift moved move linear 0 0.1 0",
+            "motion": "fix motion still nve",
+        },
+        ["atom 3 is moved by fix lift (move) and is not frozen", "keyword frozen"],
+    ),
+    "a tolerance as large as a sphere": (
+        {"tolerance": 0.05},
+        ["the tolerance 0.05", "must be below the smallest radius of group all, 0.05"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_the_cause_is_named(name: str, tmp_path: Path, refused: Refused) -> None:
+    options, words = MESSAGES[name]
+    error = refused(deck(tmp_path, **options) + "run 5\n")
+    for word in words:
+        assert word in error, error
+
+
+def column(folder: Path, count: int, top: float, **options: object) -> str:
+    """Return spheres that stand on one another between floor and ceiling, in a tube."""
+    x = np.full(count, 0.5)
+    y = 0.05 + 0.1 * np.arange(count)
+    box = ((0.0, 1.0), (0.0, top), (0.0, 1.0))
+    return scene(
+        np.column_stack([x, y, x]),
+        RADIUS,
+        folder,
+        box=box,
+        tolerance=1e-9,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def test_slow_is_told_from_impossible(tmp_path: Path, refused: Refused) -> None:
+    """The same number of iterations: a column that needs more, and one that does not fit."""
+    options = "region container maxiter 300"
+    slow = refused(column(tmp_path, 60, 7.0, options=options) + "run 1\n")
+    assert "the residual is still coming down" in slow, slow
+    assert "raise maxiter (300)" in slow, slow
+    closing = "region lid plane 0 4.99 0 0 -1 0"
+    full = column(tmp_path, 50, 7.0, setup=closing, options=f"region container lid {options[17:]}")
+    tight = refused(full + "run 1\n")
+    assert "leaves no room" in tight, tight
+    few = refused(column(tmp_path, 60, 7.0, options="region container maxiter 2") + "run 1\n")
+    assert "too few to tell whether there is room" in few, few
