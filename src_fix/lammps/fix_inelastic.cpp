@@ -1963,6 +1963,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
   constexpr double NEAR_ROUND_OFF = 10.0;
   // In half of the iterations or more; without room it stays, and otherwise falls by half or faster.
   constexpr double STILL_FALLS = 0.7;
+  constexpr double UNSEEN = 100.0;
   ++run_unconverged_;
   const std::string named = worst_.empty() ? "" : ": " + worst_;    // numbers may not be finite
   std::string message, cause;
@@ -1984,7 +1985,10 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
     const std::string help =
         fmt::format("raise maxiter ({}), raise the tolerance, or lower the timestep",
                     max_iterations_);
-    const double before = result.trend.earlier(), now = result.trend.least();
+    double before = result.trend.earlier();
+    const double now = result.trend.least();
+    // Of constraints that were found after the last iteration it knows nothing.
+    if (result.residual.feasibility > UNSEEN * now) before = std::numeric_limits<double>::infinity();
     if (tolerance_ < NEAR_ROUND_OFF * result.round_off)
       cause = fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
                           NEAR_ROUND_OFF * result.round_off);

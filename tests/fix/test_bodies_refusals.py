@@ -188,7 +188,7 @@ def test_a_negative_molecule_id(ranks: int, tmp_path: Path, refused: Refused) ->
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_large_molecule_id_costs_nothing(ranks: int, tmp_path: Path, lmp: Runner) -> None:
-    """Same motion, and no memory for the IDs in between, of which there are two thousand million."""
+    """Same motion, and no memory for the two thousand million IDs in between."""
     small = lmp(deck(tmp_path / "small") + DUMP_BODY_SPHERES + "run 3\n", into="small", ranks=ranks)
     text = with_molecule(tmp_path / "large", 2_000_000_000)
     large = lmp(text + DUMP_BODY_SPHERES + "run 3\n", into="large", ranks=ranks)
@@ -213,7 +213,7 @@ def test_a_body_that_loses_a_sphere(tmp_path: Path, refused: Refused) -> None:
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_a_body_that_leaves_the_box(ranks: int, tmp_path: Path, refused: Refused) -> None:
+def test_bodies_that_fall_out_of_the_box(ranks: int, tmp_path: Path, refused: Refused) -> None:
     centres = ((0.2, 0.8), (0.2, 0.8), (0.2, 0.8))
     dimers = random_bodies([dimer(1.5)] * 6, RADIUS, centres, seed=1)
     text = body_scene(

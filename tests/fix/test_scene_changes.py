@@ -148,7 +148,7 @@ def test_radii_changed_by_something_unknown(tmp_path: Path, refused: Refused) ->
 
 
 def test_radii_grown_between_runs(tmp_path: Path, lmp: Runner) -> None:
-    """What the page says to do instead: each short run pushes the pair apart by what it has grown."""
+    """What the page says to do instead: a short run pushes apart what has grown before it."""
     text = pair(
         tmp_path,
         style="atom_style sphere 1",
