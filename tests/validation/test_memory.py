@@ -19,6 +19,7 @@ import pytest
 import test_bodies_continuation as of_bodies
 import test_continuation as of_spheres
 import test_determinism as moving
+import test_scene_changes as scene_changes
 from bodies import DUMP_BODIES
 from building import REPOSITORY, cmake, generator, run
 from lammps_run import BIN, run_lmp, without_launcher
@@ -66,6 +67,8 @@ SCENES: dict[str, Callable[[Path], str]] = {
     "solid": lambda folder: bodies(folder, "solid"),
     "uzawa": uzawa,
     "bad start": bad_start,
+    # More than 300 ghosts, for which LAMMPS would make too small buffers.
+    "newton off": lambda folder: scene_changes.crowd(folder, "off") + ALL_DUMPS + "run 20\n",
 }
 REFUSED = {
     "argument": lambda folder: deck(folder) + "fix more all inelastic 1e-5 region nowhere\n",
