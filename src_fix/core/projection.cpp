@@ -1,6 +1,8 @@
 #include "projection.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace inelastic {
 
@@ -52,7 +54,9 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
     if (result.complete && result.converged) return result;
     if (result.complete || !solved.converged || result.rounds >= max_rounds) {
       // Nothing will be done about what was added, but the residual must tell of it.
-      const std::vector<double> &impulse = problem.contacts.impulse;
+      std::vector<double> &impulse = problem.contacts.impulse;
+      // What was added with a first guess has pushed nobody.
+      std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(solved_for), impulse.end(), 0.0);
       std::vector<double> gap_at_end(problem.contacts.size());
       gap_operator.prepare(problem);
       gap_operator.apply(problem, impulse.data(), gap_at_end.data(), host);

@@ -45,7 +45,7 @@ struct ProjectionResult {
 
 // Solves at least once. On return `velocity` (3 per particle, copies included) holds the projection
 // of problem.predicted_velocity and problem.contacts.impulse the impulses. When the result is not
-// complete, `velocity` knows nothing of the constraints that were added last.
+// complete, `velocity` knows nothing of the constraints that were added last, and their impulses are 0.
 ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,
                          const SolverLimits &limits, int max_rounds, Host &host,
                          std::vector<double> &velocity);

@@ -829,18 +829,23 @@ const std::vector<RegionWalls::Look> &FixInelastic::looks(const double *velocity
   return looks_;
 }
 
-// Looks from where the step takes those atoms for which the constraint of a wall may be inexact.
+// Looks from where the step takes those atoms for which the constraint of a wall may be inexact. A
+// constraint that was set by an earlier look is set again wherever its wall is now.
 const std::vector<RegionWalls::Look> &
 FixInelastic::looks_at_end(const std::vector<double> &velocity)
 {
   const std::vector<double> &moved = rigid_ ? rigid_->motion() : velocity;
   looks_.clear();
   const double h = problem_.timestep;
+  std::unordered_set<int> followed;
+  for (std::size_t c = 0; c < origin_.size(); ++c)
+    if (origin_[c].wall != 0 && origin_[c].followed) followed.insert(problem_.contacts.first[c]);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (problem_.inverse_mass[i] == 0.0 || (walls_->exact() && !is_member(i))) continue;
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
-    const double reach = atom->radius[i] + (rigid_ ? margin_ : 0.0);
+    const double reach =
+        followed.count(i) ? EXTREME : atom->radius[i] + (rigid_ ? margin_ : 0.0);
     if (reach + h * norm(v) < clear_of_walls_[i]) continue;
     looks_.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
   }

@@ -24,7 +24,10 @@ WallView make_view(const Region::Contact &contact, int first_wall)
   WallView view{};
   view.wall = first_wall + contact.iwall;
   view.distance = view.distance_now = contact.r;
-  const double inverse = contact.r > 0.0 ? 1.0 / contact.r : 0.0;
+  // Near a curved wall the distance is a small difference, with more round-off than the vector.
+  const double length = std::sqrt(contact.delx * contact.delx + contact.dely * contact.dely +
+                                  contact.delz * contact.delz);
+  const double inverse = length > 0.0 ? 1.0 / length : 0.0;
   view.normal[0] = contact.delx * inverse;
   view.normal[1] = contact.dely * inverse;
   view.normal[2] = contact.delz * inverse;

@@ -172,7 +172,7 @@ def as_short(value: float) -> str:
 def as_sample(ours: Sample, decimals: int) -> str:
     """Write mean ± standard deviation (standard error)."""
     text = as_text(ours.mean, decimals)
-    if ours.n < 2:
+    if math.isnan(ours.std):
         return text
     return f"{text} ± {as_text(ours.std, decimals)} ({as_text(ours.error, decimals + 1)})"
 

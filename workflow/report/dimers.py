@@ -38,10 +38,15 @@ from .statistics import (
     mean_distribution,
     numbers,
     peak,
+    pooled_numbers,
     root_mean_square_difference,
     sample,
 )
 
+POOLED = (
+    "Mean ± standard deviation (standard error); the standard deviation of rows of fewer than four "
+    "runs is that of all rows, pooled."
+)
 # Of the dimer that is drawn.
 DRAWN = 1.8
 ByAspect = Mapping[float, Sequence[Result]]
@@ -330,7 +335,7 @@ def _agitation(data: Data) -> Section:
 
 def _against(label: str, groups: ByAspect, name: str, kind: Any = "points") -> Curve:
     """Return a number against the aspect ratio, where it is known."""
-    found = {aspect: numbers(group, name) for aspect, group in groups.items()}
+    found = pooled_numbers(groups, name)
     known = {aspect: one for aspect, one in found.items() if one.n}
     return curve(
         label,
@@ -339,6 +344,13 @@ def _against(label: str, groups: ByAspect, name: str, kind: Any = "points") -> C
         [one.error for one in known.values()],
         kind,
     )
+
+
+def _top(one: Curve, reach: int) -> str:
+    """Write where a curve is largest, with its standard error; see `peak`."""
+    errors = [math.nan] * len(one.x) if one.error is None else one.error.tolist()
+    place, error = peak(one.x.tolist(), one.y.tolist(), errors, reach)
+    return f"{as_text(place, 2)} ± {as_text(error, 2)}"
 
 
 def _figure_11(data: Data, groups: ByAspect) -> Section:
@@ -358,22 +370,23 @@ def _figure_11(data: Data, groups: ByAspect) -> Section:
                 kind="apart",
             )
         )
-        rows = []
-        for aspect, group in groups.items():
-            rows.append(
-                cells(
-                    as_short(aspect) if aspect > 1 else "1 (spheres)",
-                    len(group),
-                    as_sample(numbers(group, "packing_fraction").scaled(100), 2),
-                    as_sample(numbers(group, "packing_fraction_with_necks").scaled(100), 2),
-                )
+        phi = pooled_numbers(groups, "packing_fraction")
+        with_necks = pooled_numbers(groups, "packing_fraction_with_necks")
+        rows = [
+            cells(
+                as_short(aspect) if aspect > 1 else "1 (spheres)",
+                len(group),
+                as_sample(phi[aspect].scaled(100), 2),
+                as_sample(with_necks[aspect].scaled(100), 2),
             )
+            for aspect, group in groups.items()
+        ]
         said = [
             f"{label}, largest φ at L/d = {as_short(float(one.x[np.argmax(one.y)]))} "
-            f"({as_text(100 * float(one.y.max()), 2)} %), by a parabola through the three highest "
-            f"points at {as_text(peak(one.x.tolist(), one.y.tolist()), 2)}"
+            f"({as_text(100 * float(one.y.max()), 2)} %), by a parabola through it and one "
+            f"neighbour to either side at {_top(one, 1)}, through two at {_top(one, 2)}"
             for label, one in (("raw", raw), ("with necks", necks))
-            if len(one.x) > 2
+            if len(one.x) > 4
         ]
         mean_field = elsewhere["baule2013"]
         blocks = [
@@ -400,7 +413,7 @@ def _figure_11(data: Data, groups: ByAspect) -> Section:
                 "Packing fraction against aspect ratio",
                 ("L/d", "runs", "φ [%]", "φ with necks [%]"),
                 rows,
-                ("Mean ± standard deviation (standard error).",),
+                (POOLED,),
             ),
             Text(
                 f"Paper: φ grows, and falls above about L/d = {stated}; the curve with necks looks "
@@ -510,8 +523,11 @@ def _figure_13(data: Data, groups: ByAspect) -> Section:
     known = {a: group for a, group in groups.items() if numbers(group, "coordination_number").n}
     if known:
         rows = []
+        firm = pooled_numbers(known, "coordination_number_without_rattlers")
+        contacts = pooled_numbers(known, "coordination_number")
+        touched = pooled_numbers(known, "neighbours")
         for aspect, group in known.items():
-            z, neighbours = numbers(group, "coordination_number"), numbers(group, "neighbours")
+            z, neighbours = contacts[aspect], touched[aspect]
             outside = aspect > 1 and abs(z.mean - value) > tolerance
             rows.append(
                 cells(
@@ -521,7 +537,7 @@ def _figure_13(data: Data, groups: ByAspect) -> Section:
                     as_sample(neighbours, 3),
                     as_short(numbers(group, "resolution").mean),
                     as_text(numbers(group, "rattlers").mean * 100, 2),
-                    as_sample(numbers(group, "coordination_number_without_rattlers"), 3),
+                    as_sample(firm[aspect], 3),
                 )
             )
         dimers = [result for group in _true_dimers(known).values() for result in group]
@@ -574,7 +590,7 @@ def _figure_13(data: Data, groups: ByAspect) -> Section:
                 ),
                 rows,
                 (
-                    f"Mean ± standard deviation (standard error). Marked: outside {value:g} ± "
+                    f"{POOLED} Marked: outside {value:g} ± "
                     f"{tolerance:g}. Near L/d = 1 the two contacts of a dimer with a neighbour lie "
                     "close together, and only a tolerance well below ε = 0.005 (L/d - 1) r tells "
                     "both.",

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from ..store import Result
 
 FloatArray = NDArray[np.float64]
+Key = TypeVar("Key", bound=Hashable)
 
 # Parameters that do not change the packing but by chance: cases that differ in these alone are
 # repeats.
 REPEATS = frozenset({"seed", "dump_every"})
+# Samples of fewer values get the scatter of all samples of their kind.
+FEW = 4
 # Above this many standard errors a difference is marked.
 LARGE = 2.0
 
@@ -58,6 +61,29 @@ def sample(values: Iterable[float]) -> Sample:
 def numbers(results: Iterable[Result], name: str) -> Sample:
     """Return mean and scatter of one of the results' numbers."""
     return sample(result.number(name) for result in results)
+
+
+def pooled(samples: Mapping[Key, Sample]) -> dict[Key, Sample]:
+    """Give samples of few values the scatter that all samples share.
+
+    The standard deviation of two or three values is itself uncertain by half and more, and near
+    zero by chance in some of many samples. Where the scatter can be taken to be the same in all,
+    sqrt(sum of (n - 1) s^2 / sum of (n - 1)) is a better one.
+    """
+    freedom = sum(one.n - 1 for one in samples.values() if one.n > 1)
+    if not freedom:
+        return dict(samples)
+    square = sum((one.n - 1) * one.std**2 for one in samples.values() if one.n > 1)
+    std = math.sqrt(square / freedom)
+    return {
+        key: Sample(one.mean, std, one.n) if 0 < one.n < FEW else one
+        for key, one in samples.items()
+    }
+
+
+def pooled_numbers(groups: Mapping[Key, Iterable[Result]], name: str) -> dict[Key, Sample]:
+    """Return mean and scatter of one of the results' numbers, group by group; see `pooled`."""
+    return pooled({key: numbers(group, name) for key, group in groups.items()})
 
 
 @dataclass(frozen=True)
@@ -210,15 +236,26 @@ def computing_seconds(results: Iterable[Result]) -> float:
     return float(sum(result.record["wall_seconds"] * result.record["ranks"] for result in results))
 
 
-def peak(x: Sequence[float], y: Sequence[float]) -> float:
-    """Return where a parabola through the largest value and its neighbours is largest.
+def peak(
+    x: Sequence[float], y: Sequence[float], errors: Sequence[float], reach: int = 1
+) -> tuple[float, float]:
+    """Return where a parabola near the largest value is largest, and its standard error.
 
-    The x of the largest value where that one is the first or the last.
+    The parabola is fitted to the largest value and those up to `reach` places to either side; the
+    error is what the errors of these values make of its top (linear propagation). The x of the
+    largest value, and NaN, where that one is too near to either end or the parabola has no top.
     """
     best = int(np.argmax(y))
-    if not 0 < best < len(y) - 1:
-        return float(x[best])
-    near = slice(best - 1, best + 2)
+    if not reach <= best < len(y) - reach:
+        return float(x[best]), math.nan
+    near = slice(best - reach, best + reach + 1)
     # About the middle one, which keeps the numbers small.
-    a, b, _ = np.polyfit(np.asarray(x[near]) - x[best], np.asarray(y[near]), 2)
-    return float(x[best] - b / (2 * a)) if a < 0 else float(x[best])
+    apart = np.asarray(x[near]) - x[best]
+    # Rows of the pseudo-inverse: how much of each value is in the coefficients a and b.
+    of_a, of_b, _ = np.linalg.pinv(np.vander(apart, 3))
+    values = np.asarray(y[near])
+    a, b = float(of_a @ values), float(of_b @ values)
+    if not a < 0:
+        return float(x[best]), math.nan
+    slope = -of_b / (2 * a) + b * of_a / (2 * a**2)
+    return float(x[best] - b / (2 * a)), float(np.linalg.norm(slope * np.asarray(errors[near])))
