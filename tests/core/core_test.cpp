@@ -551,6 +551,26 @@ void test_iteration_limit()
     }
 }
 
+// A residual of 1/n falls by half from a half of the iterations on, and one that stays does not.
+void test_residual_trend()
+{
+  for (const long last : {4L, 7L, 8L, 100L, 1023L}) {
+    ResidualTrend falling, staying;
+    for (long k = 1; k <= last; ++k) {
+      falling.see(k, 1.0 / static_cast<double>(k));
+      staying.see(k, k % 2 == 0 ? 1.0 : 2.0);
+    }
+    CHECK_NEAR(falling.least(), 1.0 / static_cast<double>(last), ROUNDING);
+    CHECK_AT_MOST(falling.least(), 0.5 * falling.earlier());
+    CHECK_AT_MOST(falling.earlier(), 4.0 * falling.least());
+    CHECK_EQUAL(staying.least(), 1.0);
+    CHECK_EQUAL(staying.earlier(), 1.0);
+  }
+  ResidualTrend short_one;
+  short_one.see(1, 1.0);
+  CHECK(std::isinf(short_one.earlier()));
+}
+
 // A floor and a ceiling that a column cannot be between: the overlap is shared by all its contacts.
 // The same with a body, of half of its particles.
 void test_no_room()
@@ -631,10 +651,12 @@ void test_names_of_solvers()
    constraints that are found on the way
 ------------------------------------------------------------------------- */
 
-// Knows all contacts of a problem and hands out those that a velocity violates.
+// Knows all contacts of a problem and hands out those that a velocity violates, with a first guess of
+// their impulses.
 class HiddenContacts final : public ConstraintSource {
  public:
-  explicit HiddenContacts(const ContactProblem &all) : all_(all), known_(all.contacts.size(), false)
+  explicit HiddenContacts(const ContactProblem &all, double guess = 0.0) :
+      all_(all), guess_(guess), known_(all.contacts.size(), false)
   {
   }
 
@@ -647,7 +669,7 @@ class HiddenContacts final : public ConstraintSource {
     for (std::size_t c = 0; c < gaps.size(); ++c) {
       if (known_[c] || gaps[c] >= -TOLERANCE) continue;
       problem.contacts.add(hidden.first[c], hidden.second[c], &hidden.normal[3 * c], hidden.gap[c],
-                           0.0);
+                           guess_);
       known_[c] = true;
       ++added;
     }
@@ -656,6 +678,7 @@ class HiddenContacts final : public ConstraintSource {
 
  private:
   ContactProblem all_;
+  double guess_;
   std::vector<bool> known_;
 };
 
@@ -710,11 +733,13 @@ void test_round_limit()
   const auto solver = make_solver("apgd");
   for (const int limit : {1, 3}) {
     ContactProblem problem = make_column(6, false);
-    HiddenContacts source(make_column(6, true));
+    HiddenContacts source(make_column(6, true), 1.0);
     std::vector<double> velocity;
     const ProjectionResult result =
         project(problem, source, *solver, {TOLERANCE, 100000}, limit, host, velocity);
     CHECK_EQUAL(result.rounds, limit);
+    // The contacts that were found last have a first guess, which has pushed nobody.
+    CHECK_ALL_NEAR(velocity, velocity_of(problem), ROUNDING);
     CHECK(!result.complete);
     CHECK(result.converged);
     CHECK_ABOVE(result.residual.feasibility, TOLERANCE);    // of what was found and not solved
@@ -727,7 +752,7 @@ void test_iterations_of_all_rounds_are_limited()
   SerialHost host;
   const auto solver = make_solver("apgd");
   ContactProblem problem = make_column(6, false);
-  HiddenContacts source(make_column(6, true));
+  HiddenContacts source(make_column(6, true), 1.0);
   std::vector<double> velocity;
   const ProjectionResult result =
       project(problem, source, *solver, {TOLERANCE, 40}, 100, host, velocity);
@@ -1443,6 +1468,7 @@ int main()
   test_crystal(make_crystal(4));
   test_crystal(make_crystal_of_bodies());
   test_iteration_limit();
+  test_residual_trend();
   test_no_room();
   test_solver_is_used_again();
   test_first_guess();

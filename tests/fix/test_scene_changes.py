@@ -164,6 +164,21 @@ def test_radii_grown_between_runs(tmp_path: Path, lmp: Runner) -> None:
     assert result.thermo["KinEng"][-1] == pytest.approx(0, abs=1e-12)
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_drift_that_all_share(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    """It uses up no reach, but LAMMPS loses atoms that cross its box twice between two lists."""
+    text = pair(
+        tmp_path,
+        velocities=[[3, 0, 0], [3, 0, 0]],
+        timestep=0.05,
+        setup="processors * 1 1",
+    ).replace("neigh_modify delay 0", "neigh_modify delay 20")
+    lmp(text + DUMP_PARTICLES + "run 40\n", ranks=ranks)
+    last = read_dump(tmp_path / "particles.dump")[-1]
+    # 40 steps of 0.15 are six times through the box.
+    assert last["x"] == pytest.approx([0.4, 0.4 + 2.02 * RADIUS], abs=1e-12)
+
+
 # Pairs that are hidden
 
 
