@@ -35,8 +35,10 @@ from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import (
     ExactPackingFraction,
+    MeasuredPackingFraction,
     PackingFraction,
     exact_packing_fraction,
+    measure_packing_fraction,
     packing_fraction,
 )
 from .particles import ParticleDump, ParticleFrame, read_particle_frame
@@ -71,6 +73,7 @@ __all__ = [
     "ExportError",
     "ForceDistribution",
     "InputError",
+    "MeasuredPackingFraction",
     "NetworkDifference",
     "Orientation",
     "PackingFraction",
@@ -104,6 +107,7 @@ __all__ = [
     "largest_pair_overlap",
     "largest_wall_overlap",
     "measure_evolution",
+    "measure_packing_fraction",
     "monte_carlo",
     "mueller_packing_fraction",
     "neck_volume",

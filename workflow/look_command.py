@@ -16,8 +16,8 @@ from lammps_inelastic.analysis import (
     AnalysisError,
     ContactCounts,
     CoordinationNumber,
+    MeasuredPackingFraction,
     Orientation,
-    PackingFraction,
     PairOverlap,
     ParticleFrame,
     PictureError,
@@ -30,7 +30,7 @@ from lammps_inelastic.analysis import (
     iterate_contact_frames,
     largest_pair_overlap,
     largest_wall_overlap,
-    packing_fraction,
+    measure_packing_fraction,
     particles_inside,
     read_particle_frame,
 )
@@ -95,7 +95,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "--points",
         type=int,
         default=1_000_000,
-        help="random points for the packing fraction (default: 1000000)",
+        help="random points for the Monte Carlo packing fraction (default: 1000000)",
     )
     look.add_argument("--seed", type=int, default=1, help="seed of these points (default: 1)")
     walls = look.add_mutually_exclusive_group()
@@ -142,7 +142,7 @@ class _Look:
     frame : the last particle frame, on which everything but the contacts is measured
     box : (3, 2), where the packing fraction and the coordination number are measured, length
     seed : of the random points
-    packing : packing fraction in the box
+    packing : packing fraction in the box, as studies measure it
     coordination : coordination number of the particles in the box, over all contact frames
     contact_steps : first and last step of the contact frames
     bodies : None where every particle is one sphere
@@ -157,7 +157,7 @@ class _Look:
     frame: ParticleFrame
     box: FloatArray
     seed: int
-    packing: PackingFraction
+    packing: MeasuredPackingFraction
     coordination: CoordinationNumber
     contact_steps: tuple[int, int]
     bodies: _Bodies | None
@@ -246,8 +246,13 @@ def run(options: argparse.Namespace) -> int:
         frame=frame,
         box=box,
         seed=options.seed,
-        packing=packing_fraction(
-            frame.positions, frame.radii, box, points=options.points, seed=options.seed
+        packing=measure_packing_fraction(
+            frame.positions,
+            frame.radii,
+            box,
+            particles,
+            points=options.points,
+            seed=options.seed,
         ),
         coordination=coordination_number((count.particles for count in counts), chosen),
         contact_steps=(steps[0], steps[-1]),
@@ -305,11 +310,7 @@ def _as_text(found: _Look) -> str:
     rows = [
         ("particles", f"{len(found.frame.particles)}", f"step {found.frame.step}"),
         *([] if bodies is None else [("  spheres", f"{len(ids)}", _sizes(found.frame))]),
-        (
-            "packing fraction",
-            f"{found.packing.value:.4f} ± {found.packing.uncertainty:.4f}",
-            f"{found.packing.points:,} points, seed {found.seed}",
-        ),
+        _packing_row(found),
         ("coordination number", _as_mean(coordination), over),
         (
             "  0 or 1 contacts",
@@ -338,6 +339,15 @@ def _as_text(found: _Look) -> str:
             *(f"{name:<{left}}  {path}" for name, path in files),
         ]
     )
+
+
+def _packing_row(found: _Look) -> tuple[str, str, str]:
+    drawn = found.packing.drawn
+    by_points = f"{drawn.value:.4f} ± {drawn.uncertainty:.4f}"
+    points = f"{drawn.points:,} random points, seed {found.seed}"
+    if found.packing.exact is None:
+        return ("packing fraction", by_points, points)
+    return ("packing fraction", f"{found.packing.value:.4f}", f"exact; {by_points} by {points}")
 
 
 def _as_mean(number: CoordinationNumber) -> str:
@@ -377,6 +387,7 @@ def _body_rows(bodies: _Bodies) -> list[tuple[str, str, str]]:
 
 def _as_json(found: _Look) -> str:
     coordination, ids, wall = found.coordination, found.frame.ids, found.wall
+    exact, drawn = found.packing.exact, found.packing.drawn
     report: dict[str, Any] = {
         "step": found.frame.step,
         "particles": len(found.frame.particles),
@@ -384,9 +395,14 @@ def _as_json(found: _Look) -> str:
         "box": found.box.tolist(),
         "packing_fraction": {
             "value": found.packing.value,
-            "uncertainty": found.packing.uncertainty,
-            "points": found.packing.points,
-            "seed": found.seed,
+            "method": "monte carlo" if exact is None else "exact",
+            "common_volume": None if exact is None else exact.overlap,
+            "monte_carlo": {
+                "value": drawn.value,
+                "uncertainty": drawn.uncertainty,
+                "points": drawn.points,
+                "seed": found.seed,
+            },
         },
         "coordination_number": {
             "mean": coordination.mean,

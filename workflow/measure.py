@@ -44,6 +44,7 @@ from lammps_inelastic.analysis import (
     force_distribution,
     largest_pair_overlap,
     measure_evolution,
+    measure_packing_fraction,
     packing_fraction,
     packing_fraction_with_necks,
     particles_inside,
@@ -129,22 +130,17 @@ def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values
     return values
 
 
-def _exact(particles: Particles) -> bool:
-    return bool((particles.sizes <= 2).all())
-
-
 def _packing(
     frame: ParticleFrame, particles: Particles, box: NDArray[np.float64], points: int
 ) -> dict[str, float]:
     spheres = frame.positions, frame.radii, box
-    drawn = packing_fraction(*spheres, points=points, seed=SEED)
+    measured = measure_packing_fraction(*spheres, particles, points=points, seed=SEED)
+    drawn = measured.drawn
     numbers = {
-        "packing_fraction": drawn.value,
+        "packing_fraction": measured.value,
         "packing_fraction_monte_carlo": drawn.value,
         "packing_fraction_monte_carlo_error": drawn.uncertainty,
     }
-    if _exact(particles):
-        numbers["packing_fraction"] = exact_packing_fraction(*spheres, particles).value
     if _are_dimers(particles):
         # The same points: what the necks add has a far smaller error than either share.
         with_necks = packing_fraction_with_necks(*spheres, particles, points=points, seed=SEED)
@@ -261,7 +257,7 @@ def _evolution(
     particles = dump[-1].particles
 
     def of_frame(positions: Any, radii: Any, bounds: Any) -> float:
-        if _exact(particles):
+        if particles.exactly_measurable:
             return exact_packing_fraction(positions, radii, bounds, particles).value
         return packing_fraction(positions, radii, bounds, points=POINTS_PER_FRAME, seed=SEED).value
 
@@ -339,7 +335,7 @@ def _profile(
     values["profile/monte_carlo"] = drawn.values
     if drawn.uncertainties is not None:
         values["profile/monte_carlo_error"] = drawn.uncertainties
-    if _exact(particles):
+    if particles.exactly_measurable:
         exact = wall_profile(
             *spheres,
             wall=wall,
