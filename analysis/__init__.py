@@ -8,7 +8,16 @@ from .coordination import (
     contact_counts,
     coordination_number,
 )
-from .errors import AnalysisError, DumpError, ExportError, InputError, PictureError
+from .errors import (
+    AnalysisError,
+    DumpError,
+    ExportError,
+    InputError,
+    LogError,
+    PictureError,
+    RunFilesError,
+    UnfinishedRunError,
+)
 from .evolution import Evolution, Plateau, measure_evolution, monte_carlo, plateau, plot_evolution
 from .export import (
     VoxelImage,
@@ -50,6 +59,8 @@ from .profile import (
     wall_profile_monte_carlo,
 )
 from .rattlers import Backbone, backbone, contacts_to_hold
+from .run_files import RunFiles, check_contacts, open_run
+from .run_log import Run, RunLog, at_steps, read_run_log
 from .structure import (
     BondOrder,
     RadialDistribution,
@@ -73,6 +84,7 @@ __all__ = [
     "ExportError",
     "ForceDistribution",
     "InputError",
+    "LogError",
     "MeasuredPackingFraction",
     "NetworkDifference",
     "Orientation",
@@ -84,11 +96,18 @@ __all__ = [
     "PictureError",
     "Plateau",
     "RadialDistribution",
+    "Run",
+    "RunFiles",
+    "RunFilesError",
+    "RunLog",
+    "UnfinishedRunError",
     "VoxelImage",
     "WallOverlap",
     "WallProfile",
+    "at_steps",
     "backbone",
     "bond_order",
+    "check_contacts",
     "contact_counts",
     "contact_graph",
     "contacts_by_distance",
@@ -112,6 +131,7 @@ __all__ = [
     "mueller_packing_fraction",
     "neck_volume",
     "network_difference",
+    "open_run",
     "packing_fraction",
     "packing_fraction_with_necks",
     "particle_volumes_in_box",
@@ -122,6 +142,7 @@ __all__ = [
     "plot_radial_distribution",
     "radial_distribution",
     "read_particle_frame",
+    "read_run_log",
     "sphere_volumes_in_box",
     "voxel_shape",
     "voxel_slices",

@@ -19,24 +19,28 @@ from lammps_inelastic.analysis import (
     MeasuredPackingFraction,
     Orientation,
     PairOverlap,
+    ParticleDump,
     ParticleFrame,
     PictureError,
+    RunFiles,
+    UnfinishedRunError,
     WallOverlap,
     contact_counts,
     contacts_by_distance,
     coordination_number,
     dimer_orientation,
     draw_packing,
-    iterate_contact_frames,
     largest_pair_overlap,
     largest_wall_overlap,
     measure_packing_fraction,
+    open_run,
     particles_inside,
-    read_particle_frame,
+    read_run_log,
 )
 
-from .folder import CONTACTS as CONTACT_DUMP
-from .folder import PARTICLES as PARTICLE_DUMP
+from .finished import CONTACTS as CONTACT_DUMP
+from .finished import LOG, unchanged
+from .finished import PARTICLES as PARTICLE_DUMP
 from .measure import contacts_per_colour
 from .study import PAPER_BOX
 
@@ -185,7 +189,14 @@ def run(options: argparse.Namespace) -> int:
             raise AnalysisError(f"{folder}: is a file; --dump names one in a folder")
         folder, name = folder.parent, folder.name
     dump, contact_dump = folder / name, folder / CONTACT_DUMP
-    frame = read_particle_frame(dump, radius=options.radius)
+    particle_dump = ParticleDump(dump, radius=options.radius)
+    by_distance = options.contact_gap is not None
+    if not by_distance and not contact_dump.exists():
+        raise AnalysisError(
+            f"{contact_dump}: no such file; --contact-gap GAP counts contacts by distance"
+        )
+    files = _files(particle_dump, None if by_distance else contact_dump)
+    frame = particle_dump[-1]
     if any("p" in flags for flags in frame.boundaries):
         raise AnalysisError(
             f"{dump}: the box is periodic ({' '.join(frame.boundaries)}), and "
@@ -209,17 +220,13 @@ def run(options: argparse.Namespace) -> int:
     steps: list[int] = []
     counts: list[ContactCounts] = []
     contact_gap: float | None = None
-    if options.contact_gap is not None:
+    if by_distance:
         contact_gap = options.contact_gap * float(frame.radii.min())
         near = contacts_by_distance(frame.positions, frame.radii, contact_gap, particles, walls)
         steps.append(frame.step)
         counts.append(contact_counts(near.ids(frame.ids), frame.ids, particles))
-    elif not contact_dump.exists():
-        raise AnalysisError(
-            f"{contact_dump}: no such file; --contact-gap GAP counts contacts by distance"
-        )
     else:
-        for contacts in iterate_contact_frames(contact_dump):
+        for contacts in files.contact_frames(frame):
             steps.append(contacts.step)
             counts.append(contact_counts(contacts.ids, frame.ids, particles))
 
@@ -267,6 +274,22 @@ def run(options: argparse.Namespace) -> int:
     if failure is not None:
         raise failure
     return 0
+
+
+def _files(particles: ParticleDump, contacts: Path | None) -> RunFiles:
+    """Open the files of a run, which must belong together, as far as there is a log to tell."""
+    folder = particles.path.parent
+    log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
+    try:
+        # By distance, contacts are those of one frame, whatever comes after it.
+        files = open_run(particles, contacts, log, over=contacts is not None)
+    except UnfinishedRunError as error:
+        raise AnalysisError(
+            f"{error}; --contact-gap GAP counts contacts in the last frame that is there"
+        ) from None
+    files.check_last(particles[-1])
+    unchanged(folder)
+    return files
 
 
 def _of_bodies(

