@@ -128,16 +128,12 @@ def open_run(
 
     Raises RunFilesError, DumpError or LogError with one line: which file, and what is missing.
     """
+    paths = [path for path in (particles.path, contacts) if path is not None]
+    if log is not None and over:
+        _check_end(log, paths)
     # A log that tells of neither may be of anything.
-    named = [path for path in (particles.path, contacts) if path is not None]
-    if log is not None and not any(log.names(path) for path in named):
+    if log is not None and not any(log.names(path) for path in paths):
         log = None
-    if log is not None and over and not log.complete:
-        run = next(run for run in log.runs if run.steps is None)
-        raise UnfinishedRunError(
-            f"{log.path}: nothing after step {run.known} of the run that begins at step "
-            f"{run.first}: it is still under way, or was cut off"
-        )
     _check_steps(particles.path, particles.steps, log, repeats=True)
     written = None if log is None else log.written(particles.path)
     if log is not None and written is not None and written.group == "all":
@@ -202,6 +198,19 @@ def frame_steps(path: Path) -> tuple[int, ...]:
     if not steps:
         raise DumpError(path, "the file is empty")
     return tuple(steps)
+
+
+def _check_end(log: RunLog, paths: Sequence[Path]) -> None:
+    """See that a log goes on to the end of its runs, if it can be that of some dumps."""
+    unknown = [path.name for path in paths if log.written(path) is None]
+    cut = next((run for run in log.runs if run.steps is None), None)
+    said = ""
+    if cut is not None and len(unknown) < len(paths):
+        said = f"nothing after step {cut.known} of the run that begins at step {cut.first}"
+    elif unknown and not log.ended:
+        said = f"its end is missing, and what is there does not tell of {' and '.join(unknown)}"
+    if said:
+        raise UnfinishedRunError(f"{log.path}: {said}: it is still under way, or was cut off")
 
 
 def _check_steps(path: Path, steps: Sequence[int], log: RunLog | None, *, repeats: bool) -> None:

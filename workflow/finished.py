@@ -88,6 +88,23 @@ def unchanged(folder: Path) -> None:
             return
 
 
+def other_run(folder: Path, record: Mapping[str, Any]) -> str:
+    """Say that a result is of another run than the one in a case's folder; nothing if it is not.
+
+    Parameters
+    ----------
+    folder : of the case
+    record : of the result
+    """
+    try:
+        there = json.loads((folder / FINISHED).read_text())
+    except (OSError, ValueError):
+        return ""
+    if not isinstance(there, dict) or there == record:
+        return ""
+    return f"of the run of {record['started']}, but {folder} is that of {there.get('started')}"
+
+
 def check_unchanged(folder: Path, record: Mapping[str, Any], stage: Mapping[str, Any]) -> None:
     """See that the files of a stage are those that the run has left.
 

@@ -56,6 +56,7 @@ from lammps_inelastic.analysis import (
     wall_profile,
     wall_profile_monte_carlo,
 )
+from lammps_inelastic.analysis.run_files import AGAIN
 
 from .errors import WorkflowError
 from .finished import CONTACTS, FINISHED, LOG, PARTICLES, check_stage
@@ -431,7 +432,9 @@ def main(arguments: Sequence[str]) -> int:
     try:
         write_result(Path(target), measure_case(Path(folder), Outputs.model_validate_json(outputs)))
     except (AnalysisError, WorkflowError, OSError) as error:
-        print(" ".join(str(error).split()), file=sys.stderr)
+        # What to do is said with the folder that must go.
+        said = str(error).removesuffix(f"; {AGAIN}")
+        print(" ".join(said.split()), file=sys.stderr)
         return 2
     return 0
 
