@@ -203,7 +203,7 @@ def frame_steps(path: Path) -> tuple[int, ...]:
 def _check_end(log: RunLog, paths: Sequence[Path]) -> None:
     """See that a log goes on to the end of its runs, if it can be that of some dumps."""
     unknown = [path.name for path in paths if log.written(path) is None]
-    cut = next((run for run in log.runs if run.steps is None), None)
+    cut = None if log.complete else log.runs[-1]
     said = ""
     if cut is not None and len(unknown) < len(paths):
         said = f"nothing after step {cut.known} of the run that begins at step {cut.first}"

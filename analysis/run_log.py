@@ -23,6 +23,8 @@ _LOOP = re.compile(r"Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) 
 _COUNT = re.compile(r"f_(\w+)\[(5|6)\]")
 # Commands after which the step is another one, without a run.
 _NEW_STEP = ("read_restart", "read_data", "read_dump", "clear", "rerun", "tad", "prd", "hyper")
+# With which a deck begins.
+_ANEW = ("LAMMPS", "units", "atom_style", "read_restart", "read_data", "clear")
 # What LAMMPS takes for the same time, in shares of a step.
 _SAME_TIME = 1e-6
 # Relative; thermo output has eight digits.
@@ -112,8 +114,8 @@ class RunLog:
 
     @property
     def complete(self) -> bool:
-        """Whether all runs that it tells of have ended."""
-        return all(run.steps is not None for run in self.runs)
+        """Whether its last run has ended."""
+        return not self.runs or self.runs[-1].steps is not None
 
     def names(self, path: Path) -> bool:
         """Whether it tells that a dump of this file's name was written."""
@@ -191,6 +193,12 @@ class _Reader:
 
     def read(self, line: str, number: int) -> None:
         words = line.split()
+        if self._names and words and words[0] in _ANEW:
+            # LAMMPS was killed, and another one has gone on with the log and from a restart file.
+            self.close_run(None)
+            self._forget()
+            self._dumps.clear()
+            self._step = None
         if words[:1] == ["Step"]:
             self.close_run(None)
             self._names, self._header = words, number
