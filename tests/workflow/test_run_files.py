@@ -403,6 +403,30 @@ def test_a_result_of_another_run(
     assert "2026-01-01T00:00:00+00:00; delete it to measure that" in said
 
 
+def test_every_stage_of_a_run_is_compared(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = TINY.replace("{seeds}", "1").replace('"spheres"', '["spheres", "response"]')
+    (tmp_path / "two.toml").write_text(text.replace("seed = 1", "seed = 1\nsteps_changing = 33"))
+    out = tmp_path / "out"
+    assert main(["run", str(tmp_path / "two.toml"), "--out", str(out)]) == 0
+    (run,) = (path for path in (out / "cases").iterdir() if path.name[0] != ".")
+    look = [*BOX, "--points", 1000, "--no-picture"]
+    # The last stage works in the folder of the case, the first one in its own.
+    for stage, other in ((run, run / "spheres"), (run / "spheres", run)):
+        whole = (stage / LOG).read_text()
+        replaced(LOG, "^Total wall time: .*", "Total wall time: 9:00:00")(stage)
+        said = f"{stage / LOG}: is not the file that the run of finished.json has left"
+        with pytest.raises(AnalysisError, match=re.escape(said)):
+            measure_case(run, OUTPUTS)
+        assert said in refusal(capsys, "look", stage, *look)
+        assert main([str(word) for word in ["look", other, *look]]) == 0
+        (stage / LOG).write_text(whole)
+    (run / "spheres" / CONTACTS).unlink()
+    with pytest.raises(AnalysisError, match=r"contacts\.lammpsdump: no such file"):
+        measure_case(run, OUTPUTS)
+
+
 # Decks with other ways of writing their dumps
 
 
