@@ -54,7 +54,8 @@ class RunFiles:
             raise RunFilesError(f"{self.particles.path}: no contact dump belongs to it")
         written = None if self.log is None else self.log.written(self.contacts)
         for number, contacts in enumerate(iterate_contact_frames(self.contacts)):
-            run = None if written is None else int(written.runs[number])
+            known = written is not None and number < len(written.runs)
+            run = int(written.runs[number]) if written is not None and known else None
             self._check(self.contacts, contacts, frame, run)
             yield contacts
 
@@ -77,7 +78,7 @@ class RunFiles:
         written = self._written(self.particles.path)
         if written is None or frame.contacts is None or frame.step != written.steps[-1]:
             return
-        if written.fix is not None:
+        if written.fix is not None and written.group == "all":
             counted = {5: int(frame.contacts.sum()) / 2}
             self._compare(self.particles.path, frame.step, int(written.runs[-1]), counted)
 
@@ -137,7 +138,7 @@ def open_run(
     _check_steps(particles.path, particles.steps, log, repeats=True)
     written = None if log is None else log.written(particles.path)
     if log is not None and written is not None and written.group == "all":
-        _check_number(particles, log)
+        _check_number(particles, written, log)
     if contacts is not None:
         steps = frame_steps(contacts)
         _check_steps(contacts, steps, log, repeats=False)
@@ -264,13 +265,13 @@ def _differences(written: Written, steps: Sequence[int]) -> tuple[list[int], lis
     return missing, [*more, *steps[place:]]
 
 
-def _check_number(particles: ParticleDump, log: RunLog) -> None:
-    """Compare the number of spheres with that of the log's last run."""
-    atoms = next((run.atoms for run in reversed(log.runs) if run.atoms is not None), None)
-    if atoms is not None and atoms != particles.spheres:
+def _check_number(particles: ParticleDump, written: Written, log: RunLog) -> None:
+    """Compare the number of spheres with those of the runs that wrote the dump."""
+    numbers = {log.runs[run].atoms for run in set(written.runs.tolist())} - {None}
+    if numbers and particles.spheres not in numbers:
         raise RunFilesError(
-            f"{particles.path}: {particles.spheres} spheres, but {atoms} atoms in {log.path.name}: "
-            f"they are of different runs; {AGAIN}"
+            f"{particles.path}: {particles.spheres} spheres, but {max(numbers)} atoms in "
+            f"{log.path.name}: they are of different runs; {AGAIN}"
         )
 
 
@@ -278,10 +279,10 @@ def _frames(steps: Sequence[int]) -> str:
     """Name some frames by their steps."""
     if len(steps) == 1:
         return f"the frame of step {steps[0]}"
-    named = ", ".join(str(step) for step in steps[:STEPS_SHOWN])
-    if len(steps) > STEPS_SHOWN:
+    if len(steps) > STEPS_SHOWN + 1:
+        named = ", ".join(str(step) for step in steps[:STEPS_SHOWN])
         return f"{len(steps)} frames (steps {named}, ..., {steps[-1]})"
-    return f"{len(steps)} frames (steps {named})"
+    return f"{len(steps)} frames (steps {', '.join(str(step) for step in steps)})"
 
 
 def _are(steps: Sequence[int]) -> str:

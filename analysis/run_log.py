@@ -49,7 +49,7 @@ class Run:
     every : lines of thermo output are so many steps apart, 0 for none but the first and the last;
         None where that is not known
     counts : columns of the contacts that a fix inelastic counts, by the place in its vector: 5 for
-        those between spheres, 6 for those with walls
+        those between spheres, 6 for those with walls; none where a format may have cut digits
     """
 
     line: int
@@ -187,6 +187,7 @@ class _Reader:
         self._every: int | None = None
         self._counts: dict[int, str] = {}
         self._fixes: set[str] = set()
+        self._cut = False
         self._names: list[str] = []
         self._rows: list[list[float]] = []
         self._header = 0
@@ -247,7 +248,7 @@ class _Reader:
 
     def _counts_of(self, names: Sequence[str]) -> dict[int, str]:
         """Return the columns of thermo output that count contacts; none if several fixes do."""
-        if len(self._fixes) != 1:
+        if len(self._fixes) != 1 or self._cut:
             return {}
         own = {number: f"f_{fix}[{number}]" for fix in self._fixes for number in (5, 6)}
         found = {number: self._counts.get(number, name) for number, name in own.items()}
@@ -300,9 +301,11 @@ class _Reader:
             self._every = _integer(rest[0])
         elif name == "thermo_style":
             self._counts.clear()
+            self._cut = False
         elif name == "thermo_modify":
             if "every" in rest:
                 self._every = None
+            self._cut = self._cut or "format" in rest
             for index, word in enumerate(rest[:-2]):
                 source = _COUNT.fullmatch(rest[index + 1])
                 if word == "colname" and source and source[1] in self._fixes:
@@ -344,12 +347,13 @@ class _Reader:
         file, last = self.files[dump.path], run.known
         if dump.every:
             steps = list(range(-(-run.first // dump.every) * dump.every, last + 1, dump.every))
-        elif dump.time and (found := _steps_at_times(run, dump.time)) is not None:
+        else:
+            found = _steps_at_times(run, dump.time) if dump.time and not self._cut else None
+            if found is None:
+                file.known = False
+                return
             steps = found
             file.slack = 1
-        else:
-            file.known = False
-            return
         if dump.first and dump.last is None and steps[:1] != [run.first]:
             steps.insert(0, run.first)
         steps = [step for step in steps if step != dump.last]

@@ -64,6 +64,12 @@ def written(path: Path, text: str) -> list[int] | None:
         (DUMP.format(3) + "dump_modify all delay 5\n" + run(0, 7), None),
         (DUMP.format(3) + "dump_modify all skip v_dull\n" + run(0, 7), None),
         (DUMP.format(1) + "dump_modify all every/time 0.15\n" + run(0, 7), None),
+        (
+            DUMP.format(1)
+            + "dump_modify all every/time 0.3\nthermo_modify format float %.2g\n"
+            + run(0, 9),
+            None,
+        ),
         (DUMP.format(3) + run(0, 7) + "rerun other.dump dump x y z\n" + run(0, 7), None),
         (DUMP.format(3) + DUMP.format(5).replace("out/", "other/") + run(0, 7), None),
         (DUMP.format(3) + "keywords: ['Step']\n" + run(0, 7)[-60:], None),
@@ -132,6 +138,13 @@ def test_contacts_that_a_log_counts(tmp_path: Path) -> None:
         (FIX + named + "thermo_style custom step\n" + run(0, 0), {}),
         (FIX + FIX.replace("touch", "two") + named + run(0, 0), {}),
         (named + run(0, 0), {}),
+        (
+            FIX
+            + named
+            + "thermo_modify format float %.3g\n"
+            + run(0, 0, "contacts").replace("0   ", "0   4"),
+            {},
+        ),
     ):
         path.write_text(text)
         (only,) = read_run_log(path).runs

@@ -158,6 +158,10 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
         frames(CONTACTS, lambda f: f[:1] + f[3:]),
         rf"{CONTACTS}: 2 frames \(steps 131, 132\) {TOLD} are missing",
     ),
+    "contacts of one step": (
+        frames(CONTACTS, lambda f: f[:1]),
+        rf"{CONTACTS}: 5 frames \(steps 131, 132, 133, 134, 135\) {TOLD} are missing",
+    ),
     "no last contacts": (
         frames(CONTACTS, lambda f: f[:-1]),
         f"{CONTACTS}: the frame of step 135 {TOLD} is missing",
