@@ -8,7 +8,16 @@ from .coordination import (
     contact_counts,
     coordination_number,
 )
-from .errors import AnalysisError, DumpError, ExportError, InputError, PictureError
+from .errors import (
+    AnalysisError,
+    DumpError,
+    ExportError,
+    InputError,
+    LogError,
+    PictureError,
+    RunFilesError,
+    UnfinishedRunError,
+)
 from .evolution import Evolution, Plateau, measure_evolution, monte_carlo, plateau, plot_evolution
 from .export import (
     VoxelImage,
@@ -35,8 +44,10 @@ from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import (
     ExactPackingFraction,
+    MeasuredPackingFraction,
     PackingFraction,
     exact_packing_fraction,
+    measure_packing_fraction,
     packing_fraction,
 )
 from .particles import ParticleDump, ParticleFrame, read_particle_frame
@@ -48,6 +59,8 @@ from .profile import (
     wall_profile_monte_carlo,
 )
 from .rattlers import Backbone, backbone, contacts_to_hold
+from .run_files import RunFiles, check_contacts, open_run
+from .run_log import Run, RunLog, at_steps, read_run_log
 from .structure import (
     BondOrder,
     RadialDistribution,
@@ -71,6 +84,8 @@ __all__ = [
     "ExportError",
     "ForceDistribution",
     "InputError",
+    "LogError",
+    "MeasuredPackingFraction",
     "NetworkDifference",
     "Orientation",
     "PackingFraction",
@@ -81,11 +96,18 @@ __all__ = [
     "PictureError",
     "Plateau",
     "RadialDistribution",
+    "Run",
+    "RunFiles",
+    "RunFilesError",
+    "RunLog",
+    "UnfinishedRunError",
     "VoxelImage",
     "WallOverlap",
     "WallProfile",
+    "at_steps",
     "backbone",
     "bond_order",
+    "check_contacts",
     "contact_counts",
     "contact_graph",
     "contacts_by_distance",
@@ -104,10 +126,12 @@ __all__ = [
     "largest_pair_overlap",
     "largest_wall_overlap",
     "measure_evolution",
+    "measure_packing_fraction",
     "monte_carlo",
     "mueller_packing_fraction",
     "neck_volume",
     "network_difference",
+    "open_run",
     "packing_fraction",
     "packing_fraction_with_necks",
     "particle_volumes_in_box",
@@ -118,6 +142,7 @@ __all__ = [
     "plot_radial_distribution",
     "radial_distribution",
     "read_particle_frame",
+    "read_run_log",
     "sphere_volumes_in_box",
     "voxel_shape",
     "voxel_slices",

@@ -41,6 +41,11 @@ class Particles:
         """Whether any particle has more than one sphere."""
         return len(self.sizes) < len(self.index)
 
+    @property
+    def exactly_measurable(self) -> bool:
+        """Whether all are free spheres and dimers, whose volumes in a box are known exactly."""
+        return bool((self.sizes <= 2).all())
+
     def centres(self, positions: ArrayLike) -> FloatArray:
         """Return the particles' centres, (p, 3): of each, the mean of its spheres' centres.
 

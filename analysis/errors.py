@@ -22,6 +22,23 @@ class DumpError(AnalysisError):
         super().__init__(f"{where}: {message}")
 
 
+class LogError(AnalysisError):
+    """A log is missing, cannot be read, or lacks a part."""
+
+    def __init__(self, path: str | PathLike[str], message: str, line: int | None = None) -> None:
+        """Make the text `path, line N: message`; lines are counted from 1."""
+        where = f"{path}" if line is None else f"{path}, line {line}"
+        super().__init__(f"{where}: {message}")
+
+
+class RunFilesError(AnalysisError):
+    """The files of a run do not belong together, or lack frames."""
+
+
+class UnfinishedRunError(RunFilesError):
+    """The log ends before the run does."""
+
+
 class PictureError(AnalysisError):
     """The picture could not be drawn: no LAMMPS, or LAMMPS refused."""
 

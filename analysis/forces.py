@@ -13,6 +13,7 @@ from .bodies import Particles
 from .coordination import contact_sides
 from .errors import InputError
 from .geometry import BoolArray, FloatArray
+from .plots import error_lengths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,11 +108,14 @@ def plot_force_distribution(
 ) -> Axes:
     """Plot P(f / <f>) over f / <f>, on a logarithmic scale; empty bins are left out."""
     filled = distribution.density > 0
+    density = distribution.density[filled]
     middles = (distribution.edges[:-1] + distribution.edges[1:]) / 2
     ax.errorbar(
         middles[filled],
-        distribution.density[filled],
-        yerr=distribution.standard_errors[filled],
+        density,
+        yerr=error_lengths(
+            density, distribution.standard_errors[filled], density.min(initial=math.inf) / 10
+        ),
         fmt="o-",
         markersize=3,
         linewidth=0.8,

@@ -53,6 +53,42 @@ class ExactPackingFraction:
     overlap: float
 
 
+@dataclass(frozen=True)
+class MeasuredPackingFraction:
+    """A packing fraction, measured as well as the particles allow.
+
+    Attributes
+    ----------
+    value : exact where all particles are free spheres and dimers, else that of random points
+    exact : the exact one; None where there are other bodies
+    drawn : the one by random points, for every kind of particle
+    """
+
+    value: float
+    exact: ExactPackingFraction | None
+    drawn: PackingFraction
+
+
+def measure_packing_fraction(
+    positions: ArrayLike,
+    radii: ArrayLike,
+    box: ArrayLike,
+    particles: Particles,
+    *,
+    points: int = 1_000_000,
+    seed: int = 0,
+) -> MeasuredPackingFraction:
+    """Measure the packing fraction in a box, exactly where that is possible, and by random points.
+
+    Parameters as for `exact_packing_fraction` and `packing_fraction`.
+    """
+    drawn = packing_fraction(positions, radii, box, points=points, seed=seed)
+    if not particles.exactly_measurable:
+        return MeasuredPackingFraction(drawn.value, None, drawn)
+    exact = exact_packing_fraction(positions, radii, box, particles)
+    return MeasuredPackingFraction(exact.value, exact, drawn)
+
+
 def packing_fraction(
     positions: ArrayLike,
     radii: ArrayLike,

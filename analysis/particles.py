@@ -125,6 +125,11 @@ class ParticleDump:
         """Return the number of frames."""
         return len(self._headers)
 
+    @property
+    def spheres(self) -> int:
+        """Number of spheres, the same in all frames."""
+        return self._headers[0].rows
+
     def __iter__(self) -> Iterator[ParticleFrame]:
         """Read the frames one by one, never two at a time."""
         return (self[index] for index in range(len(self)))

@@ -62,6 +62,7 @@ def plot_curve(
     label: str | None = None,
     number: int = 0,
     markers: bool = False,
+    least: float | None = None,
 ) -> Axes:
     """Plot a line, with a band of one standard error on either side.
 
@@ -73,6 +74,8 @@ def plot_curve(
     label : for the legend
     number : of the curve in this plot, from 0: its colour and line
     markers : whether each point is marked
+    least : of a logarithmic axis: a band goes down to here where it would go to 0 or below, which
+        such an axis does not have; above 0
     """
     style = style_of(number)
     across, up = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
@@ -87,9 +90,30 @@ def plot_curve(
         label=label,
     )
     if errors is not None:
-        width = np.asarray(errors, dtype=np.float64)
-        ax.fill_between(across, up - width, up + width, color=style.colour, alpha=0.2, linewidth=0)
+        below, above = error_lengths(up, errors, least)
+        ax.fill_between(across, up - below, up + above, color=style.colour, alpha=0.2, linewidth=0)
     return ax
+
+
+def error_lengths(
+    values: ArrayLike, errors: ArrayLike, least: float | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far errors reach below and above values, (k,) each.
+
+    A corner of a band, or an end of an error bar, that lies at 0 or below is left out on a
+    logarithmic axis: what remains is a wedge between other corners, or no bar at all.
+
+    Parameters
+    ----------
+    values : (k,)
+    errors : (k,), NaN where there is none
+    least : what is reached below on a logarithmic axis at most; None on a linear one
+    """
+    place, width = np.asarray(values, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    if least is None:
+        return width, width
+    # A value below the axis has nothing to be drawn.
+    return np.minimum(width, np.maximum(place - least, 0.0)), width
 
 
 def plot_points(
@@ -101,6 +125,7 @@ def plot_points(
     label: str | None = None,
     number: int = 0,
     joined: bool = True,
+    least: float | None = None,
 ) -> Axes:
     """Plot a value against a parameter: points with error bars, joined by a thin line.
 
@@ -112,12 +137,16 @@ def plot_points(
     label : for the legend
     number : of the curve in this plot, from 0: its colour and marker
     joined : whether a line runs from point to point
+    least : as for `plot_curve`
     """
+    lengths = None
+    if errors is not None:
+        lengths = np.nan_to_num(np.array(error_lengths(y, errors, least)))
     style = style_of(number)
     ax.errorbar(
         np.asarray(x, dtype=np.float64),
         np.asarray(y, dtype=np.float64),
-        yerr=None if errors is None else np.nan_to_num(np.asarray(errors, dtype=np.float64)),
+        yerr=lengths,
         color=style.colour,
         marker=style.marker,
         linestyle=style.line if joined else "none",
@@ -139,6 +168,7 @@ def plot_distribution(
     errors: ArrayLike | None = None,
     label: str | None = None,
     number: int = 0,
+    least: float | None = None,
 ) -> Axes:
     """Plot the share of particles with 0, 1, 2, ... contacts or neighbours; the ends of zeros go.
 
@@ -149,6 +179,7 @@ def plot_distribution(
     errors : (k,), their standard errors
     label : for the legend
     number : of the curve in this plot, from 0: its colour, line and marker
+    least : as for `plot_curve`
     """
     values = np.asarray(shares, dtype=np.float64)
     filled = np.flatnonzero(values > 0)
@@ -158,7 +189,9 @@ def plot_distribution(
     first, last = max(int(filled[0]) - 1, 0), min(int(filled[-1]) + 1, len(values) - 1)
     which = np.arange(first, last + 1)
     width = None if errors is None else np.asarray(errors, dtype=np.float64)[which]
-    return plot_points(ax, which, values[which], errors=width, label=label, number=number)
+    return plot_points(
+        ax, which, values[which], errors=width, label=label, number=number, least=least
+    )
 
 
 def plot_wall_profile(
@@ -169,12 +202,13 @@ def plot_wall_profile(
     errors: ArrayLike | None = None,
     label: str | None = None,
     number: int = 0,
+    least: float | None = None,
 ) -> Axes:
     """Plot the packing fraction against the distance from a wall over the diameter.
 
     As in Figures 6 and 12 of Faure et al. (2009).
     """
-    plot_curve(ax, scaled, values, errors=errors, label=label, number=number)
+    plot_curve(ax, scaled, values, errors=errors, label=label, number=number, least=least)
     ax.set_xlabel("distance from the wall / d")
     ax.set_ylabel("packing fraction")
     # Still to be scaled by the curves that come after this one.

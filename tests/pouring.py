@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from lammps_inelastic.analysis import (
     ContactCounts,
     CoordinationNumber,
+    MeasuredPackingFraction,
     Orientation,
-    PackingFraction,
     contact_counts,
     coordination_number,
     dimer_orientation,
     iterate_contact_frames,
-    packing_fraction,
+    measure_packing_fraction,
     particles_inside,
     read_particle_frame,
 )
@@ -81,7 +81,7 @@ def projections(log: str) -> list[Projections]:
 class Packing:
     """The paper's numbers for one run; a particle is a body or a free sphere."""
 
-    packing_fraction: PackingFraction
+    packing_fraction: MeasuredPackingFraction
     coordination_number: CoordinationNumber
     neighbours: CoordinationNumber
     orientation: Orientation | None  # of dimers
@@ -98,7 +98,7 @@ def measure(folder: Path, contact_dump: str = "contacts.lammpsdump") -> Packing:
     ]
     dimers = particles.composite and set(particles.sizes.tolist()) == {2}
     return Packing(
-        packing_fraction(frame.positions, frame.radii, BULK),
+        measure_packing_fraction(frame.positions, frame.radii, BULK, particles),
         coordination_number((frame_counts.particles for frame_counts in counts), chosen),
         coordination_number((frame_counts.neighbours for frame_counts in counts), chosen),
         dimer_orientation(frame.positions, particles, BULK) if dimers else None,

@@ -19,9 +19,14 @@ from lammps_inelastic.analysis import (
     AnalysisError,
     ParticleDump,
     ParticleFrame,
+    RunFilesError,
+    UnfinishedRunError,
+    check_contacts,
     contact_counts,
     iterate_contact_frames,
+    open_run,
     particles_inside,
+    read_run_log,
     voxel_shape,
     write_raw,
     write_stl,
@@ -32,8 +37,9 @@ from lammps_inelastic.analysis import (
 from lammps_inelastic.analysis.export import Progress
 from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray, as_box
 
-from .folder import CONTACTS as CONTACT_DUMP
-from .folder import PARTICLES as PARTICLE_DUMP
+from .finished import CONTACTS as CONTACT_DUMP
+from .finished import LOG, unchanged
+from .finished import PARTICLES as PARTICLE_DUMP
 
 # What the file is called that is not named.
 NAME = "packing"
@@ -125,15 +131,39 @@ def run(options: argparse.Namespace) -> int:
 
 def _chosen_frame(dump: ParticleDump, options: argparse.Namespace) -> ParticleFrame:
     if options.step is not None:
+        # A frame that is named by its step is what it says, whatever became of the others.
         if options.step not in dump.steps:
             raise AnalysisError(f"{dump.path}: no step {options.step}; {_as_steps(dump.steps)}")
+        if dump.steps.count(options.step) > 1:
+            raise AnalysisError(
+                f"{dump.path}: more than one frame of step {options.step}; --frame N chooses one"
+            )
         return dump[dump.steps.index(options.step)]
+    _check_frames(dump, options.source)
     index = -1 if options.frame is None else options.frame
     if not -len(dump) <= index < len(dump):
         raise AnalysisError(
             f"{dump.path}: no frame {index}; there are {len(dump)}, from 0 to {len(dump) - 1}"
         )
     return dump[index]
+
+
+def _check_frames(dump: ParticleDump, source: Path) -> None:
+    """See that no frame is missing: a frame is named by its place among all.
+
+    A dump that was named alone may be of another run than the contacts beside it.
+    """
+    folder, contacts = dump.path.parent, source / CONTACT_DUMP
+    log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
+    try:
+        files = open_run(dump, contacts if contacts.exists() else None, log)
+        files.check_last(dump[-1])
+        if source.is_dir():
+            unchanged(folder)
+    except UnfinishedRunError as error:
+        raise AnalysisError(f"{error}; --step N writes a frame that is there") from None
+    except RunFilesError as error:
+        raise AnalysisError(f"{error}, or write a frame that is there with --step N") from None
 
 
 def _as_steps(steps: tuple[int, ...]) -> str:
@@ -226,6 +256,7 @@ def _contacts(frame: ParticleFrame, source: Path) -> IntArray | None:
         return None
     for contacts in iterate_contact_frames(path):
         if contacts.step == frame.step:
+            check_contacts(contacts, frame, path)
             return contact_counts(contacts.ids, frame.ids).particles
     return None
 

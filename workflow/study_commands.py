@@ -6,6 +6,7 @@ import argparse
 import os
 import shlex
 import shutil
+import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from importlib.resources import files
@@ -18,6 +19,7 @@ from rich.text import Text
 
 from .errors import StudyError, WorkflowError
 from .files import whole
+from .finished import other_run
 from .folder import Folder, last_lines
 from .launch import MEASURED, Options, Outcome, run_study
 from .progress import Display
@@ -191,11 +193,13 @@ def tell(study: Study, outcome: Outcome) -> None:
 
 def gathered(study: Study, folder: Folder) -> StoredStudy:
     """Return the results that there are of a study, in the order of its cases."""
-    results = [
-        read_result(folder.result(study, case))
-        for case in study.cases
-        if folder.is_measured(study, case)
-    ]
+    results = []
+    for case in study.cases:
+        if folder.is_measured(study, case):
+            path = folder.result(study, case)
+            results.append(read_result(path))
+            if said := other_run(folder.case(case), results[-1].record):
+                print(f"WARNING: {path} is {said}; delete it to measure that", file=sys.stderr)
     return StoredStudy(study.name, study.title, study.text, results)
 
 

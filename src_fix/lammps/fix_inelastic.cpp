@@ -36,6 +36,7 @@ constexpr double REGULAR_OVERLAP = 2.0;    // in eps; more is a bad start
 constexpr double PUSH_LIMIT =
     0.05;    // of the sum of radii, per regular step, out of a bad overlap
 constexpr double RELINEARISE_BEYOND = 1.1;    // in eps, overlap at the end of the step
+constexpr double FOLLOWED_ANGLE = 1.0;        // [radians] that a body turns in a step
 constexpr double SHORTEST_STEP = 1.0e-6;      // of the regular one: below, something else is wrong
 constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
 constexpr double COINCIDENT = 1.0e-10;          // of the sum of radii: no normal can be computed
@@ -839,7 +840,9 @@ FixInelastic::looks_at_end(const std::vector<double> &velocity)
   const double h = problem_.timestep;
   std::unordered_set<int> followed;
   for (std::size_t c = 0; c < origin_.size(); ++c)
-    if (origin_[c].wall != 0 && origin_[c].followed) followed.insert(problem_.contacts.first[c]);
+    if (origin_[c].wall != 0 && origin_[c].followed &&
+        rigid_->angle_turned(problem_, problem_.contacts.first[c]) < FOLLOWED_ANGLE)
+      followed.insert(problem_.contacts.first[c]);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (problem_.inverse_mass[i] == 0.0 || (walls_->exact() && !is_member(i))) continue;
     const double *const x = atom->x[i];

@@ -61,6 +61,13 @@ def test_plot():
     assert ax.get_yscale() == "log"
     # Empty bins are left out.
     assert ax.lines[0].get_xdata().tolist() == [0.5, 2.5]
+    # An error as large as its value ends at 0, which is not on this axis: the bar is cut, it stays.
+    (bars,) = ax.collections
+    for (_, low), (_, high) in bars.get_segments():
+        assert 0 < low < high
+    # Nothing within the range: nothing to draw.
+    none = force_distribution([1, 1], bins=1, largest=0.5)
+    assert len(plot_force_distribution(Figure().subplots(), none).lines[0].get_xdata()) == 0
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,14 @@ import sys
 import numpy as np
 import pytest
 
-from lammps_inelastic.analysis import contact_counts, contacts_by_distance, read_particle_frame
+from lammps_inelastic.analysis import (
+    contact_counts,
+    contacts_by_distance,
+    exact_packing_fraction,
+    read_particle_frame,
+)
 from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.measure import _packing
 
 RADIUS, EXCESS = 0.1, 1e-4
 CELLS = 5
@@ -51,11 +57,14 @@ def test_numbers(run, capsys):
     assert (found["step"], found["particles"]) == (90, 125)
 
     packing = found["packing_fraction"]
-    # The cap by which each sphere leaves its cell is 1e-8 of its volume. Four standard deviations:
-    # the seed is fixed, one seed in 16,000 fails by chance.
+    # The cap by which each sphere leaves its cell is 1e-8 of its volume.
     exact = 4 / 3 * np.pi * (RADIUS + EXCESS) ** 3 / (2 * RADIUS) ** 3
-    assert abs(packing["value"] - exact) < 4 * packing["uncertainty"]
-    assert packing["points"] == 1_000_000
+    assert packing["method"] == "exact"
+    assert packing["value"] == pytest.approx(exact, rel=1e-7)
+    # Four standard deviations: the seed is fixed, one seed in 16,000 fails by chance.
+    drawn = packing["monte_carlo"]
+    assert abs(drawn["value"] - exact) < 4 * drawn["uncertainty"]
+    assert (drawn["points"], drawn["seed"]) == (1_000_000, 1)
 
     coordination = found["coordination_number"]
     assert (coordination["particles"], coordination["frames"]) == (27, 2)
@@ -79,7 +88,9 @@ def test_text_and_picture(run, capsys):
     output = capsys.readouterr().out
     for expected in (
         "particles            125",
-        "packing fraction     0.52",
+        "packing fraction     0.5252  ",
+        "  exact; 0.52",
+        " by 1,000,000 random points, seed 1\n",
         "coordination number  5.778 ± 0.314",
         "2 frames, steps 80 to 90",
         "  0 or 1 contacts    0.5 particles",
@@ -93,6 +104,38 @@ def test_text_and_picture(run, capsys):
     ):
         assert expected in output
     assert (run / "packing.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_packing_fraction_is_the_one_of_studies(dimers, capsys):
+    assert main(["look", str(dimers), *MIDDLE, "--no-picture", "--points", "1000", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["packing_fraction"]
+    frame = read_particle_frame(dimers / "particles.lammpsdump")
+    box = np.reshape(np.array(MIDDLE[1:], dtype=float), (3, 2))
+    # `common_volume` is that of spheres of different dimers, 1e-4 deep.
+    exact = exact_packing_fraction(frame.positions, frame.radii, box, frame.particles)
+    assert (shown["value"], shown["common_volume"]) == (exact.value, exact.overlap)
+    # Studies draw their points with the same seed.
+    measured = _packing(frame, frame.particles, box, 1000)
+    assert shown["value"] == measured["packing_fraction"]
+    assert shown["monte_carlo"]["value"] == measured["packing_fraction_monte_carlo"]
+
+
+def test_packing_fraction_of_larger_bodies_is_by_random_points(
+    tmp_path, write_particles, write_contacts, capsys
+):
+    rows = [[i, 1, 1, 0.4 + 0.1 * i, 0.5, 0.5, 0, 0, 0, 0.1] for i in (1, 2, 3)]
+    write_particles({0: rows}, columns="id mol type x y z vx vy vz radius")
+    write_contacts({0: []})
+    command = ["look", str(tmp_path), "--no-picture", "--points", "1000"]
+    assert main([*command, "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["packing_fraction"]
+    assert (shown["method"], shown["common_volume"]) == ("monte carlo", None)
+    assert shown["value"] == shown["monte_carlo"]["value"]
+    assert main(command) == 0
+    output = " ".join(capsys.readouterr().out.split())
+    assert f"{shown['value']:.4f} ± " in output
+    assert " 1,000 random points, seed 1 " in output
+    assert "exact" not in output
 
 
 def test_container_can_be_given(run, capsys):
@@ -116,11 +159,11 @@ def test_box_that_is_not_fixed_has_no_walls(run, capsys):
 
 
 def test_one_frame(run, write_contacts, capsys):
-    write_contacts({5: []})
+    write_contacts({90: []})
     assert main(["look", str(run), "--no-picture"]) == 0
     output = capsys.readouterr().out
     assert "coordination number  0.000 " in output
-    assert "one frame, step 5" in output
+    assert "one frame, step 90" in output
 
 
 def test_spheres_of_a_body_may_overlap(tmp_path, write_particles, write_contacts, capsys):
@@ -434,12 +477,12 @@ def test_truncated_dump(run, capsys):
 
 
 def test_contact_of_an_unknown_particle(run, write_contacts, capsys):
-    write_contacts({0: [[1, 999, 0, 0, 0, 1, 0, 0, 0, 1]]})
+    write_contacts({90: [[1, 999, 0, 0, 0, 1, 0, 0, 0, 1]]})
     assert "names sphere 999" in failure_of(["look", str(run)], capsys)
 
 
 def test_contact_within_a_body(dimers, write_contacts, capsys):
-    write_contacts({0: [[6, 2, 0, 0, 0, 1, 0, 0, -0.1, 1]]})
+    write_contacts({90: [[6, 2, 0, 0, 0, 1, 0, 0, -0.1, 1]]})
     message = "spheres 6 and 2 are in contact, but both belong to body 11"
     assert message in failure_of(["look", str(dimers), *MIDDLE], capsys)
 

@@ -6,6 +6,7 @@ import base64
 import csv
 import io
 import math
+import re
 from html.parser import HTMLParser
 
 import numpy as np
@@ -24,7 +25,7 @@ from lammps_inelastic.analysis.plots import (
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.report.blocks import Comparison, Table, as_short, as_text
 from lammps_inelastic.workflow.report.data import Data, paper_numbers, read_data
-from lammps_inelastic.workflow.report.figures import Figure
+from lammps_inelastic.workflow.report.figures import Figure, Panel, curve
 from lammps_inelastic.workflow.report.page import summarise
 from lammps_inelastic.workflow.report.paper import all_sections
 from lammps_inelastic.workflow.report.statistics import (
@@ -225,14 +226,20 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__()
         self.ids, self.links, self.sources, self.opened, self.text = [], [], [], [], ""
+        # The style sheet; of each table, listing and figure its own rule's name and its parents'.
+        self.text_of_style, self.wide, self._names = "", [], []
         self.feed(text)
         self.close()
         assert self.opened == []
 
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)
+        names = [tag, *(f".{word}" for word in (values.get("class") or "").split())]
         if tag not in VOID:
             self.opened.append(tag)
+            self._names.append(names)
+        if tag in {"table", "pre"} or ".plot" in names:
+            self.wide.append([name for names in self._names[-2:] for name in names])
         assert tag not in {"script", "link", "iframe", "object"}
         if "id" in values:
             self.ids.append(values["id"])
@@ -244,11 +251,13 @@ class Page(HTMLParser):
 
     def handle_endtag(self, tag):
         assert self.opened.pop() == tag
+        self._names.pop()
 
     def handle_data(self, data):
         if self.opened[-1:] != ["style"]:
             self.text += data
         else:
+            self.text_of_style += data
             # Nothing is loaded from anywhere.
             assert "url(" not in data
             assert "@import" not in data
@@ -653,6 +662,39 @@ def test_plots_return_their_axis_and_name_it():
     assert ax.lines[0].get_xdata().tolist() == [1, 2, 3, 4]
     with pytest.raises(InputError):
         plot_distribution(axis(), [0, 0])
+
+
+@pytest.mark.parametrize("kind", ["curve", "profile", "points", "distribution"])
+def test_errors_on_a_logarithmic_axis_leave_no_wedge(kind):
+    """A corner at 0 or below has no place there: others would be joined across the figure."""
+    y = np.array([1, 0.1, 0.01, 0.002, 0.001])
+    error = np.array([0.1, 0.05, 0.01, 0.003, math.nan])
+    panel = Panel("x", "y", [curve("a", np.arange(5), y, error, kind)], log=True)
+    canvas = Figure("wedge", "Wedge.", [panel])._canvas
+    (ax,) = canvas.axes
+    (drawn,) = ax.collections
+    parts = drawn.get_paths() if hasattr(drawn, "get_paths") else drawn.get_segments()
+    corners = np.vstack([part.vertices for part in parts])
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    assert (corners[:, 1] > 0).all()
+    for place, value, width in zip(range(4), y, error, strict=False):
+        at = corners[corners[:, 0] == place, 1]
+        assert at.max() == pytest.approx(value + width)
+        # Down to its end, or out of the figure.
+        assert at.min() == pytest.approx(value - width) or at.min() < ax.get_ylim()[0]
+
+
+def test_what_is_wider_than_the_page_scrolls_in_a_box_of_its_own(page):
+    style = page.text_of_style
+    rules = dict(re.findall(r"^([.\w][^{}@]*?) \{([^{}]*)\}", style, re.MULTILINE))
+    assert page.wide
+    for parents in page.wide:
+        # A table stands in a box that scrolls; what else may be wide scrolls itself.
+        assert any("overflow-x: auto" in rules.get(name, "") for name in parents), parents
+    assert "max-width: 100%" in rules[".pictures img"]
+    assert "width: 100%" in rules[".plot img"]
+    # Beside the contents a column may become narrower than what it holds.
+    assert re.search(r"grid-template-columns: \w+ minmax\(0, 1fr\)", style)
 
 
 def test_neck_touches_the_rolling_sphere():

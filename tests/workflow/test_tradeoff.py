@@ -10,13 +10,19 @@ import numpy as np
 import pytest
 
 from few_spheres import write_data
-from lammps_inelastic.analysis import InputError, ParticleFrame, network_difference
+from lammps_inelastic.analysis import (
+    InputError,
+    ParticleFrame,
+    at_steps,
+    network_difference,
+    read_run_log,
+)
 from lammps_inelastic.workflow import tradeoff_command
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.settling import first_at_rest, overlaps_as_contacts
 from lammps_inelastic.workflow.store import Result, read_studies
 from lammps_inelastic.workflow.study import Case
-from lammps_inelastic.workflow.thermo import at_steps, read_thermo
+from lammps_inelastic.workflow.thermo import read_thermo
 from lammps_inelastic.workflow.tradeoff import (
     Configuration,
     Run,
@@ -93,16 +99,19 @@ def test_a_log_between_and_after_its_lines(tmp_path):
     log = tmp_path / "log.lammps"
     runs = [
         "   Step  \n     0\nLoop time of 1 on 1 procs for 0 steps with 3 atoms\n",
-        "   Step          Time   \n     0   0\n   100   1.0\nLoop time of 1 on 1 procs\n",
-        "   Step          Time   \n   100   1.0\n   200   3.0\nLoop time of 1 on 1 procs\n",
+        "   Step          Time   \n     0   0\n   100   1.0\nLoop time of 1 on 1 procs "
+        "for 100 steps with 3 atoms\n",
+        "   Step          Time   \n   100   1.0\n   200   3.0\nLoop time of 1 on 1 procs "
+        "for 110 steps with 3 atoms\n",
     ]
     log.write_text("".join(runs))
-    table = read_thermo(log, "Time")
+    read = read_run_log(log)
+    table = read_thermo(read, "Time")
     assert table["Step"].tolist() == [0, 100, 200]
     times = at_steps([50, 100, 150, 200, 210, -1], table["Step"], table["Time"])
     assert times[:5] == pytest.approx([0.5, 1, 2, 3, 3.2])
     assert math.isnan(times[5])
-    assert np.isnan(at_steps([1], *read_thermo(log, "CPU").values())).all()
+    assert np.isnan(at_steps([1], *read_thermo(read, "CPU").values())).all()
 
 
 def test_overlaps_are_the_contacts_of_soft_spheres():

@@ -326,14 +326,15 @@ def _draw(ax: Axes, panel: Panel) -> None:
         plot_bounds(ax, low, high, label=label)
     for number, (label, value) in enumerate(panel.references):
         plot_reference(ax, value, label=label, number=number)
+    # The lower end of a logarithmic axis: not down to where an error band meets 0.
+    bottom = 0.5 * min(float(one.y[one.y > 0].min()) for one in panel.curves) if panel.log else None
     for number, one in enumerate(panel.curves):
-        _draw_curve(ax, one, number)
+        _draw_curve(ax, one, number, bottom)
     for label, place in panel.moments:
         plot_moment(ax, place, label)
-    if panel.log:
+    if bottom is not None:
         ax.set_yscale("log", nonpositive="mask")
-        # Not down to where an error band meets 0.
-        ax.set_ylim(bottom=0.5 * min(float(one.y[one.y > 0].min()) for one in panel.curves))
+        ax.set_ylim(bottom=bottom)
     if panel.ticks:
         ax.set_xticks(range(len(panel.ticks)), panel.ticks, rotation=30, ha="right")
         ax.set_xlim(-0.5, len(panel.ticks) - 0.5)
@@ -345,18 +346,19 @@ def _draw(ax: Axes, panel: Panel) -> None:
         ax.set_title(panel.title, fontsize="medium")
 
 
-def _draw_curve(ax: Axes, one: Curve, number: int) -> None:
+def _draw_curve(ax: Axes, one: Curve, number: int, bottom: float | None) -> None:
+    """Draw a curve; `bottom` is the lower end of a logarithmic axis."""
+    # Beyond the lower end of the axis, so that a band is cut there and does not seem to end.
+    least = None if bottom is None else bottom / 10
+    how: Any = {"errors": one.error, "label": one.label, "number": number, "least": least}
     if one.kind == "distribution":
-        plot_distribution(ax, one.y, errors=one.error, label=one.label, number=number)
+        plot_distribution(ax, one.y, **how)
     elif one.kind == "profile":
-        plot_wall_profile(ax, one.x, one.y, errors=one.error, label=one.label, number=number)
+        plot_wall_profile(ax, one.x, one.y, **how)
     elif one.kind == "curve":
-        plot_curve(ax, one.x, one.y, errors=one.error, label=one.label, number=number)
+        plot_curve(ax, one.x, one.y, **how)
     else:
-        joined = one.kind == "points"
-        plot_points(
-            ax, one.x, one.y, errors=one.error, label=one.label, number=number, joined=joined
-        )
+        plot_points(ax, one.x, one.y, joined=one.kind == "points", **how)
 
 
 def _word(value: float) -> str:

@@ -1,0 +1,452 @@
+"""A log of LAMMPS: its runs, their thermo output, and the steps at which its dumps were written.
+
+A log repeats every command with the values of its variables. So it tells by itself which frames a
+dump must hold: what `dump`, `dump_modify`, `undump` and `write_dump` say, and the runs in between.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import LogError
+from .geometry import FloatArray, IntArray
+
+_LOOP = re.compile(r"Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) atoms")
+_COUNT = re.compile(r"f_(\w+)\[(5|6)\]")
+# Commands after which the step is another one, without a run.
+_NEW_STEP = ("read_restart", "read_data", "read_dump", "clear", "rerun", "tad", "prd", "hyper")
+# With which a deck begins.
+_ANEW = ("LAMMPS", "units", "atom_style", "read_restart", "read_data", "clear")
+# What LAMMPS takes for the same time, in shares of a step.
+_SAME_TIME = 1e-6
+# Relative; thermo output has eight digits.
+_DIGITS = 1e-8
+# Beyond so many steps, frames that are written at times are not predicted.
+_MOST_STEPS = 50_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run of a log.
+
+    Attributes
+    ----------
+    line : of the header of its thermo output, counted from 1
+    before : step at which the run before it ended; None where that is not known
+    first : its first step
+    steps : how many it took; None where the log ends before the run does
+    seconds : wall time; None likewise
+    atoms : their number at the end; None likewise
+    thermo : columns of the thermo output by their names, (k,) each; they have all the same length
+    every : lines of thermo output are so many steps apart, 0 for none but the first and the last;
+        None where that is not known
+    counts : columns of the contacts that a fix inelastic counts, by the place in its vector: 5 for
+        those between spheres, 6 for those with walls; none where a format may have cut digits
+    """
+
+    line: int
+    before: int | None
+    first: int
+    steps: int | None
+    seconds: float | None
+    atoms: int | None
+    thermo: Mapping[str, FloatArray]
+    every: int | None
+    counts: Mapping[int, str]
+
+    @property
+    def known(self) -> int:
+        """The last step of which the log tells."""
+        return int(self.thermo["Step"][-1]) if self.steps is None else self.first + self.steps
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What a dump file must hold, as a log tells it.
+
+    Attributes
+    ----------
+    path : of the file, as the deck names it
+    steps : (k,), of its frames
+    runs : (k,), number of the run that wrote each, from 0
+    slack : by so many steps a frame may be written earlier or later: those that are written at
+        times follow from the rounded times of the log
+    group : of atoms; None for a dump that chooses among them
+    fix : the fix inelastic whose contacts are in it; None where there is none
+    """
+
+    path: str
+    steps: IntArray
+    runs: IntArray
+    slack: int
+    group: str | None
+    fix: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class RunLog:
+    """A log of LAMMPS.
+
+    Attributes
+    ----------
+    path : of the log
+    text : all of it
+    runs : in their order
+    dumps : the files that it names, by their paths: what they must hold, or None where it does not
+        tell all about that
+    ended : whether it was closed as LAMMPS or the deck does it: not the case while LAMMPS works,
+        and where the log was cut off
+    """
+
+    path: Path
+    text: str
+    runs: Sequence[Run]
+    dumps: Mapping[str, Written | None]
+    ended: bool
+
+    @property
+    def complete(self) -> bool:
+        """Whether its last run has ended."""
+        return not self.runs or self.runs[-1].steps is not None
+
+    def names(self, path: Path) -> bool:
+        """Whether it tells that a dump of this file's name was written."""
+        return any(PurePosixPath(name).name == path.name for name in self.dumps)
+
+    def written(self, path: Path) -> Written | None:
+        """Return what a dump must hold; None where the log does not tell.
+
+        A folder may have been moved: the file's name decides, which must be there once.
+        """
+        found = [dump for name, dump in self.dumps.items() if PurePosixPath(name).name == path.name]
+        return found[0] if len(found) == 1 else None
+
+
+def read_run_log(path: str | PathLike[str]) -> RunLog:
+    """Read a log of LAMMPS with one line of thermo output a step (styles one and custom).
+
+    Raises LogError where the file cannot be read, or where what it tells contradicts itself.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8", errors="replace")
+    except FileNotFoundError:
+        raise LogError(file, "no such file") from None
+    except OSError as error:
+        raise LogError(file, f"cannot be read: {error.strerror}") from None
+    reader = _Reader(file)
+    for number, line in enumerate(text.splitlines(), 1):
+        reader.read(line, number)
+    reader.close_run(None)
+    dumps = {name: reader.written(name) for name in reader.files}
+    return RunLog(file, text, reader.runs, dumps, reader.ended)
+
+
+@dataclass
+class _Dump:
+    """A dump that is defined; `every` or `time` says when it writes, or neither is known."""
+
+    path: str
+    group: str | None
+    every: int | None
+    time: float | None = None
+    first: bool = False
+    last: int | None = None
+
+
+@dataclass
+class _File:
+    """What a dump file holds; nothing is known of a file that had something in it before."""
+
+    known: bool = True
+    steps: list[int] = field(default_factory=list)
+    runs: list[int] = field(default_factory=list)
+    slack: int = 0
+    group: str | None = None
+    fix: str | None = None
+
+
+class _Reader:
+    """Goes through the lines of a log."""
+
+    def __init__(self, path: Path) -> None:
+        self.runs: list[Run] = []
+        self.files: dict[str, _File] = {}
+        self.ended = False
+        self._path = path
+        self._dumps: dict[str, _Dump] = {}
+        self._step: int | None = None
+        self._every: int | None = None
+        self._counts: dict[int, str] = {}
+        self._fixes: set[str] = set()
+        self._cut = False
+        self._names: list[str] = []
+        self._rows: list[list[float]] = []
+        self._header = 0
+
+    def read(self, line: str, number: int) -> None:
+        words = line.split()
+        if self._names and words and words[0] in _ANEW:
+            # LAMMPS was killed, and another one has gone on with the log and from a restart file.
+            self.close_run(None)
+            self._forget()
+            self._dumps.clear()
+            self._step = None
+        if words[:1] == ["Step"]:
+            self.close_run(None)
+            self._names, self._header = words, number
+        elif self._names and (loop := _LOOP.match(line)):
+            self.close_run(loop)
+        elif self._names and (row := _numbers(words, len(self._names))) is not None:
+            self._rows.append(row)
+        elif _LOOP.match(line):
+            # Of a run whose thermo output has another style: nobody knows where it ended.
+            self._step = None
+            self._forget()
+        elif words and not self._names:
+            self._command(words)
+
+    def close_run(self, loop: re.Match[str] | None) -> None:
+        """Keep the run that the thermo output of the last header belongs to, if there is one."""
+        if self._rows:
+            table = np.array(self._rows).T
+            thermo = dict(zip(self._names, table, strict=True))
+            run = Run(
+                line=self._header,
+                before=self._step,
+                first=int(thermo["Step"][0]),
+                steps=None if loop is None else int(loop[2]),
+                seconds=None if loop is None else float(loop[1]),
+                atoms=None if loop is None else int(loop[3]),
+                thermo=thermo,
+                every=self._every,
+                counts=self._counts_of(self._names),
+            )
+            self.runs.append(run)
+            self._check(run)
+            for dump in self._dumps.values():
+                self._write(dump, run)
+            self._step = run.known
+        elif self._names and loop is not None:
+            raise LogError(self._path, "a run has no line of thermo output", self._header)
+        self._names, self._rows = [], []
+
+    def written(self, name: str) -> Written | None:
+        file = self.files[name]
+        if not file.known or not file.steps:
+            return None
+        steps, runs = np.array(file.steps), np.array(file.runs)
+        return Written(name, steps, runs, file.slack, file.group, file.fix)
+
+    def _counts_of(self, names: Sequence[str]) -> dict[int, str]:
+        """Return the columns of thermo output that count contacts; none if several fixes do."""
+        if len(self._fixes) != 1 or self._cut:
+            return {}
+        own = {number: f"f_{fix}[{number}]" for fix in self._fixes for number in (5, 6)}
+        found = {number: self._counts.get(number, name) for number, name in own.items()}
+        return {number: name for number, name in found.items() if name in names}
+
+    def _fix_of(self, columns: Sequence[str]) -> str | None:
+        """Return the fix inelastic whose first column, the contacts, is among those of a dump."""
+        return next((fix for fix in self._fixes if f"f_{fix}[1]" in columns), None)
+
+    def _check(self, run: Run) -> None:
+        """See that a run goes on where the one before has ended, and that no line is missing."""
+        if run.before is not None and run.first != run.before:
+            raise LogError(
+                self._path,
+                f"a run begins at step {run.first}, but the one before it ended at step "
+                f"{run.before}: a part of the log is missing",
+                run.line,
+            )
+        steps = run.thermo["Step"]
+        wanted = {run.first}
+        if run.every:
+            wanted |= set(range(-(-run.first // run.every) * run.every, run.known, run.every))
+        there = set(steps.astype(np.int64).tolist())
+        missing = sorted(wanted - there) if run.every is not None else []
+        if missing or (np.diff(steps) <= 0).any() or steps[-1] > run.known:
+            what = f"of step {missing[0]} is missing" if missing else "do not follow one another"
+            raise LogError(
+                self._path,
+                f"{'a line' if missing else 'the lines'} of thermo output {what}, in the run from "
+                f"step {run.first} to {run.known}",
+                run.line,
+            )
+
+    def _command(self, words: list[str]) -> None:
+        if words[:3] == ["Total", "wall", "time:"]:
+            self.ended = True
+            return
+        if any("$" in word for word in words):
+            # It comes again, with the values in place.
+            return
+        name, *rest = [word for word in words[: _comment(words)]] or [""]
+        self.ended = name in ("quit", "log")
+        if name == "reset_timestep" or name in _NEW_STEP:
+            self._step = _integer(rest[0]) if name == "reset_timestep" and rest else None
+            if name == "clear":
+                self._dumps.clear()
+            elif name != "reset_timestep":
+                self._forget()
+        elif name == "thermo" and rest:
+            self._every = _integer(rest[0])
+        elif name == "thermo_style":
+            self._counts.clear()
+            self._cut = False
+        elif name == "thermo_modify":
+            if "every" in rest:
+                self._every = None
+            self._cut = self._cut or "format" in rest
+            for index, word in enumerate(rest[:-2]):
+                source = _COUNT.fullmatch(rest[index + 1])
+                if word == "colname" and source and source[1] in self._fixes:
+                    self._counts[int(source[2])] = rest[index + 2]
+        elif name == "fix" and rest[2:3] == ["inelastic"]:
+            self._fixes.add(rest[0])
+        elif name == "dump" and len(rest) >= 5:
+            identity, group, _, every, path = rest[:5]
+            self._dumps[identity] = _Dump(path, group, _integer(every))
+            self.files[path] = _File(group=group, fix=self._fix_of(rest[5:]))
+        elif name == "dump_modify" and rest and rest[0] in self._dumps:
+            self._modify(self._dumps[rest[0]], rest[1:])
+        elif name == "undump" and rest:
+            self._dumps.pop(rest[0], None)
+        elif name == "write_dump" and len(rest) >= 3:
+            self._write_once(rest)
+
+    def _modify(self, dump: _Dump, words: list[str]) -> None:
+        file = self.files[dump.path]
+        for word, value in itertools.pairwise(words):
+            if word == "every":
+                dump.every, dump.time = _integer(value), None
+            elif word == "every/time":
+                dump.every, dump.time = None, _real(value)
+            elif word == "first":
+                dump.first = value == "yes"
+            elif word in ("region", "thresh"):
+                file.group = None
+            elif word in ("append", "delay", "skip") and value != "no":
+                file.known = False
+
+    def _forget(self) -> None:
+        """Take nothing for known of what the dumps write now."""
+        for dump in self._dumps.values():
+            self.files[dump.path].known = False
+
+    def _write(self, dump: _Dump, run: Run) -> None:
+        """Add the frames that a dump has written in a run."""
+        file, last = self.files[dump.path], run.known
+        if dump.every:
+            steps = list(range(-(-run.first // dump.every) * dump.every, last + 1, dump.every))
+        else:
+            found = _steps_at_times(run, dump.time) if dump.time and not self._cut else None
+            if found is None:
+                file.known = False
+                return
+            steps = found
+            file.slack = 1
+        if dump.first and dump.last is None and steps[:1] != [run.first]:
+            steps.insert(0, run.first)
+        steps = [step for step in steps if step != dump.last]
+        if steps:
+            dump.last = steps[-1]
+            file.steps += steps
+            file.runs += [len(self.runs) - 1] * len(steps)
+
+    def _write_once(self, words: list[str]) -> None:
+        """Add the frame of a write_dump: its words are group, style, file and columns."""
+        path, append = words[2], " append yes" in " ".join(words)
+        new = _File(known=not append, group=words[0], fix=self._fix_of(words[3:]))
+        if not append or path not in self.files:
+            self.files[path] = new
+        file = self.files[path]
+        if self._step is None or not self.runs:
+            file.known = False
+            return
+        file.steps.append(self._step)
+        file.runs.append(len(self.runs) - 1)
+
+
+def _steps_at_times(run: Run, interval: float) -> list[int] | None:
+    """Return the steps at which a multiple of a time interval is reached; None if unknown."""
+    if "Time" not in run.thermo or run.known - run.first > _MOST_STEPS:
+        return None
+    steps = np.arange(run.first, run.known + 1)
+    times = at_steps(steps, run.thermo["Step"], run.thermo["Time"])
+    if not np.isfinite(times).all():
+        return None
+    length = np.diff(times, prepend=times[0])
+    # A dump whose interval is about that of the steps now and then leaves one out.
+    if 2 * length.max() > interval:
+        return None
+    length[0] = length[1] if len(length) > 1 else 0.0
+    near = (_SAME_TIME * length + _DIGITS * np.abs(times)) / interval
+    passed = np.floor(times / interval + near)
+    written = np.diff(passed, prepend=passed[0]) > 0
+    # The first one is on time, or is passed already.
+    written[0] = abs(times[0] / interval - passed[0]) <= near[0]
+    return [int(step) for step in steps[written]]
+
+
+def at_steps(wanted: ArrayLike, steps: FloatArray, values: FloatArray) -> FloatArray:
+    """Return what a column was at some steps: linear between two lines, and after the last one.
+
+    A run that a fix has ended has no line of its last step.
+
+    Parameters
+    ----------
+    wanted : (m,), steps that need not have a line
+    steps : (k,), of the lines, ascending
+    values : (k,), of the column
+
+    Returns
+    -------
+    (m,); NaN before the first line, and everywhere where there is none
+    """
+    where = np.asarray(wanted, dtype=np.float64)
+    if len(steps) == 0:
+        return np.full(where.shape, np.nan)
+    found = np.interp(where, steps, values, left=np.nan)
+    beyond = where > steps[-1]
+    if beyond.any():
+        slope = (values[-1] - values[-2]) / (steps[-1] - steps[-2]) if len(steps) > 1 else np.nan
+        found[beyond] = values[-1] + slope * (where[beyond] - steps[-1])
+    return found
+
+
+def _numbers(words: list[str], count: int) -> list[float] | None:
+    """Return the numbers of a line of thermo output; None if the line is none."""
+    if len(words) != count or not words[0].isdigit():
+        return None
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        return None
+
+
+def _comment(words: list[str]) -> int:
+    """Return the number of words before a comment."""
+    return next((n for n, word in enumerate(words) if word.startswith("#")), len(words))
+
+
+def _integer(word: str) -> int | None:
+    try:
+        return int(word)
+    except ValueError:
+        return None
+
+
+def _real(word: str) -> float | None:
+    try:
+        return float(word)
+    except ValueError:
+        return None

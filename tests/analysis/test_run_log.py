@@ -1,0 +1,182 @@
+"""What a log of LAMMPS tells of the frames of its dumps, and what it does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lammps_inelastic.analysis import LogError, ParticleDump, UnfinishedRunError, open_run
+from lammps_inelastic.analysis.run_log import read_run_log
+
+DUMP = "dump all all custom {} out/a.dump id x y z radius\n"
+FIX = "fix touch all inelastic 1e-4\n"
+
+
+def run(first: int, steps: int, columns: str = "", last: bool = True, end: bool = True) -> str:
+    """Return what a log holds of a run: a line of thermo output at either end."""
+    rows = [first, first + steps] if last and steps else [first]
+    lines = [f"   Step          Time    {columns}", *(f"{n:10} {n * 0.1:g}   " for n in rows)]
+    loop = [f"Loop time of 0.5 on 2 procs for {steps} steps with 3 atoms"] if end else []
+    return "\n".join([*lines, *loop, ""])
+
+
+def written(path: Path, text: str) -> list[int] | None:
+    (path / "log.lammps").write_text(text)
+    found = read_run_log(path / "log.lammps").written(path / "moved" / "a.dump")
+    return None if found is None else found.steps.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "steps"),
+    [
+        (DUMP.format(3) + run(0, 7), [0, 3, 6]),
+        (DUMP.format(3) + run(1, 7), [3, 6]),
+        (DUMP.format(3) + "dump_modify all sort id first yes\n" + run(1, 7), [1, 3, 6]),
+        # A step that ends one run and begins the next is written once.
+        (DUMP.format(3) + run(0, 6) + run(6, 3) + run(9, 0), [0, 3, 6, 9]),
+        (run(0, 6) + DUMP.format(2) + run(6, 3), [6, 8]),
+        (DUMP.format(2) + run(0, 3) + "undump all\n" + run(3, 5), [0, 2]),
+        (DUMP.format(2) + run(0, 3) + "reset_timestep 100\n" + run(100, 3), [0, 2, 100, 102]),
+        # A run that a fix has ended: no line of its last step, here or in the columns.
+        (DUMP.format(2) + run(0, 5, last=False), [0, 2, 4]),
+        (
+            DUMP.format(4)
+            + run(0, 6)
+            + "undump all\nwrite_dump all custom out/a.dump id modify append yes\n",
+            [0, 4, 6],
+        ),
+        (DUMP.format(4) + run(0, 6) + "write_dump all custom out/a.dump id modify sort id\n", [6]),
+        # With variables in place, and comments.
+        (
+            "dump all all custom ${n} ${out}/a.dump id\ndump all all custom 5 ${out}/a.dump id\n"
+            "dump all all custom 5 out/a.dump id # radius\n" + run(0, 5),
+            [0, 5],
+        ),
+        (DUMP.format(1) + "dump_modify all every/time 0.35\n" + run(0, 10), [0, 4, 7]),
+        # Times that fall together with steps.
+        (DUMP.format(1) + "dump_modify all every/time 0.3\n" + run(0, 9), [0, 3, 6, 9]),
+        # A run under way: as far as the log tells.
+        (DUMP.format(3) + run(0, 6, end=False), [0, 3, 6]),
+        # Of these it does not tell all.
+        (DUMP.format(3) + "dump_modify all every v_when\n" + run(0, 7), None),
+        (DUMP.format(3) + "dump_modify all append yes\n" + run(0, 7), None),
+        (DUMP.format(3) + "dump_modify all delay 5\n" + run(0, 7), None),
+        (DUMP.format(3) + "dump_modify all skip v_dull\n" + run(0, 7), None),
+        (DUMP.format(1) + "dump_modify all every/time 0.15\n" + run(0, 7), None),
+        (
+            DUMP.format(1)
+            + "dump_modify all every/time 0.3\nthermo_modify format float %.2g\n"
+            + run(0, 9),
+            None,
+        ),
+        (DUMP.format(3) + run(0, 7) + "rerun other.dump dump x y z\n" + run(0, 7), None),
+        (DUMP.format(3) + DUMP.format(5).replace("out/", "other/") + run(0, 7), None),
+        (DUMP.format(3) + "keywords: ['Step']\n" + run(0, 7)[-60:], None),
+        (run(0, 7), None),
+        ("", None),
+        # Killed, and continued from step 4 in the same files.
+        (
+            DUMP.format(3)
+            + run(0, 6, end=False)
+            + "read_restart a\n"
+            + DUMP.format(3)
+            + "dump_modify all append yes\n"
+            + run(4, 8),
+            None,
+        ),
+    ],
+)
+def test_frames_of_which_a_log_tells(tmp_path: Path, text: str, steps: list[int] | None) -> None:
+    assert written(tmp_path, text) == steps
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (run(0, 5) + run(7, 5), "line 5: a run begins at step 7, but the one before it ended at"),
+        ("thermo 2\n" + run(0, 5), "line 2: a line of thermo output of step 2 is missing"),
+        (run(0, 9).replace("for 9", "for 4"), "line 1: the lines of thermo output do not follow"),
+        (run(5, 5).replace("    10 ", "     4 "), "the lines of thermo output do not follow one"),
+        ("   Step Time\nLoop time of 1 on 1 procs for 0 steps with 3 atoms\n", "a run has no line"),
+    ],
+)
+def test_a_log_that_contradicts_itself(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(LogError, match=f"log.lammps, .*{said}"):
+        written(tmp_path, text)
+
+
+def test_what_is_no_log(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"log\.lammps: no such file"):
+        read_run_log(tmp_path / "log.lammps")
+    with pytest.raises(LogError, match="cannot be read: Is a directory"):
+        read_run_log(tmp_path)
+    (tmp_path / "picture").write_bytes(bytes(range(256)) * 10)
+    assert read_run_log(tmp_path / "picture").runs == []
+
+
+def test_the_end_of_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "log.lammps"
+    for text, ended in (
+        (run(0, 5) + "Total wall time: 0:00:01\n", True),
+        (run(0, 5) + "quit\n", True),
+        (run(0, 5) + "log other.log\n", True),
+        (run(0, 5), False),
+        (run(0, 5) + "quit\nundump all\n", False),
+    ):
+        path.write_text(text)
+        assert read_run_log(path).ended == ended
+
+
+def test_contacts_that_a_log_counts(tmp_path: Path) -> None:
+    path = tmp_path / "log.lammps"
+    named = "thermo_modify colname f_touch[5] contacts colname f_other[6] walls\n"
+    for text, counts in (
+        (FIX + named + run(0, 0, "contacts").replace("0   ", "0   4"), {5: "contacts"}),
+        (FIX + run(0, 0, "f_touch[6]").replace("0   ", "0   4"), {6: "f_touch[6]"}),
+        # A style of its own puts names back.
+        (FIX + named + "thermo_style custom step\n" + run(0, 0), {}),
+        (FIX + FIX.replace("touch", "two") + named + run(0, 0), {}),
+        (named + run(0, 0), {}),
+        (
+            FIX
+            + named
+            + "thermo_modify format float %.3g\n"
+            + run(0, 0, "contacts").replace("0   ", "0   4"),
+            {},
+        ),
+    ):
+        path.write_text(text)
+        (only,) = read_run_log(path).runs
+        assert only.counts == counts
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        # A dump that no log explains: a run that goes on from a restart file repeats its step.
+        ([0, 5, 5, 7], ""),
+        ([0, 1, 10, 100], ""),
+        ([0, 5, 3], "the frame of step 3 comes after that of step 5; run it again"),
+    ],
+)
+def test_a_dump_of_which_no_log_tells(tmp_path: Path, steps: list[int], said: str) -> None:
+    head = "ITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n" + "0 1\n" * 3
+    frames = [f"ITEM: TIMESTEP\n{n}\n{head}ITEM: ATOMS id x y z radius\n1 0 0 0 1\n" for n in steps]
+    (tmp_path / "own.dump").write_text("".join(frames))
+    dump = ParticleDump(tmp_path / "own.dump")
+    (tmp_path / "log.lammps").write_text(DUMP.format(5) + run(0, 20) + "quit\n")
+    log = read_run_log(tmp_path / "log.lammps")
+    for given in (None, log):
+        if said:
+            with pytest.raises(ValueError, match=said):
+                open_run(dump, None, given)
+        else:
+            assert open_run(dump, None, given).log is None
+    # The log of a run that was cut off before it told of the dump.
+    if not said:
+        (tmp_path / "log.lammps").write_text(run(0, 20))
+        log = read_run_log(tmp_path / "log.lammps")
+        assert open_run(dump, None, log, over=False).log is None
+        with pytest.raises(UnfinishedRunError, match=r"its end is missing, .* tell of own\.dump"):
+            open_run(dump, None, log)
