@@ -26,9 +26,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
-from .files import whole, writing
+from .errors import WorkflowError
+from .files import digest_of, whole, writing
 from .store import origin_of
-from .study import Case, Study
+from .study import INPUTS, Case, Study
 
 State = Literal["measured", "finished", "running", "cut off", "failed", "missing"]
 
@@ -133,8 +134,13 @@ class Folder:
             part.mkdir(parents=True)
             for stage in case.stages:
                 (part / f"{stage.deck.name}.in").write_text(stage.deck.text)
-            for name, path in case.inputs.items():
-                shutil.copyfile(path, part / name)
+            if case.inputs:
+                (part / INPUTS).mkdir()
+            for name, file in case.inputs.items():
+                copy = part / INPUTS / name
+                shutil.copyfile(file.path, copy)
+                if digest_of(copy) != file.digest:
+                    raise WorkflowError(f"{file.path}: has changed since the study was read")
         return part
 
     def finish(self, case: Case, record: Mapping[str, Any]) -> None:

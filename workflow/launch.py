@@ -21,7 +21,8 @@ from types import FrameType
 from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record
-from .study import Case, Stage, Study
+from .stages import steps_of
+from .study import Case, Study
 
 POLL = 0.05
 # How often the logs are looked at for the step [seconds].
@@ -277,12 +278,6 @@ def exit_reason(code: int) -> str:
         except ValueError:
             pass
     return f"exit status {code}"
-
-
-def steps_of(stage: Stage) -> int:
-    """Steps that a stage will take in all; 0 where its deck does not say."""
-    steps = [v for name, v in stage.variables.items() if name.startswith("steps_")]
-    return sum(step for step in steps if isinstance(step, int))
 
 
 def step_of(output: Path) -> int | None:

@@ -234,7 +234,7 @@ def test_starts_from_a_data_file(tmp_path, capsys):
     numbers = numbers_of(tmp_path / "out" / "few.h5")
     # The file says how many there are.
     assert numbers["few/summary/particles_measured"].tolist() == [27]
-    assert numbers["few/summary/start"].tolist() == [b"my.data"]
+    assert numbers["few/summary/start"].tolist() == [b"inputs/my.data"]
 
 
 def test_groups_of_one_rank_give_the_same_numbers(undisturbed, tmp_path):
