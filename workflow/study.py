@@ -265,14 +265,17 @@ class Case:
         """A hash of what the decks do: another one means that a result is of another deck."""
         return "+".join(stage.deck.fingerprint for stage in self.stages)
 
-    def is_of(self, record: Mapping[str, Any]) -> bool:
+    def is_of(self, record: Any) -> bool:
         """Whether a run was made with the values of this case, as far as it had the variables.
 
         Parameters
         ----------
-        record : how it was made: see `provenance.run_record`
+        record : how it was made: see `provenance.run_record`; anything else is of no case
         """
-        made = [stage["variables"] for stage in record["stages"]]
+        try:
+            made = [dict(stage["variables"]) for stage in record["stages"]]
+        except (KeyError, TypeError, ValueError):
+            return False
         if len(made) != len(self.stages):
             return False
         return all(
