@@ -91,13 +91,12 @@ def _wrong_before(stage: Stage, before: Stage, kind: str | None) -> tuple[str, s
     particle = stage.variables.get("particle", kind)
     if particle != kind:
         return "particle", (
-            f"{particle} is not allowed: {before.deck.name} leaves {kind}, so that it must be "
-            f"{kind} in {name}"
+            f"{name} has particle = {particle}, but {before.deck.name} leaves {kind}: set "
+            f"particle = {kind}"
         )
     if before.variables.get("contacts") == "soft":
         return "contacts", (
-            f"soft is not allowed: {name} cannot follow {before.deck.name} with soft contacts, "
-            "which leaves overlaps"
+            f"{name} cannot follow {before.deck.name} with contacts = soft, which leaves overlaps"
         )
     return None
 

@@ -141,20 +141,32 @@ def test_one_line_for_one_mistake(write_study, text, message, capsys):
         ("dimers response", "", "response cannot follow dimers, which leaves dimers: it takes sph"),
         ("clusters response", "", "response cannot follow clusters, which leaves clusters"),
         ("clusters settling", "", "settling cannot follow clusters, which leaves clusters: it ta"),
-        ("dimers settling", "", "spheres is not allowed: dimers leaves dimers, so that it must be"),
-        ("dimers settling", "particle='spheres'", "parameters.particle: spheres is not allowed"),
+        (
+            "dimers settling",
+            "",
+            "settling has particle = spheres, but dimers leaves dimers: set pa",
+        ),
+        (
+            "dimers settling",
+            "particle='spheres'",
+            "parameters.particle: settling has particle = spheres",
+        ),
         (
             "dimers settling",
             "particle=['dimers', 'spheres']",
-            "parameters.particle: spheres is not",
+            "parameters.particle: settling has par",
         ),
-        ("spheres settling", "particle='dimers'", "parameters.particle: dimers is not allowed"),
+        (
+            "spheres settling",
+            "particle='dimers'",
+            "parameters.particle: settling has particle = dimers",
+        ),
         ("spheres response settling", "", "settling cannot follow response, which changes the co"),
         ("dimers settling response", "particle='dimers'", "response cannot follow settling, which"),
         (
             "spheres settling response",
             "contacts='soft'",
-            "parameters.contacts: soft is not allowed",
+            "parameters.contacts: response cannot follow",
         ),
         ("spheres dimers", "", "dimers makes a packing of its own, and would not use that of sph"),
         ("own.in spheres", "", "spheres makes a packing of its own, and would not use that of own"),
@@ -191,7 +203,9 @@ def test_a_row_whose_deck_does_not_fit(write_study):
         'title="t"\ndeck=["spheres", "settling"]\n[[rows]]\n[[rows]]\ndeck=["dimers", "settling"]'
     )
     (line,) = mistakes_of(write_study(text))
-    assert line.startswith("rows[2].deck: spheres is not allowed: dimers leaves dimers, so that it")
+    assert line.startswith(
+        "rows[2].deck: settling has particle = spheres, but dimers leaves dimers: set "
+    )
     assert line.endswith(" (at line 5)")
 
 
