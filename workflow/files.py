@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -42,3 +44,36 @@ def writing(path: Path) -> Iterator[None]:
         raise WorkflowError(f"{path}: cannot be written: {error.filename} is no folder") from None
     except OSError as error:
         raise WorkflowError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """Return the content of a regular file of at most so many bytes.
+
+    Raises WorkflowError, with the name of the file, if it cannot be read, is larger, or is
+    something else, such as a pipe, for whose writer one would wait for ever.
+    """
+    try:
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            kind = os.fstat(file.fileno()).st_mode
+            content = file.read(most + 1) if stat.S_ISREG(kind) else b""
+    except OSError as error:
+        raise WorkflowError(f"{path}: {error.strerror}") from None
+    if not stat.S_ISREG(kind):
+        raise WorkflowError(f"{path}: not a file")
+    if len(content) > most:
+        raise WorkflowError(f"{path}: too large: at most {most} bytes are allowed")
+    return content
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a regular file; no name is too long or too odd to ask."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def digest_of(path: Path) -> str:
+    """Return a hash of a file's content, however large it is. Raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

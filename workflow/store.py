@@ -5,12 +5,17 @@
     /STUDY/summary        one dataset a parameter and a number, one row a case: a table
     /STUDY/cases/CASE     as in schema.py; where the packing comes from in the attributes
 
-Everything is written under another name and renamed when it is complete.
+Everything is written under another name and renamed when it is complete. After the end of the HDF5
+file, where its readers do not look, comes a line with its check sum: a damaged file is known before
+HDF5 reads it, which may take long over one, or take it for whole.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,6 +31,10 @@ from .files import whole
 from .schema import PICTURES, SCHEMA, VERSION
 
 Array = NDArray[Any]
+
+SEAL = b"\nlammps-inelastic sha256 %s\n"
+SEAL_BYTES = len(SEAL % bytes(64))
+CHUNK = 2**20
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,24 +82,19 @@ def write_result(path: Path, result: Result) -> None:
 def read_result(path: Path) -> Result:
     """Read one case's file.
 
-    Raises WorkflowError if it is none.
+    Raises WorkflowError if it is none, or damaged.
     """
-    try:
-        with h5py.File(path) as file:
-            _check_version(file, path)
-            return _get(file)
-    except (OSError, KeyError, ValueError) as error:
-        raise WorkflowError(f"{path}: not a result: {' '.join(str(error).split())}") from None
+    with _opened(path, "a result") as file:
+        return _get(file)
 
 
-def origin_of(path: Path) -> tuple[str, Mapping[str, Any]] | None:
-    """Return a result's outputs and its record, as in `Result`; None if the file is no result."""
-    try:
-        with h5py.File(path) as file:
-            _check_version(file, path)
-            return str(file.attrs["outputs"]), json.loads(file.attrs["record"])
-    except (OSError, KeyError, ValueError):
-        return None
+def origin_of(path: Path) -> tuple[str, Mapping[str, Any]]:
+    """Return a result's outputs and its record, as in `Result`.
+
+    Raises WorkflowError if the file is no result, or damaged.
+    """
+    with _opened(path, "a result") as file:
+        return str(file.attrs["outputs"]), json.loads(file.attrs["record"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,24 +132,16 @@ def read_studies(path: Path) -> list[StoredStudy]:
 
     Raises WorkflowError if it is none.
     """
-    if not path.is_file():
-        raise WorkflowError(f"{path}: no such file")
-    try:
-        with h5py.File(path) as file:
-            _check_version(file, path)
-            return [
-                StoredStudy(
-                    name,
-                    str(group.attrs["title"]),
-                    str(group.attrs["study"]),
-                    [_get(case) for case in group["cases"].values()],
-                )
-                for name, group in file.items()
-            ]
-    except (OSError, KeyError, ValueError) as error:
-        raise WorkflowError(
-            f"{path}: not a file of studies: {' '.join(str(error).split())}"
-        ) from None
+    with _opened(path, "a file of studies") as file:
+        return [
+            StoredStudy(
+                name,
+                str(group.attrs["title"]),
+                str(group.attrs["study"]),
+                [_get(case) for case in group["cases"].values()],
+            )
+            for name, group in file.items()
+        ]
 
 
 def _put(group: h5py.Group, result: Result) -> None:
@@ -187,7 +183,7 @@ def _summarise(group: h5py.Group, results: Sequence[Result]) -> None:
     for name in names:
         column = [result.variables.get(name) for result in results]
         # That of the names is there already.
-        name = "case_variable" if name == "case" else name
+        name = _free(group, name, "variable")
         if any(isinstance(value, str) for value in column):
             group.create_dataset(name, data=["" if v is None else str(v) for v in column])
         else:
@@ -199,16 +195,61 @@ def _summarise(group: h5py.Group, results: Sequence[Result]) -> None:
             continue
         # A parameter such as `particles` is what was asked for, the number what there was.
         short = name.removeprefix("numbers/")
-        label = short if short not in names else f"{short}_measured"
+        label = _free(group, short, "measured")
         dataset = group.create_dataset(label, data=[result.number(short) for result in results])
         dataset.attrs["unit"] = entry.unit
         dataset.attrs["meaning"] = entry.meaning
 
 
-def _check_version(file: h5py.File, path: Path) -> None:
-    version = file.attrs.get("schema_version")
-    if version != VERSION:
-        raise WorkflowError(f"{path}: schema version {version}, but this program reads {VERSION}")
+def _free(group: h5py.Group, name: str, ending: str) -> str:
+    """Return a name that no column has yet: with an ending if need be, and with several."""
+    while name in group:
+        name = f"{name}_{ending}"
+    return name
+
+
+@contextmanager
+def _opened(path: Path, what: str) -> Iterator[h5py.File]:
+    """Open a file that `_whole` has written, and none that is damaged.
+
+    Raises WorkflowError with one line that says what is wrong with it.
+    """
+    try:
+        _check_seal(path)
+        with h5py.File(path) as file:
+            version = file.attrs.get("schema_version")
+            if version != VERSION:
+                raise WorkflowError(f"schema version {version}, but this program reads {VERSION}")
+            yield file
+    except WorkflowError as error:
+        raise WorkflowError(f"{path}: not {what}: {error}") from None
+    except OSError as error:
+        reason = error.strerror or " ".join(str(error).split())
+        raise WorkflowError(f"{path}: {reason[:1].lower()}{reason[1:]}") from None
+    # A file that some other program has sealed may lack anything.
+    except (KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+        raise WorkflowError(f"{path}: not {what}: {' '.join(str(error).split())}") from None
+
+
+def _check_seal(path: Path) -> None:
+    """Raise WorkflowError if a file is not as it was written, and OSError if it cannot be read."""
+    # What is no file may keep one waiting.
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(handle, "rb") as file:
+        status = os.fstat(handle)
+        if not stat.S_ISREG(status.st_mode):
+            raise WorkflowError("it is no regular file")
+        left = status.st_size - SEAL_BYTES
+        digest = hashlib.sha256()
+        while left > 0 and (chunk := file.read(min(left, CHUNK))):
+            digest.update(chunk)
+            left -= len(chunk)
+        seal = file.read()
+    start, _, end = SEAL.partition(b"%s")
+    if len(seal) != SEAL_BYTES or not (seal.startswith(start) and seal.endswith(end)):
+        raise WorkflowError("it is cut off, or was written or changed by another program")
+    if seal != SEAL % digest.hexdigest().encode():
+        raise WorkflowError("it is damaged: its check sum is another one")
 
 
 @contextmanager
@@ -226,4 +267,4 @@ def _whole(path: Path) -> Iterator[h5py.File]:
         file.flush()
         image = file.id.get_file_image()
     with whole(path) as temporary:
-        temporary.write_bytes(image)
+        temporary.write_bytes(image + SEAL % hashlib.sha256(image).hexdigest().encode())

@@ -34,24 +34,45 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator
 
-from .decks import FILES, OUT, PACKING, RULES, Deck, Value, find_deck
+from .decks import FILES, OUT, PACKING, RULES, SHIPPED, Deck, Value, find_deck
 from .errors import StudyError, WorkflowError
+from .files import digest_of, is_file, read_regular
+from .stages import Bounds, container_of, last_step_of, misfit, takes_out
 from .toml_lines import lines_of_keys
 
 # A study of more cases is a slip of the pen.
 MOST_CASES = 10_000
 LONGEST_NAME = 160
+# A study's name names a file and a folder, with some letters more while they are written [bytes].
+LONGEST_STUDY_NAME = 200
+# Of a study file or a deck; what is larger is some other file [bytes].
+LARGEST_FILE = 1_000_000
+# A whole number of more bits cannot be written in decimal digits by Python.
+MOST_BITS = 10_000
+# A minute of measuring each, or some minutes for all slabs together.
+MOST_POINTS, MOST_POINTS_OF_SLAB, MOST_POINTS_OF_PROFILE = 10**8, 10**7, 10**9
+MOST_SLABS = 10_000
+MOST_PICTURES = 100
+# In a case's folder, so that a user's file may have any name.
+INPUTS = "inputs"
+# What a case's folder holds beside decks: no folder of a stage may have such a name.
+OWN_FILES = (
+    *(INPUTS, "finished.json", "failed.json", "log.lammps", "lmp.out", "screen.out", "measure.out"),
+    *("particles.lammpsdump", "contacts.lammpsdump", "packing.restart"),
+    *("dimer.json", "tetrahedron.json"),
+)
 # Of an error; a file may quote a picture.
 LONGEST_LINE = 2000
 # In a case's name even at their defaults; others where they differ.
 ALWAYS_SHOWN = ("particles", "aspect_ratio", "change", "seed")
 
+# What pydantic calls otherwise than TOML does.
+KINDS = {"dict_type": "a table", "model_type": "a table", "list_type": "a list"}
+KINDS |= {"tuple_type": "a list"}
 # Keys of which pydantic has several things to say at a time.
 WHOLE = {("deck",): "a name or a list of names", ("outputs", "box"): "six numbers"}
-
-Bounds = tuple[float, float, float, float, float, float]
 
 # The box of the paper: a quarter of the container's width away from every wall and the floor.
 PAPER_BOX: Bounds = (0.25, 0.75, 0.25, 0.75, 0.25, 0.75)
@@ -59,6 +80,29 @@ PAPER_BOX: Bounds = (0.25, 0.75, 0.25, 0.75, 0.25, 0.75)
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _from_to(least: int, most: int) -> BeforeValidator:
+    def check(value: Any) -> int:
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+            raise ValueError(f"it must be a whole number from {least} to {most}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def _between(low: float, high: float) -> BeforeValidator:
+    def check(value: Any) -> float:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not low <= value <= high:
+            raise ValueError(f"it must be a number from {low:g} to {high:g}")
+        return float(value)
+
+    return BeforeValidator(check)
+
+
+_Number = Annotated[float, Field(strict=True)]
+_Boolean = Annotated[bool, Field(strict=True)]
 
 
 class ProfileOutput(_Table):
@@ -73,9 +117,9 @@ class ProfileOutput(_Table):
     """
 
     axis: Literal["x", "y", "z"] = "x"
-    thickness: Annotated[float, Field(gt=0, le=1)] = 0.1
-    reach: Annotated[float, Field(gt=0)] = 0.25
-    points: Annotated[int, Field(ge=1, strict=True)] = 100_000
+    thickness: Annotated[float, _between(0.001, 1)] = 0.1
+    reach: Annotated[float, _between(1e-6, 1e6)] = 0.25
+    points: Annotated[int, _from_to(1, MOST_POINTS_OF_SLAB)] = 100_000
 
 
 class Outputs(_Table):
@@ -93,23 +137,29 @@ class Outputs(_Table):
     keep : `everything`, or `results` to delete the dumps of a case that has been measured
     """
 
-    box: Bounds = PAPER_BOX
-    points: Annotated[int, Field(ge=1, strict=True)] = 1_000_000
-    evolution: bool = True
+    box: tuple[_Number, _Number, _Number, _Number, _Number, _Number] = PAPER_BOX
+    points: Annotated[int, _from_to(1, MOST_POINTS)] = 1_000_000
+    evolution: _Boolean = True
     profile: ProfileOutput | None = None
-    structure: bool = True
-    pictures: tuple[int, ...] = ()
-    network: bool = False
+    structure: _Boolean = True
+    pictures: tuple[Annotated[int, _from_to(0, 2**63 - 1)], ...] = ()
+    network: _Boolean = False
     keep: Literal["everything", "results"] = "everything"
 
     @field_validator("box")
     @classmethod
     def _ordered(cls, value: Bounds) -> Bounds:
-        if not all(
-            -math.inf < low < high < math.inf
-            for low, high in zip(value[::2], value[1::2], strict=True)
-        ):
+        sides = [high - low for low, high in zip(value[::2], value[1::2], strict=True)]
+        # A volume that is no number of full precision gives no packing fraction.
+        if not all(0 < side < math.inf for side in sides) or not 1e-300 < math.prod(sides) < 1e300:
             raise ValueError("it must be xlo, xhi, ylo, yhi, zlo, zhi, each lower bound the lesser")
+        return value
+
+    @field_validator("pictures")
+    @classmethod
+    def _few(cls, value: tuple[int, ...]) -> tuple[int, ...]:
+        if len(value) > MOST_PICTURES or len(set(value)) < len(value):
+            raise ValueError(f"they must be at most {MOST_PICTURES} steps, each of them once")
         return value
 
     @property
@@ -124,6 +174,25 @@ class _StudyFile(_Table):
     parameters: dict[str, Any] = {}
     rows: list[dict[str, Any]] = []
     outputs: Outputs = Outputs()
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file that a deck reads.
+
+    Attributes
+    ----------
+    path : where it is
+    digest : of its content when the study was read
+    """
+
+    path: Path
+    digest: str
+
+    @classmethod
+    def of(cls, path: Path) -> Input:
+        """Return a file as it is now. Raises OSError if it cannot be read."""
+        return cls(path, digest_of(path))
 
 
 @dataclass(frozen=True)
@@ -152,11 +221,11 @@ class Case:
     Attributes
     ----------
     stages : in the order in which they run
-    inputs : files that the decks read, by the name that they get in the case's folder
+    inputs : files that the decks read, by the name that they get in the case's folder of inputs
     """
 
     stages: tuple[Stage, ...]
-    inputs: Mapping[str, Path]
+    inputs: Mapping[str, Input]
 
     @property
     def variables(self) -> dict[str, Value]:
@@ -188,7 +257,7 @@ class Case:
                 + ([] if stage.deck.shipped else [stage.deck.fingerprint])
                 for stage in self.stages
             ],
-            "inputs": {name: _hash(path.read_bytes()) for name, path in self.inputs.items()},
+            "inputs": {name: file.digest for name, file in self.inputs.items()},
         }
         digest = _hash(json.dumps(identity, sort_keys=True).encode())[:8]
         readable = re.sub(r"[^\w.=+-]", "-", "_".join(words), flags=re.ASCII)
@@ -199,14 +268,17 @@ class Case:
         """A hash of what the decks do: another one means that a result is of another deck."""
         return "+".join(stage.deck.fingerprint for stage in self.stages)
 
-    def is_of(self, record: Mapping[str, Any]) -> bool:
+    def is_of(self, record: Any) -> bool:
         """Whether a run was made with the values of this case, as far as it had the variables.
 
         Parameters
         ----------
-        record : how it was made: see `provenance.run_record`
+        record : how it was made: see `provenance.run_record`; anything else is of no case
         """
-        made = [stage["variables"] for stage in record["stages"]]
+        try:
+            made = [dict(stage["variables"]) for stage in record["stages"]]
+        except (KeyError, TypeError, ValueError):
+            return False
         if len(made) != len(self.stages):
             return False
         return all(
@@ -228,7 +300,9 @@ class Case:
         before = None
         for stage in self.stages:
             out = self.folder_of(stage)
-            values = {**stage.values, OUT: out}
+            values = dict(stage.values)
+            if takes_out(stage.deck):
+                values[OUT] = out
             if before is not None and PACKING in stage.deck.variables:
                 values[PACKING] = f"{before}/packing.restart"
             command = ["lmp", "-nonbuf", "-in", f"{stage.deck.name}.in"]
@@ -266,11 +340,15 @@ def read_study(path: Path) -> Study:
 
     Raises StudyError with one line for every mistake.
     """
+    if mistake := _of_name(path.stem):
+        raise StudyError([_shown(f"{path}: {mistake}")])
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_regular(path, LARGEST_FILE).decode("utf-8-sig")
         content = tomllib.loads(text)
-    except OSError as error:
-        raise StudyError([f"{path}: {error.strerror}"]) from None
+        if _has_endless_number(content):
+            raise ValueError("a whole number has too many digits")
+    except WorkflowError as error:
+        raise StudyError([_shown(str(error))]) from None
     # A whole number of thousands of digits is a ValueError too.
     except ValueError as error:
         raise StudyError([f"{path}: not TOML: {_shown(str(error))}"]) from None
@@ -287,10 +365,34 @@ def read_study(path: Path) -> Study:
             raise StudyError(_placed(mistakes, path, text)) from None
         # The parameters are as they should be: their mistakes are to be told at once.
         file = _StudyFile.model_validate({**content, "outputs": {}})
+    if not file.title.isprintable():
+        mistakes.append(f"title: {file.title!r} is not allowed: it must be one line of text")
     cases = tuple(_cases(file, path.parent, mistakes))
+    if not mistakes:
+        mistakes += dict.fromkeys(_of_outputs(file.outputs, cases))
     if mistakes:
         raise StudyError(_placed(mistakes, path, text))
     return Study(path.stem, file.title, text, cases, file.outputs)
+
+
+def _of_name(name: str) -> str | None:
+    """Say why a study file's name cannot name its results, if it cannot."""
+    if name.startswith(".") or not name.isprintable() or name != name.strip():
+        return (
+            "the file's name, which its results get, must begin with a letter or a digit, and have "
+            "neither line breaks nor other characters that cannot be printed"
+        )
+    if len(name.encode()) > LONGEST_STUDY_NAME:
+        return f"the file's name is too long: at most {LONGEST_STUDY_NAME} bytes are allowed"
+    return None
+
+
+def _has_endless_number(content: Any) -> bool:
+    if isinstance(content, dict):
+        return any(map(_has_endless_number, content.values()))
+    if isinstance(content, list):
+        return any(map(_has_endless_number, content))
+    return isinstance(content, int) and content.bit_length() > MOST_BITS
 
 
 def _placed(mistakes: Sequence[str], path: Path, text: str) -> list[str]:
@@ -302,7 +404,7 @@ def _placed(mistakes: Sequence[str], path: Path, text: str) -> list[str]:
         line = lines.get(mistake.split(": ")[0])
         # As tomllib says it.
         where = "" if line is None else f" (at line {line})"
-        placed.append(f"{path}: {_shown(mistake)}{where}")
+        placed.append(f"{_shown(str(path))}: {_shown(mistake)}{where}")
     return placed
 
 
@@ -315,6 +417,7 @@ def _shown(mistake: str) -> str:
 def _cases(file: _StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case]:
     known: set[str] = set()
     seen: set[str] = set()
+    files: dict[Path, Input] = {}
     missing = False
     rows = file.rows or [{}]
     for number, row in enumerate(rows, 1):
@@ -343,9 +446,17 @@ def _cases(file: _StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case
             mistakes.append(f"{where}: more than {MOST_CASES} cases")
         if mistakes:
             continue
+        keys = {name: key for key, (name, _) in wanted.items()}
+        keys["deck"] = f"{where}.deck" if "deck" in row else "deck"
         for combination in itertools.product(*choices.values()):
-            case = _case(decks, dict(zip(choices, combination, strict=True)), folder)
-            if case.name not in seen:
+            try:
+                case = _case(decks, dict(zip(choices, combination, strict=True)), folder, files)
+            except WorkflowError as error:
+                mistakes.append(f"{where}: {error}")
+                break
+            if wrong := misfit(case.stages):
+                mistakes.append(f"{keys.get(wrong[0], keys['deck'])}: {wrong[1]}")
+            elif case.name not in seen:
                 seen.add(case.name)
                 yield case
     if missing:
@@ -360,10 +471,28 @@ def _decks(name: Any, folder: Path) -> list[Deck]:
     names = name if isinstance(name, list) else [name]
     if not names or not all(isinstance(each, str) for each in names):
         raise WorkflowError(f"a deck is a name, or a list of names, not {name!r}")
-    decks = [find_deck(each, folder) for each in names]
+    decks = []
+    for each in names:
+        path = folder / each
+        if each not in SHIPPED and is_file(path):
+            # Before all of it is read; of its content the deck itself takes care.
+            read_regular(path, LARGEST_FILE)
+        decks.append(find_deck(each, folder))
+        if not is_word(decks[-1].name) or decks[-1].name.startswith("."):
+            raise WorkflowError(
+                f"{each!r}: a deck's name must be one word without quotes, $ and &, that does not "
+                "begin with a dot"
+            )
     # Each writes to a folder of its name.
     if len({deck.name for deck in decks}) < len(decks):
         raise WorkflowError(f"{names!r} names a deck twice; each may be there once")
+    if len(decks) > 1:
+        for deck in decks:
+            if deck.name in (*OWN_FILES, *(f"{other.name}.in" for other in decks)):
+                raise WorkflowError(
+                    f"{deck.name}.in: the folder of this deck would be named as a file of the "
+                    "case; rename the deck"
+                )
     return decks
 
 
@@ -380,7 +509,7 @@ def _decks_of(file: _StudyFile, folder: Path) -> list[Deck]:
 def _unknown(key: str, decks: Sequence[Deck]) -> str:
     if not decks:
         return f"{key}: no deck knows it"
-    allowed = "; ".join(f"{deck.name}: {', '.join(deck.parameters)}" for deck in decks)
+    allowed = "; ".join(f"{deck.name}: {', '.join(deck.parameters) or 'none'}" for deck in decks)
     return f"{key}: no variable of that name; allowed are {allowed}"
 
 
@@ -403,11 +532,13 @@ def _values(
             )
         elif isinstance(each, float) and not math.isfinite(each):
             mistakes.append(f"{key}: {each} is not allowed: it must be finite")
-        elif isinstance(each, str) and not _is_word(each):
+        elif isinstance(each, str) and not is_word(each):
             mistakes.append(f"{key}: {each!r} must be one word, without spaces, quotes, $ and &")
         elif shipped and name in RULES and not RULES[name].accepts(each):
-            mistakes.append(f"{key}: {each} is not allowed: it must be {RULES[name].allowed}")
-        elif name in FILES and not (folder / str(each)).is_file():
+            mistakes.append(f"{key}: {each!r} is not allowed: it must be {RULES[name].allowed}")
+        elif isinstance(each, int) and abs(each) >= 2**63:
+            mistakes.append(f"{key}: {each} is not allowed: whole numbers must be below 2^63")
+        elif name in FILES and not is_file(folder / str(each)):
             words = [word for deck in decks for word in FILES[name].get(deck.name, ())]
             if shipped and each not in words:
                 mistakes.append(
@@ -416,7 +547,8 @@ def _values(
     return values
 
 
-def _is_word(text: str) -> bool:
+def is_word(text: str) -> bool:
+    """Whether LAMMPS takes a text as one word wherever a deck may put it."""
     return text.isprintable() and not re.search(r"[\s$\"'&]|^$", text)
 
 
@@ -445,13 +577,30 @@ def _range(key: str, value: Mapping[str, Any], mistakes: list[str]) -> list[Valu
     return [low + i * step if whole else float(f"{low + i * step:.15g}") for i in range(count)]
 
 
-def _case(decks: Sequence[Deck], values: dict[str, Value], folder: Path) -> Case:
-    inputs: dict[str, Path] = {}
-    for name in FILES:
-        path = folder / str(values.get(name, ""))
-        if name in values and path.is_file():
-            inputs[path.name] = path
-            values[name] = path.name
+def _case(
+    decks: Sequence[Deck], values: dict[str, Value], folder: Path, files: dict[Path, Input]
+) -> Case:
+    """Return a case; `files` are those that are known already, to read each once.
+
+    Raises WorkflowError if a file cannot be read, or if two have the same name.
+    """
+    inputs: dict[str, Input] = {}
+    for name, words in FILES.items():
+        value = values.get(name)
+        # A word of a deck means the same whatever files there are.
+        if value is None or any(value in words.get(deck.name, ()) for deck in decks):
+            continue
+        path = folder / str(value)
+        if not is_file(path):
+            continue
+        if path not in files:
+            try:
+                files[path] = Input.of(path)
+            except OSError as error:
+                raise WorkflowError(f"{path}: {error.strerror}") from None
+        if inputs.setdefault(path.name, files[path]) != files[path]:
+            raise WorkflowError(f"two files are named {path.name}; rename one of them")
+        values[name] = f"{INPUTS}/{path.name}"
     return Case(tuple(stage_of(deck, values) for deck in decks), inputs)
 
 
@@ -465,6 +614,61 @@ def stage_of(deck: Deck, values: Mapping[str, Value]) -> Stage:
             if name in values and values[name] != default
         },
     )
+
+
+def _of_outputs(outputs: Outputs, cases: Sequence[Case]) -> Iterator[str]:
+    """Say what of the outputs cannot be measured of the cases, one line each."""
+    ends = [last_step_of(case.stages[-1]) for case in cases]
+    known = [end for end in ends if end is not None]
+    for step in outputs.pictures:
+        # Cases of fewer steps than others are drawn at their end.
+        if len(known) == len(ends) and step > max(known):
+            yield (
+                f"outputs.pictures: {step} is not allowed: it must be a step from 0 to "
+                f"{max(known)}, where the longest case ends"
+            )
+    for stage in [case.stages[-1] for case in cases]:
+        container = container_of(stage)
+        if container is not None and not all(
+            low <= value <= high
+            for value, low, high in zip(
+                outputs.box,
+                [low for low in container[::2] for _ in "lh"],
+                [high for high in container[1::2] for _ in "lh"],
+                strict=True,
+            )
+        ):
+            yield (
+                f"outputs.box: {list(outputs.box)} is not allowed: it must lie in the container of "
+                f"{stage.deck.name}, {list(container)}"
+            )
+        if outputs.profile is not None:
+            yield from _of_profile(outputs.profile, stage, container)
+
+
+def _of_profile(profile: ProfileOutput, stage: Stage, container: Bounds | None) -> Iterator[str]:
+    axis = "xyz".index(profile.axis)
+    if container is not None:
+        width = container[2 * axis + 1] - container[2 * axis]
+        if profile.reach > width:
+            yield (
+                f"outputs.profile.reach: {profile.reach} is not allowed: it must be at most "
+                f"{width}, the width of the container of {stage.deck.name} along {profile.axis}"
+            )
+            return
+    diameter = stage.variables.get("diameter")
+    if not isinstance(diameter, int | float) or diameter <= 0:
+        return
+    thickness = profile.thickness * diameter
+    slabs = profile.reach / thickness if thickness > 0 else math.inf
+    if slabs > MOST_SLABS or slabs * profile.points > MOST_POINTS_OF_PROFILE:
+        most = min(MOST_SLABS, MOST_POINTS_OF_PROFILE / profile.points)
+        least = profile.reach / (most * diameter)
+        yield (
+            f"outputs.profile: {slabs:.3g} slabs of {profile.points} points each are too many: at "
+            f"most {MOST_SLABS} slabs and {MOST_POINTS_OF_PROFILE} points in all are allowed, so "
+            f"that thickness must be at least {least:.2g} diameters for spheres of {diameter}"
+        )
 
 
 def _lines(error: ValidationError) -> Iterator[str]:
@@ -491,6 +695,8 @@ def _lines(error: ValidationError) -> Iterator[str]:
             message = f"no such key; allowed are {', '.join(model.model_fields)}"
         elif mistake["type"] == "missing":
             message = "this key is missing"
+        elif mistake["type"] in KINDS:
+            message = f"{mistake['input']!r} is not allowed: it must be {KINDS[mistake['type']]}"
         else:
             message = f"{mistake['input']!r} is not allowed: {message}"
         yield f"{place}: {message}"

@@ -18,16 +18,19 @@ from rich.table import Table
 from rich.text import Text
 
 from .errors import StudyError, WorkflowError
-from .files import whole
+from .files import is_file, whole, writing
 from .finished import other_run
 from .folder import Folder, last_lines
 from .launch import MEASURED, Options, Outcome, run_study
 from .progress import Display
 from .slurm import job_script
-from .store import StoredStudy, read_result, write_studies
+from .store import StoredStudy, origin_of, read_result, write_studies
 from .study import Case, Study, read_study
 
 WIDEST = 10_000
+# How an HDF5 file begins.
+HDF5 = b"\x89HDF\r\n\x1a\n"
+LONGEST_TIMEOUT = 1e9
 SHIPPED = Path(str(files("lammps_inelastic.inputs") / "studies"))
 
 
@@ -118,6 +121,7 @@ def run_command(options: argparse.Namespace) -> int:
         return 0
     if options.command == "collect":
         file = options.file or folder.root / f"{'+'.join(study.name for study in studies)}.h5"
+        _check_target(file)
         stored = [gathered(study, folder) for study in studies]
         write_studies(file, stored)
         for study, found in zip(studies, stored, strict=True):
@@ -125,11 +129,24 @@ def run_command(options: argparse.Namespace) -> int:
         print(f"written: {file}")
         return 0
     if options.command == "slurm":
-        print(
-            job_script(studies[0], _found(options.studies[0]), folder, options.ranks, options.time)
-        )
+        path = _found(options.studies[0])
+        script = job_script(studies[0], path, folder, options.ranks, options.time)
+        with writing(folder.root):
+            # Slurm does not make the folder for its output, and a job without one fails unseen.
+            folder.root.mkdir(parents=True, exist_ok=True)
+        print(script)
         return 0
     return _run(options, studies, folder)
+
+
+def _check_target(file: Path) -> None:
+    """Raise WorkflowError if a file that would be replaced is no HDF5 file."""
+    if not is_file(file):
+        return
+    with file.open("rb") as opened:
+        start = opened.read(len(HDF5))
+    if start and start != HDF5:
+        raise WorkflowError(f"{file}: this file is no HDF5 file, and is not replaced")
 
 
 def _run(options: argparse.Namespace, studies: Sequence[Study], folder: Folder) -> int:
@@ -192,7 +209,10 @@ def tell(study: Study, outcome: Outcome) -> None:
 
 
 def gathered(study: Study, folder: Folder) -> StoredStudy:
-    """Return the results that there are of a study, in the order of its cases."""
+    """Return the results that there are of a study, in the order of its cases.
+
+    What is damaged is left out, and named on stderr.
+    """
     results = []
     for case in study.cases:
         if folder.is_measured(study, case):
@@ -200,6 +220,8 @@ def gathered(study: Study, folder: Folder) -> StoredStudy:
             results.append(read_result(path))
             if said := other_run(folder.case(case), results[-1].record):
                 print(f"WARNING: {path} is {said}; delete it to measure that", file=sys.stderr)
+        elif damage := folder.damage(study, case):
+            print(f"inelastic: left out: {damage}", file=sys.stderr)
     return StoredStudy(study.name, study.title, study.text, results)
 
 
@@ -210,6 +232,13 @@ def adopt_results(study: Study, folder: Folder, source: Path) -> int:
         kept, target = source / study.name / f"{case.name}.h5", folder.result(study, case)
         if folder.is_measured(study, case) or not kept.is_file():
             continue
+        try:
+            origin_of(kept)
+        except WorkflowError as error:
+            print(f"not taken: {error}")
+            continue
+        for line in folder.set_aside(study, case):
+            print(line)
         with whole(target) as temporary:
             shutil.copyfile(kept, temporary)
         count += 1
@@ -234,6 +263,8 @@ def _print_status(study: Study, folder: Folder) -> None:
             if record["fingerprint"] != case.fingerprint:
                 other += 1
                 note += ", by another version of the deck"
+        if damage := folder.damage(study, case):
+            note = f"{note}; {damage}" if note else damage
         table.add_row(str(number), Text(case.name), state, Text(note))
     # A name is there to be copied, whole: a line may be longer than the terminal is wide.
     Console(highlight=False, width=WIDEST).print(table)
@@ -257,7 +288,9 @@ def _chosen(study: Study, wanted: Iterable[str] | None) -> list[Case]:
                 f"--case {name}: {study.name} has no such case; it must be a name that "
                 f"`inelastic status` shows, or a number from 1 to {len(study.cases)}"
             )
-        chosen.append(cases[name])
+        # Once, however often and by whichever of its names it was asked for.
+        if cases[name] not in chosen:
+            chosen.append(cases[name])
     return chosen
 
 
@@ -317,7 +350,8 @@ def _add_out(parser: argparse.ArgumentParser) -> None:
 
 
 def _count(text: str) -> int:
-    if not text.isdigit() or int(text) < 1:
+    # Digits of other scripts are digits too, and superscripts: but no numbers.
+    if not (text.isascii() and text.isdigit() and len(text) < 10) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no whole number of at least 1")
     return int(text)
 
@@ -327,6 +361,8 @@ def seconds(text: str) -> float:
         value = float(text)
     except ValueError:
         value = 0.0
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of seconds above 0")
+    if not 0 < value <= LONGEST_TIMEOUT:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no number of seconds above 0, and up to {LONGEST_TIMEOUT:g}"
+        )
     return value

@@ -23,7 +23,7 @@ from lammps_inelastic.analysis import network_difference
 
 from .decks import SETTLING, Value, find_deck
 from .store import Result
-from .study import Case, stage_of
+from .study import INPUTS, Case, Input, stage_of
 
 FloatArray = NDArray[np.float64]
 
@@ -139,13 +139,14 @@ def runs_of(plan: Plan) -> list[Run]:
     """
     folder = Path()
     first, second = find_deck(plan.particle, folder), find_deck(SETTLING, folder)
+    files = {start: Input.of(start) for start in plan.starts if isinstance(start, Path)}
     runs = []
     for start, configuration in product(plan.starts, plan.configurations):
         own: dict[str, Value] = {**NO_STEPS, **plan.values}
-        inputs: dict[str, Path] = {}
+        inputs: dict[str, Input] = {}
         if isinstance(start, Path):
-            own["start"] = start.name
-            inputs[start.name] = start
+            own["start"] = f"{INPUTS}/{start.name}"
+            inputs[start.name] = files[start]
         else:
             own["seed"] = start
         settling: dict[str, Value] = {

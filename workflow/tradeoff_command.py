@@ -18,12 +18,12 @@ from rich.text import Text
 
 from .decks import RULES, Rule, Value, as_value
 from .errors import StudyError
-from .files import whole
+from .files import is_file, whole
 from .folder import Folder
 from .launch import Options, run_study
 from .progress import Display
 from .store import Result, read_result, write_studies
-from .study import MOST_CASES, Outputs, Study
+from .study import MOST_CASES, Outputs, Study, is_word
 from .study_commands import WIDEST, gathered, seconds, tell
 from .tradeoff import (
     COMPARED,
@@ -188,7 +188,13 @@ def read_plan(options: argparse.Namespace) -> Plan:
     count = value_of("--seeds", options.seeds, _whole_number_to(MOST_CASES))
     seeds: list[int] = []
     files: list[Path] = options.start or []
-    mistakes += [f"--start: {path}: no such file" for path in files if not path.is_file()]
+    for path in files:
+        if not is_word(path.name):
+            mistakes.append(
+                f"--start: {path}: a file's name must be one word, without spaces, quotes, $ and &"
+            )
+        elif not is_file(path):
+            mistakes.append(f"--start: {path}: no such file")
     if len({path.name for path in files}) < len(files):
         mistakes.append("--start: two files have the same name, which tells starts apart")
     soft = options.soft_tolerances

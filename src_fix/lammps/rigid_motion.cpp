@@ -517,12 +517,6 @@ void RigidMotion::turn(const inelastic::ContactProblem &problem,
   }
 }
 
-double RigidMotion::angle_turned(const inelastic::ContactProblem &problem, int i) const
-{
-  const double *const q = bodies_[problem.bodies.body[i]].turned;
-  return 2.0 * std::atan2(norm(q + 1), std::abs(q[0]));
-}
-
 void RigidMotion::velocity_after(const inelastic::ContactProblem &problem, int i,
                                  double *velocity) const
 {

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import signal
+import subprocess
 import threading
 import time
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -16,7 +18,17 @@ from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.schema import SCHEMA
 from lammps_inelastic.workflow.study import read_study
-from study_run import inelastic, killed_when, numbers_of, processes_in, same, wait_for
+from study_run import (
+    ENVIRONMENT,
+    PATIENCE,
+    command,
+    inelastic,
+    killed_when,
+    numbers_of,
+    processes_in,
+    same,
+    wait_for,
+)
 
 
 @pytest.fixture(scope="module")
@@ -122,20 +134,6 @@ def test_status_tells_whole_names(undisturbed, capsys):
     assert "few: 2 measured" in output
 
 
-def test_a_broken_result_is_measured_again(undisturbed, capsys):
-    path, out = undisturbed / "few.toml", undisturbed / "out"
-    before = numbers_of(out / "few.h5")
-    study = read_study(path)
-    result = Folder(out).result(study, study.cases[0])
-    result.write_bytes(result.read_bytes()[:1000])
-    assert main(["collect", str(path), "--out", str(out), "--file", str(out / "one.h5")]) == 0
-    assert "few: 1 of 2 cases" in capsys.readouterr().out
-    assert len(numbers_of(out / "one.h5")["few/summary/case"]) == 1
-    assert main(["run", str(path), "--out", str(out)]) == 0
-    assert "few: 1 done, 1 there before" in capsys.readouterr().out
-    assert same(before, numbers_of(out / "few.h5"))
-
-
 @pytest.mark.parametrize("moment", ["part", "dump", "finished", "result"])
 def test_killed_and_run_again(undisturbed, tmp_path, moment, capsys):
     path, out = one_case(tmp_path), tmp_path / "out"
@@ -176,6 +174,66 @@ def test_sigterm_kills_what_runs(slow, tmp_path):
     )
     assert status == 130
     wait_for(lambda: not processes_in(out))
+
+
+def mapped(process, part):
+    """Whether a process has a library mapped whose path has this part: how far it has come."""
+    try:
+        return part in Path(f"/proc/{process.pid}/maps").read_text()
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("moment", ["imports", "imports, late", "pool", "twice", "together"])
+def test_interrupted(moment, tmp_path):
+    """At whatever moment: one line, and nothing is left running."""
+    out = tmp_path / "out"
+    (tmp_path / "slow.in").write_text("variable x index 1\nshell sleep 1000\n")
+    path = tmp_path / "slow.toml"
+    path.write_text(SLOW + "[parameters]\nx = { from = 1, to = 40 }\n")
+    process = subprocess.Popen(
+        command("run", path, "--out", out, "--at-once", 20),
+        env=ENVIRONMENT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    there = {
+        "imports": lambda: mapped(process, "/numpy/"),
+        "imports, late": lambda: mapped(process, "/h5py/"),
+        "pool": lambda: len(processes_in(out)) > 0,
+        "twice": lambda: len(processes_in(out)) > 10,
+        "together": lambda: len(processes_in(out)) > 10,
+    }[moment]
+    wait_for(lambda: there() or process.poll() is not None)
+    process.send_signal(signal.SIGINT)
+    for pause in {"twice": [0.01] * 20, "together": [0.0] * 20}.get(moment, []):
+        time.sleep(pause)
+        process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=PATIENCE)[1]
+    assert (process.returncode, said) == (130, "inelastic: interrupted\n")
+    assert processes_in(out) == []
+
+
+def test_what_nohup_ignores_stays_ignored(slow, tmp_path):
+    """A study goes on when the terminal is closed, and ends for another signal."""
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        ["nohup", *command("run", slow, "--out", out)],
+        env=ENVIRONMENT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        wait_for(lambda: len(processes_in(out)) > 0)
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.5)
+        assert process.poll() is None
+    finally:
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 130
 
 
 def test_what_a_killed_workflow_leaves_is_stopped(slow, tmp_path, capsys):
@@ -234,7 +292,7 @@ def test_starts_from_a_data_file(tmp_path, capsys):
     numbers = numbers_of(tmp_path / "out" / "few.h5")
     # The file says how many there are.
     assert numbers["few/summary/particles_measured"].tolist() == [27]
-    assert numbers["few/summary/start"].tolist() == [b"my.data"]
+    assert numbers["few/summary/start"].tolist() == [b"inputs/my.data"]
 
 
 def test_groups_of_one_rank_give_the_same_numbers(undisturbed, tmp_path):
@@ -261,13 +319,14 @@ def test_a_group_of_two_ranks(undisturbed, tmp_path):
 
 
 def test_an_error_on_one_rank_ends_the_job(tmp_path):
-    (tmp_path / "out").write_text("a file")
     start = time.monotonic()
     done = inelastic(
-        "run", one_case(tmp_path), "--out", tmp_path / "out", "--mpi", "--ranks", 2, ranks=2
+        # Where nobody can make a folder.
+        *("run", one_case(tmp_path), "--out", "/proc/out", "--mpi", "--ranks", 2),
+        ranks=2,
     )
     assert done.returncode != 0
-    assert "Not a directory" in done.stderr
+    assert "cannot be written: No such file or directory" in done.stderr
     # A job that hangs is given up much later.
     assert time.monotonic() - start < 60
 

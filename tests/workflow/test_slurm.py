@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import shlex
+
+import pytest
 
 from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
@@ -34,3 +37,58 @@ def test_one_study_at_a_time(write_study, capsys):
     path = str(write_study(STUDY))
     assert main(["slurm", path, path]) == 2
     assert capsys.readouterr().err == "inelastic: slurm: one study at a time\n"
+
+
+@pytest.mark.parametrize(
+    ("time", "fine"),
+    [
+        *((time, True) for time in ("90", "5:00", "1:00:00", "2-0", "2-12:30:00", "UNLIMITED")),
+        *(
+            (time, False)
+            for time in ("", "1h", "1:00\n#SBATCH --x", "'1'", "$(id)", "1:2:3:4", "٣")
+        ),
+    ],
+)
+def test_limits_of_time(write_study, tmp_path, time, fine, capsys):
+    arguments = ["slurm", str(write_study(STUDY)), "--out", str(tmp_path / "out")]
+    assert main([*arguments, f"--time={time}"]) == (0 if fine else 2)
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == (0 if fine else 1)
+    assert (f"#SBATCH --time={time}\n" in captured.out) == fine
+    # There the job writes what it says.
+    assert (tmp_path / "out").is_dir() == fine
+
+
+@pytest.mark.parametrize(
+    ("name", "fine"),
+    [
+        ("a b", True),
+        ("a%j", True),
+        ("$(id);x", True),
+        ("a\nb", False),
+        ("a'b", False),
+        ('a"', False),
+    ],
+)
+def test_names_in_a_script(tmp_path, name, fine, capsys):
+    """Neither a line nor a word of a name is taken for an option or a command."""
+    folder = tmp_path / name
+    folder.mkdir()
+    path = folder / f"{name}.toml"
+    path.write_text(STUDY)
+    assert main(["slurm", str(path), "--out", str(folder)]) == (0 if fine else 2)
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == (0 if fine else 1)
+    if not fine:
+        return
+    lines = captured.out.splitlines()
+    assert [line.split("=")[0] for line in lines[1:-1]] == [
+        f"#SBATCH --{key}"
+        for key in ("job-name", "array", "ntasks", "nodes", "cpus-per-task", "time", "output")
+    ]
+    options = dict(line.split("=", 1) for line in lines[1:-1])
+    assert re.fullmatch(r"[\w.+-]+", options["#SBATCH --job-name"])
+    (output,) = shlex.split(options["#SBATCH --output"])
+    assert output.replace("%%", "%") == f"{folder}/slurm-%A_%a.out"
+    words = shlex.split(lines[-1])
+    assert words[words.index("run") + 1] == str(path)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
+import random
 import re
 from pathlib import Path
 
@@ -10,8 +13,9 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.workflow.errors import WorkflowError
-from lammps_inelastic.workflow.schema import SCHEMA
+from lammps_inelastic.workflow.schema import SCHEMA, VERSION
 from lammps_inelastic.workflow.store import (
+    SEAL,
     Result,
     StoredStudy,
     read_result,
@@ -79,13 +83,70 @@ def test_a_truncated_file_is_no_result(tmp_path, size):
         read_result(path)
 
 
-def test_another_version_is_said(tmp_path):
+def test_another_version_is_said(tmp_path, monkeypatch):
+    path = tmp_path / "a.h5"
+    with monkeypatch.context() as patch:
+        patch.setattr("lammps_inelastic.workflow.store.VERSION", 99)
+        write_result(path, result_of("a"))
+    with pytest.raises(WorkflowError, match="not a result: schema version 99"):
+        read_result(path)
+
+
+@pytest.mark.parametrize("at", [0, 8, 60, 500, 2000, -200, -100, -40, -1])
+def test_one_changed_byte_is_noticed(tmp_path, at):
+    """Wherever it is: HDF5 itself does not look whether numbers are as they were written."""
     path = tmp_path / "a.h5"
     write_result(path, result_of("a"))
-    with h5py.File(path, "a") as file:
-        file.attrs["schema_version"] = 99
-    with pytest.raises(WorkflowError, match="schema version 99"):
+    content = bytearray(path.read_bytes())
+    content[at] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(WorkflowError, match=r"not a result: it is (damaged|cut off)"):
         read_result(path)
+    with pytest.raises(WorkflowError, match=r"not a file of studies: it is (damaged|cut off)"):
+        read_studies(path)
+
+
+def test_random_bytes_never_reach_hdf5(tmp_path):
+    """A file that begins as one of HDF5 may keep it busy for minutes, or end the process."""
+    path = tmp_path / "a.h5"
+    write_result(path, result_of("a"))
+    content = path.read_bytes()
+    for seed in range(100):
+        path.write_bytes(content[:48] + random.Random(seed).randbytes(len(content) - 48))
+        with pytest.raises(WorkflowError, match="not a result: it is cut off"):
+            read_result(path)
+
+
+@pytest.mark.parametrize("lacks", ["outputs", "record", "case"])
+def test_a_sealed_file_of_something_else(tmp_path, lacks):
+    path = tmp_path / "a.h5"
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        file.attrs["schema_version"] = VERSION
+        if lacks != "outputs":
+            file.attrs["outputs"] = "{}"
+        if lacks == "case":
+            file.attrs["record"] = "[" * 100_000
+    seal = hashlib.sha256(image.getvalue()).hexdigest().encode()
+    path.write_bytes(image.getvalue() + SEAL % seal)
+    with pytest.raises(WorkflowError, match="not a result: "):
+        read_result(path)
+
+
+def test_columns_whose_names_are_taken(tmp_path):
+    path = tmp_path / "s.h5"
+    taken = {"case": 1, "case_variable": 2, "packing_fraction": 3, "packing_fraction_measured": 4}
+    write_studies(path, [StoredStudy("s", "", "", [result_of("a", **taken)])])
+    with h5py.File(path) as file:
+        columns = {name: column[()].tolist() for name, column in file["s/summary"].items()}
+    assert columns == {
+        "case": [b"a"],
+        "case_variable": [1],
+        "case_variable_variable": [2],
+        "packing_fraction": [3],
+        "packing_fraction_measured": [4],
+        "packing_fraction_measured_measured": [0.6],
+    }
 
 
 def test_the_document_lists_the_schema():

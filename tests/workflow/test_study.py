@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
-from lammps_inelastic.workflow.errors import StudyError
+from lammps_inelastic.workflow.errors import StudyError, WorkflowError
+from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.study import read_study
 
@@ -68,6 +71,55 @@ def mistakes_of(path):
         (HEAD + "[outputs]\nbox = [1, 0, 0, 1, 0, 1]", "each lower bound the lesser"),
         (HEAD + "[outputs]\nbox = [0, inf, 0, 1, 0, 1]", "each lower bound the lesser"),
         (HEAD + "[outputs]\npoints = 0", "outputs.points: 0 is not allowed"),
+        (HEAD + "outputs = []", "outputs: [] is not allowed: it must be a table"),
+        (HEAD + "outputs = { profile = 5 }", "outputs.profile: 5 is not allowed: it must be a tab"),
+        (
+            HEAD + "outputs = { pictures = 5 }",
+            "outputs.pictures: 5 is not allowed: it must be a li",
+        ),
+        (HEAD + "rows = 5", "rows: 5 is not allowed: it must be a list"),
+        (HEAD + "parameters = []", "parameters: [] is not allowed: it must be a table"),
+        (HEAD + "[parameters]\nseed = '1'", "parameters.seed: '1' is not allowed: it must be a wh"),
+        (HEAD + "[outputs]\npoints = 10000000000", "must be a whole number from 1 to 100000000"),
+        (HEAD + "[outputs]\npoints = '1000'", "must be a whole number from 1 to 100000000"),
+        (HEAD + "[outputs]\nevolution = 'yes'", "outputs.evolution: 'yes' is not allowed"),
+        (HEAD + "[outputs]\nbox = ['0', 1, 0, 1, 0, 1]", "outputs.box: it must be six numbers"),
+        (HEAD + "[outputs]\nbox = [0, 1, 0, 1, 0, nan]", "each lower bound the lesser"),
+        (HEAD + "[outputs]\nbox = [0, 1e-200, 0, 1e-200, 0, 1]", "each lower bound the lesser"),
+        (
+            HEAD + "[outputs]\nbox = [0, 1, 0, 5, 0, 1.01]",
+            "in the container of spheres, [0, 1, 0, 5",
+        ),
+        (
+            HEAD + "[outputs]\npictures = [-5]",
+            "must be a whole number from 0 to 9223372036854775807",
+        ),
+        (
+            HEAD + "[outputs]\npictures = ['0']",
+            "must be a whole number from 0 to 92233720368547758",
+        ),
+        (HEAD + "[outputs]\npictures = [1271]", "it must be a step from 0 to 1270, where the long"),
+        (
+            HEAD + "[outputs]\npictures = [0, 0]",
+            "they must be at most 100 steps, each of them once",
+        ),
+        (HEAD + f"[outputs]\npictures = {list(range(101))}", "they must be at most 100 steps"),
+        (HEAD + "[outputs.profile]\nthickness = 1e-9", "it must be a number from 0.001 to 1"),
+        (HEAD + "[outputs.profile]\nthickness = nan", "it must be a number from 0.001 to 1"),
+        (HEAD + "[outputs.profile]\nreach = 1.5", "it must be at most 1, the width of the contain"),
+        (HEAD + "[outputs.profile]\nreach = inf", "it must be a number from 1e-06 to 1e+06"),
+        (HEAD + "[outputs.profile]\npoints = 1000000000", "a whole number from 1 to 10000000"),
+        (
+            HEAD + "[parameters]\ndiameter = 0.01\n[outputs.profile]\nthickness = 0.001",
+            "2.5e+04 slabs of 100000 points each are too many: at most 10000 slabs and 1000000000 "
+            "points in all are allowed, so that thickness must be at least 0.0025 diameters",
+        ),
+        (
+            HEAD + "[parameters]\ndiameter = 5e-324\n[outputs.profile]\nthickness = 0.001",
+            "outputs.profile: inf slabs of 100000 points each are too many",
+        ),
+        (HEAD + f"[parameters]\nseed = 0x{'f' * 5000}", "not TOML: a whole number has too many"),
+        ('title = "a\\u0000"\ndeck = "spheres"', "title: 'a\\x00' is not allowed: it must be one"),
         (HEAD + "[outputs]\nkeep = 'none'", "should be 'everything' or 'results'"),
         (HEAD + "[outputs.profile]\naxis = 'w'", "should be 'x', 'y' or 'z'"),
         (HEAD + "[outputs.profile]\naxes = 'x'", "allowed are axis, thickness, reach, points"),
@@ -81,6 +133,224 @@ def test_one_line_for_one_mistake(write_study, text, message, capsys):
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err == f"inelastic: {' '.join(f'{path}: {line}'.split())}\n"
+
+
+@pytest.mark.parametrize(
+    ("decks", "parameters", "message"),
+    [
+        ("dimers response", "", "response cannot follow dimers, which leaves dimers: it takes sph"),
+        ("clusters response", "", "response cannot follow clusters, which leaves clusters"),
+        ("clusters settling", "", "settling cannot follow clusters, which leaves clusters: it ta"),
+        (
+            "dimers settling",
+            "",
+            "settling has particle = spheres, but dimers leaves dimers: set pa",
+        ),
+        (
+            "dimers settling",
+            "particle='spheres'",
+            "parameters.particle: settling has particle = spheres",
+        ),
+        (
+            "dimers settling",
+            "particle=['dimers', 'spheres']",
+            "parameters.particle: settling has par",
+        ),
+        (
+            "spheres settling",
+            "particle='dimers'",
+            "parameters.particle: settling has particle = dimers",
+        ),
+        ("spheres response settling", "", "settling cannot follow response, which changes the co"),
+        ("dimers settling response", "particle='dimers'", "response cannot follow settling, which"),
+        (
+            "spheres settling response",
+            "contacts='soft'",
+            "parameters.contacts: response cannot follow",
+        ),
+        ("spheres dimers", "", "dimers makes a packing of its own, and would not use that of sph"),
+        ("own.in spheres", "", "spheres makes a packing of its own, and would not use that of own"),
+        ("response", "", "deck: response starts from a packing, which a deck before it must make"),
+        ("settling", "", 'spheres or dimers, as in deck = ["spheres", "settling"]'),
+        ("own.in response", "", "parameters.diameter: 0.11 in response and 0.2 in own: decks that"),
+        ("own.in settling", "diameter=0.2", None),
+        ("spheres response", "", None),
+        ("spheres settling", "", None),
+        ("spheres settling response", "", None),
+        ("dimers settling", "particle='dimers'", None),
+        ("dimers settling", "particle='dimers'\ninertia='solid'", None),
+        ("clusters own.in", "", None),
+    ],
+)
+def test_decks_that_fit_together(write_study, tmp_path, decks, parameters, message):
+    (tmp_path / "own.in").write_text("variable diameter index 0.2\nvariable out index out\n")
+    # As the study's deck, and as that of a row.
+    for head in ("deck = {}", 'deck = "spheres"\nrows = [{{ deck = {} }}]'):
+        text = f"title = 't'\n{head.format(decks.split())}\n[parameters]\n{parameters}\n"
+        path = write_study(text)
+        if message is None:
+            assert len(read_study(path).cases) == 1
+            continue
+        (line,) = mistakes_of(path)
+        where, _, said = line.partition(": ")
+        wanted = message.removeprefix("deck: ").removeprefix("parameters.diameter: ")
+        assert wanted in said or wanted in line
+        assert where in ("deck", "rows[1].deck", message.split(":")[0])
+
+
+def test_a_row_whose_deck_does_not_fit(write_study):
+    text = (
+        'title="t"\ndeck=["spheres", "settling"]\n[[rows]]\n[[rows]]\ndeck=["dimers", "settling"]'
+    )
+    (line,) = mistakes_of(write_study(text))
+    assert line.startswith(
+        "rows[2].deck: settling has particle = spheres, but dimers leaves dimers: set "
+    )
+    assert line.endswith(" (at line 5)")
+
+
+def test_pictures_of_the_longest_case(write_study):
+    """Of a shorter one the last frame is drawn, so that a study may mix them."""
+    text = HEAD + "[parameters]\nsteps_settling = [100, 2000]\n[outputs]\npictures = [0, 2470]"
+    assert len(read_study(write_study(text)).cases) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        (".few.toml", "must begin with a letter or a digit"),
+        ("..toml", "must begin with a letter or a digit"),
+        ("a\nb.toml", "neither line breaks"),
+        ("a\x1b[2J.toml", "neither line breaks"),
+        ("a\udcff.toml", "neither line breaks"),
+        (f"{'a' * 201}.toml", "at most 200 bytes"),
+        ("a b 'c' $(d).toml", None),
+        ("漢.toml", None),
+    ],
+)
+def test_names_of_study_files(tmp_path, name, message, capsys):
+    path = tmp_path / name
+    path.write_text(HEAD)
+    assert main(["validate", str(path)]) == (0 if message is None else 2)
+    said = capsys.readouterr().err
+    assert said.count("\n") == (0 if message is None else 1)
+    assert (message or "") in said
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "link", "large"])
+def test_what_is_no_file(write_study, tmp_path, kind, capsys):
+    """As a study, a deck and a start: a line each, and nobody waits."""
+    odd = tmp_path / "odd"
+    if kind == "pipe":
+        os.mkfifo(odd)
+    elif kind == "device":
+        odd.symlink_to("/dev/zero")
+    elif kind == "folder":
+        odd.mkdir()
+    elif kind == "link":
+        odd.symlink_to(tmp_path / "nowhere")
+    else:
+        with odd.open("wb") as file:
+            file.truncate(2_000_000)
+    uses = ['title = "t"\ndeck = "odd"', HEAD + '[parameters]\nstart = "odd"']
+    paths = [odd, *(write_study(text, f"{n}.toml") for n, text in enumerate(uses))]
+    for path in paths:
+        # A start may be large: it is data.
+        fine = kind == "large" and path is paths[2]
+        assert main(["validate", str(path)]) == (0 if fine else 2)
+        assert len(capsys.readouterr().err.splitlines()) == (0 if fine else 1)
+
+
+@pytest.mark.parametrize(
+    "name", ["spheres.in", "log.lammps", "lmp.out", "finished.json", "inputs", "random", "a b"]
+)
+def test_a_start_may_have_any_name(write_study, tmp_path, name):
+    """It lies in a folder of its own, and is a file also where a deck has a word of its name."""
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / name).write_text("data")
+    path = write_study(HEAD + f"[parameters]\nstart = 'data/{name}'")
+    if " " in name:
+        assert "must be one word" in mistakes_of(path)[0]
+        return
+    (case,) = read_study(path).cases
+    (command,) = case.commands()
+    assert command[command.index("start") + 1] == f"inputs/{name}"
+    part = Folder(tmp_path / "out").begin(case)
+    assert (part / "inputs" / name).read_text() == "data"
+    assert (part / "spheres.in").read_text() == case.stages[0].deck.text
+
+
+def test_a_word_of_a_deck_is_no_file(write_study, tmp_path):
+    (tmp_path / "random").write_text("data")
+    (case,) = read_study(write_study(HEAD + "[parameters]\nstart = 'random'")).cases
+    assert (case.inputs, case.variables["start"]) == ({}, "random")
+
+
+def test_two_files_of_one_name(write_study, tmp_path):
+    (tmp_path / "own.in").write_text("variable start index a\nvariable shape index b\n")
+    for folder in "ab":
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "x").write_text(folder)
+    text = 'title="t"\ndeck="own.in"\n[parameters]\nstart = "a/x"\nshape = "b/x"'
+    assert mistakes_of(write_study(text)) == [
+        "parameters: two files are named x; rename one of them (at line 3)"
+    ]
+    (case,) = read_study(write_study(text.replace("b/x", "a/x"))).cases
+    assert list(case.inputs) == ["x"]
+
+
+def test_a_start_that_changes_before_it_is_used(write_study, tmp_path):
+    (tmp_path / "my.data").write_text("one")
+    (case,) = read_study(write_study(HEAD + '[parameters]\nstart = "my.data"')).cases
+    (tmp_path / "my.data").write_text("two")
+    with pytest.raises(WorkflowError, match="has changed since the study was read"):
+        Folder(tmp_path / "out").begin(case)
+
+
+@pytest.mark.parametrize(
+    "names", [".hidden.in", "a b.in", "$a.in", "inputs.in a.in", "a.in.in a.in"]
+)
+def test_names_of_own_decks(write_study, tmp_path, names):
+    decks = names.split(".in ")
+    decks = [f"{each.removesuffix('.in')}.in" for each in decks]
+    for each in decks:
+        (tmp_path / each).write_text("variable x index 1\n")
+    (line,) = mistakes_of(write_study(f"title='t'\ndeck={decks}"))
+    assert line.startswith("deck: ")
+
+
+def test_a_deck_without_a_parameter(write_study, tmp_path):
+    (tmp_path / "own.in").write_text("print 'x'\n")
+    (case,) = read_study(write_study('title="t"\ndeck="own.in"')).cases
+    assert case.variables == {}
+    assert case.commands() == [["lmp", "-nonbuf", "-in", "own.in", "-var", "out", "."]]
+    (line,) = mistakes_of(write_study('title="t"\ndeck="own.in"\n[parameters]\nx = 1'))
+    assert line == "parameters.x: no variable of that name; allowed are own: none (at line 4)"
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "fits"),
+    [
+        ("variable out index x\n", True, True),
+        ("variable   out   index x # or another variable out there\n", True, True),
+        ("shell mkdir ${out}\n", True, True),
+        ("print 'x'\n", True, False),
+        # LAMMPS would end with "Cannot redefine variable out with a different style".
+        ("variable out string x\n", False, False),
+        ("if 1 then 'variable out equal 1'\n", False, False),
+    ],
+)
+def test_where_an_own_deck_writes(write_study, tmp_path, text, given, fits):
+    (tmp_path / "own.in").write_text(text)
+    (case,) = read_study(write_study('title="t"\ndeck="own.in"')).cases
+    (command,) = case.commands()
+    assert ("-var" in command) == given
+    path = write_study('title="t"\ndeck=["own.in", "response"]')
+    if fits:
+        assert len(read_study(path).cases) == 1
+    else:
+        (line,) = mistakes_of(path)
+        assert line.startswith("deck: the next deck could not find what own leaves: own must write")
 
 
 def test_all_mistakes_at_once_in_the_order_of_the_file(write_study):
@@ -198,7 +468,7 @@ def test_a_data_file_counts_by_its_content(write_study, tmp_path):
     data.write_text("two")
     (other,) = read_study(path).cases
     assert case.name != other.name
-    assert case.variables["start"] == "my.data"
+    assert case.variables["start"] == "inputs/my.data"
 
 
 def test_commands(write_study, capsys, tmp_path):

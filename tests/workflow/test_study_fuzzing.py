@@ -23,14 +23,14 @@ FUZZED = settings(
 
 VALID = """\
 title = "Packing fraction against aspect ratio"
-deck = ["dimers", "response"]
+deck = ["dimers", "settling"]
 
 [parameters]
 particles = 2000
 diameter = 0.085
 aspect_ratio = [1.1, 1.5, 1.8]
 seed = { from = 1, to = 4 }
-change = "tilt"
+particle = "dimers"
 
 [[rows]]
 tolerance = 0.005
@@ -179,7 +179,7 @@ def test_one_value_of_any_kind(name: str, value: object, tmp_path: Path) -> None
         ("points = 1000", "points = 0", "outputs.points", 19),
         ('axis = "x"', 'axis = "w"', "outputs.profile.axis", 22),
         ("thickness = 0.1", "axes = 1", "outputs.profile.axes", 23),
-        ('deck = ["dimers", "response"]', "deck = 5", "deck", 2),
+        ('deck = ["dimers", "settling"]', "deck = 5", "deck", 2),
         ('title = "', 'titel = "', "titel", 1),
     ],
 )

@@ -281,6 +281,7 @@ def test_the_reference_is_the_tightest_with_the_shortest_step():
         (["--seeds", "1.5"], "--seeds: 1.5 is not allowed: it must be a whole number from 1 to 1"),
         (["--time", "0"], "--time: 0 is not allowed: it must be a number above 0"),
         (["--start", "no.data"], "--start: no.data: no such file"),
+        (["--start", "no data"], "--start: no data: a file's name must be one word, without spa"),
         (["--timeout", "0"], "argument --timeout: '0' is no number of seconds above 0"),
         (["--start", "a", "--seeds", "2"], "argument --seeds: not allowed with argument --start"),
     ],
