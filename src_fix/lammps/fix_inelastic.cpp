@@ -36,6 +36,8 @@ constexpr double REGULAR_OVERLAP = 2.0;    // in eps; more is a bad start
 constexpr double PUSH_LIMIT =
     0.05;    // of the sum of radii, per regular step, out of a bad overlap
 constexpr double RELINEARISE_BEYOND = 1.1;    // in eps, overlap at the end of the step
+// [radians] Beyond, where a body ends says little about the wall that it has met.
+constexpr double HALF_A_TURN = 3.14;
 constexpr double SHORTEST_STEP = 1.0e-6;      // of the regular one: below, something else is wrong
 constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
 constexpr double COINCIDENT = 1.0e-10;          // of the sum of radii: no normal can be computed
@@ -96,7 +98,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), scene_(lmp),
     first_list_of_run_(false), list_(nullptr), looked_(false), margin_(-1.0), came_back_(false),
-    relinearised_(false), follows_far_walls_(true), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
+    relinearised_(false), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
     pushed_before_(false), left_overlap_(EXTREME), unexpected_overlap_(0.0), state_(nullptr),
     largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
     strayed_(0.0), own_width_{EXTREME, EXTREME, EXTREME},
@@ -515,7 +517,6 @@ void FixInelastic::advance(int vflag, double kick_steps)
 
   spread_at_start_ = spread_since_build(nullptr);
   inelastic::ProjectionResult result;
-  follows_far_walls_ = true;
   bool no_room = false;     // for certain, in this step as long as it was at first
   bool appeared = false;    // on any rank, an overlap that no step has left
   while (true) {
@@ -540,11 +541,6 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (bad_overlap_) push_apart(result);
     if (!result.converged || !result.complete) {
       no_room = no_room || result.infeasible;
-      // Where bodies turn by radians, gaps that follow them may leave no room between two walls.
-      if (relinearised_ && rigid_ && follows_far_walls_) {
-        follows_far_walls_ = false;
-        continue;
-      }
       // Where the gaps at the end of the step were not to be had, those of a shorter one may be.
       if (shorten_ && (relinearised_ || result.infeasible) &&
           update->dt > SHORTEST_UNSOLVED * regular_timestep_) {
@@ -845,7 +841,8 @@ FixInelastic::looks_at_end(const std::vector<double> &velocity)
   const double h = problem_.timestep;
   std::unordered_set<int> followed;
   for (std::size_t c = 0; c < origin_.size(); ++c)
-    if (origin_[c].wall != 0 && origin_[c].followed && follows_far_walls_)
+    if (origin_[c].wall != 0 && origin_[c].followed &&
+        rigid_->angle_turned(problem_, problem_.contacts.first[c]) < HALF_A_TURN)
       followed.insert(problem_.contacts.first[c]);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (problem_.inverse_mass[i] == 0.0 || (walls_->exact() && !is_member(i))) continue;

@@ -116,7 +116,6 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double margin_;           // what comes closer than this is in the problem from the start
   bool came_back_;          // for constraints that were not in the problem from the start
   bool relinearised_;       // about the end of the step, any of them
-  bool follows_far_walls_;  // constraints of walls that are far away when the step ends
   int relinearisations_;    // in this step
   std::string message_;     // what went wrong on this rank while collecting
   std::string worst_;       // the constraint that is farthest from being met, after a failure

@@ -517,6 +517,9 @@ void RigidMotion::turn(const inelastic::ContactProblem &problem,
   }
 }
 
+double RigidMotion::angle_turned(const inelastic::ContactProblem &problem, int i) const
+{ return problem.timestep * norm(bodies_[problem.bodies.body[i]].angular_velocity_end); }
+
 void RigidMotion::velocity_after(const inelastic::ContactProblem &problem, int i,
                                  double *velocity) const
 {

@@ -73,6 +73,9 @@ class RigidMotion : protected Pointers {
   void turn(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
   const std::vector<double> &motion() const { return motion_; }
 
+  // By how much the step of the last turn() turns the body of a member [radians].
+  double angle_turned(const inelastic::ContactProblem &problem, int i) const;
+
   // Velocity of a member after the step of the last turn().
   void velocity_after(const inelastic::ContactProblem &problem, int i, double *velocity) const;
 
