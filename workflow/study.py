@@ -36,7 +36,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from .decks import FILES, OUT, PACKING, RULES, Deck, Value, find_deck
+from .decks import OUT, PACKING, Deck, Value, file_of, find_deck
 from .errors import StudyError, WorkflowError
 from .toml_lines import lines_of_keys
 
@@ -394,7 +394,7 @@ def _values(
         values = value if isinstance(value, list) else [value]
     if isinstance(value, list) and not values:
         mistakes.append(f"{key}: the list is empty")
-    shipped = any(deck.shipped and name in deck.parameters for deck in decks)
+    rules = [deck.rules[name] for deck in decks if name in deck.rules]
     for each in values:
         if isinstance(each, bool) or not isinstance(each, int | float | str):
             mistakes.append(
@@ -405,14 +405,16 @@ def _values(
             mistakes.append(f"{key}: {each} is not allowed: it must be finite")
         elif isinstance(each, str) and not _is_word(each):
             mistakes.append(f"{key}: {each!r} must be one word, without spaces, quotes, $ and &")
-        elif shipped and name in RULES and not RULES[name].accepts(each):
-            mistakes.append(f"{key}: {each} is not allowed: it must be {RULES[name].allowed}")
-        elif name in FILES and not (folder / str(each)).is_file():
-            words = [word for deck in decks for word in FILES[name].get(deck.name, ())]
-            if shipped and each not in words:
-                mistakes.append(
-                    f"{key}: {each} is not allowed: it must be {' or '.join(words)}, or a file"
-                )
+        elif (file := file_of(decks, name, each, folder)) is not None:
+            # The deck finds it by its name alone.
+            if any(file.name in rule.words for rule in rules):
+                mistakes.append(f"{key}: {each} is not allowed: {file.name} is no name for a file")
+        else:
+            mistakes.extend(
+                f"{key}: {each} is not allowed: it must be {rule.allowed}"
+                for rule in rules
+                if not rule.accepts(each)
+            )
     return values
 
 
@@ -447,9 +449,9 @@ def _range(key: str, value: Mapping[str, Any], mistakes: list[str]) -> list[Valu
 
 def _case(decks: Sequence[Deck], values: dict[str, Value], folder: Path) -> Case:
     inputs: dict[str, Path] = {}
-    for name in FILES:
-        path = folder / str(values.get(name, ""))
-        if name in values and path.is_file():
+    for name in values:
+        path = file_of(decks, name, values[name], folder)
+        if path is not None:
             inputs[path.name] = path
             values[name] = path.name
     return Case(tuple(stage_of(deck, values) for deck in decks), inputs)
