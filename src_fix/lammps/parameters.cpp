@@ -91,10 +91,13 @@ bool has_any_of(const std::string &text, const char *letters)
 std::string shown(const std::string &value)
 {
   if (value.empty()) return "an empty text";
-  std::string text = value.substr(0, LONGEST_SHOWN);
+  std::size_t end = std::min(value.size(), LONGEST_SHOWN);
+  // Not in the middle of a letter beyond ASCII.
+  while (end < value.size() && (value[end] & 0xc0) == 0x80) --end;
+  std::string text = value.substr(0, end);
   for (char &letter : text)
     if (static_cast<unsigned char>(letter) < ' ' || letter == 127) letter = '?';
-  return value.size() > LONGEST_SHOWN ? text + "..." : text;
+  return value.size() > end ? text + "..." : text;
 }
 
 std::string joined(const std::vector<std::string> &words, const char *last)

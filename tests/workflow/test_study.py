@@ -49,7 +49,10 @@ def mistakes_of(path):
         (HEAD + f"[parameters]\ndrag = {DIGITS}", "it must be a number of at least 0"),
         (HEAD + f"[parameters]\nparticles = {DIGITS * 11}", "not TOML: Exceeds the limit"),
         (HEAD + "[parameters]\nstart = 'a b'", "must be one word, without spaces, quotes, $ and &"),
-        (HEAD + "[parameters]\nstart = 'no.data'", "no.data is not allowed: it must be random or a"),
+        (
+            HEAD + "[parameters]\nstart = 'no.data'",
+            "no.data is not allowed: it must be random or a",
+        ),
         (HEAD + "[parameters]\nseed = { from = 1 }", "a range is { from = A, to = B, step = S }"),
         (HEAD + "[parameters]\nseed = { from = 2, to = 1 }", "a range needs from <= to and step"),
         (HEAD + "[parameters]\nseed = { from = 1, to = 9, step = 0 }", "step > 0"),
