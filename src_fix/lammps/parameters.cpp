@@ -182,6 +182,7 @@ void Parameters::command(int narg, char **arg)
     if (input->variable->find(parameter.name.c_str()) < 0)
       input->variable->set(fmt::format("{} index {}", parameter.name, parameter.usual));
     parameter.value = value_of(parameter);
+    parameter.alone = is_alone(parameter);
     const std::string mistake = mistake_in(parameter);
     if (!mistake.empty()) mistakes.push_back(mistake);
   }
@@ -339,6 +340,16 @@ std::string Parameters::value_of(const Parameter &parameter) const
   return value ? value : "";
 }
 
+// Says whether a variable has one value, and not several for the command next.
+bool Parameters::is_alone(const Parameter &parameter) const
+{
+  const int variable = input->variable->find(parameter.name.c_str());
+  if (!is_index_variable(variable)) return true;
+  // Ends with all values.
+  const std::string text = Info(lmp).get_variable_info(variable);
+  return text.substr(text.find(" def =") + 6) == " " + parameter.value + "\n";
+}
+
 // Returns what is wrong with a parameter's value, or nothing.
 std::string Parameters::mistake_in(const Parameter &parameter) const
 {
@@ -422,11 +433,13 @@ std::string Parameters::listed(const std::vector<Parameter> &table) const
   }
   std::string text = "Parameters (* is not the default):";
   for (const Parameter &parameter : table) {
-    if (parameter.value == parameter.usual)
-      text += fmt::format("\n    {:{}} {}", parameter.name, names, parameter.value);
-    else
-      text += fmt::format("\n  * {:{}} {:{}} default {}", parameter.name, names, parameter.value,
-                          values, parameter.usual);
+    const bool usual = parameter.value == parameter.usual;
+    text +=
+        fmt::format("\n  {} {:{}} {}", usual ? ' ' : '*', parameter.name, names, parameter.value);
+    if (usual && parameter.alone) continue;
+    text += std::string(values - parameter.value.size(), ' ');
+    if (!usual) text += " default " + parameter.usual;
+    if (!parameter.alone) text += " (one of several values)";
   }
   return text;
 }

@@ -43,6 +43,7 @@ class Parameters : public Command {
 
   struct Parameter {
     std::string name, value, usual;    // usual: the default
+    bool alone = true;                 // no further values follow, as in `variable a index 1 2`
     Rule rule;
   };
 
@@ -52,6 +53,7 @@ class Parameters : public Command {
   bool is_index_variable(int) const;
   std::vector<std::string> find_unknown(const std::vector<Parameter> &) const;
   std::string value_of(const Parameter &) const;
+  bool is_alone(const Parameter &) const;
   std::string mistake_in(const Parameter &) const;
   std::string mistake_in_folder(const std::string &) const;
   std::string make_folder(const Parameter &) const;

@@ -380,12 +380,12 @@ def test_a_word_comes_before_a_file_of_its_name(ask: Ask) -> None:
 
 def test_the_list_is_in_the_logs(ask: Ask) -> None:
     steps = [SMALL, "log second.log", "parameters log"]
-    arguments = ["-var", "particles", "20", "-var", "start", "there.data"]
+    arguments = ["-var", "particles", "20", "-var", "start", "there.data", "-var", "seed", "1", "2"]
     assert ask(steps, *arguments, log="first.log") == [""] * 3
     listed = """\
 Parameters (* is not the default):
   * particles 20         default 1000
-    seed      1
+    seed      1          (one of several values)
   * start     there.data default random
     out       out
 """
