@@ -43,7 +43,7 @@ def mistakes_of(path):
         (HEAD + "[parameters]\nseed = []", "parameters.seed: the list is empty"),
         (HEAD + "[parameters]\nseed = true", "parameters.seed: True is no value; it must be"),
         (HEAD + "[parameters]\nseed = [[1]]", "parameters.seed: [1] is no value"),
-        (HEAD + "[parameters]\nseed = 1.0", "a whole number from 1 to 2147483647"),
+        (HEAD + "[parameters]\nseed = 1.0", "a whole number from 1 to 800000000"),
         (HEAD + "[parameters]\nseed = 2024-01-01", "is no value"),
         (HEAD + "[parameters]\ndrag = nan", "parameters.drag: nan is not allowed: it must be fin"),
         (HEAD + f"[parameters]\ndrag = {DIGITS}", "it must be a number of at least 0"),

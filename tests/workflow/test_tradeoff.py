@@ -257,7 +257,7 @@ def test_the_reference_is_the_tightest_with_the_shortest_step():
     [
         (["--particle", "cubes"], "--particle: cubes is not allowed: it must be spheres or dimers"),
         (["--particles", "0"], "--particles: 0 is not allowed: it must be a whole number from 1 t"),
-        (["--diameter", "2"], "--diameter: 2 is not allowed: it must be a number from 0.001 to"),
+        (["--diameter", "2"], "--diameter: 2 is not allowed: it must be a number from 0.005 to"),
         (["--aspect-ratio", "1.5"], "--aspect-ratio: only dimers have one (--particle dimers)"),
         (
             ["--particle", "dimers", "--aspect-ratio", "3"],
@@ -266,7 +266,7 @@ def test_the_reference_is_the_tightest_with_the_shortest_step():
         (["--tolerances", "0.05,"], "--tolerances:  is not allowed: it must be a number from 1e-1"),
         (["--tolerances", "nan"], "--tolerances: nan is not allowed: it must be a number from 1e"),
         (["--soft-tolerances", "0.05,no"], "--soft-tolerances: no is not allowed: it must be a nu"),
-        (["--dts", "-1"], "--dts: -1 is not allowed: it must be a number above 0"),
+        (["--dts", "-1"], "--dts: -1 is not allowed: it must be a number from 1e-6 t"),
         (["--solvers", "apgd,sor"], "--solvers: sor is not allowed: it must be apgd or uzawa"),
         (["--ranks", "1,9999"], "--ranks: 9999 is not allowed: it must be a whole number from 1 t"),
         (["--seeds", "1.5"], "--seeds: 1.5 is not allowed: it must be a whole number from 1 to 1"),
