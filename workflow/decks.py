@@ -1,21 +1,24 @@
-"""LAMMPS decks as a study sees them: a text, and the variables that the command line may set.
+"""LAMMPS decks as a study sees them: a text, and the parameters that the command line may set.
 
-A variable is a line `variable NAME index DEFAULT  # meaning`, and nothing else is one. What values
-the variables of our own decks allow is written down here, so that a study is checked before
-anything runs; a deck of the user's own is only asked for the names.
+Names, defaults and what each parameter may be stand in the deck's own table, which LAMMPS's command
+`parameters` reads too (src_fix/doc/parameters.md), so that a study is checked before anything runs.
+A deck of the user's own may have a table as well; one that has none is only asked for the names in
+its lines `variable NAME index DEFAULT`.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 
 from .errors import WorkflowError
+from .files import is_file
 
 Value = int | float | str
 
@@ -24,90 +27,130 @@ SETTLING = "settling"
 SHIPPED = ("spheres", "dimers", "clusters", "response", SETTLING)
 # Set by the workflow itself: where a deck writes, and the packing that the deck before it has left.
 OUT, PACKING = "out", "packing"
+# Of a deck without a table, these parameters may name a file.
+FILES = ("start", "shape")
 
 _VARIABLE = re.compile(r"^variable\s+(\w+)\s+index\s+(\S+)", re.MULTILINE)
+_TABLE = re.compile(r'^[ \t]*parameters[ \t]+"""(.*?)"""', re.MULTILINE | re.DOTALL)
+_NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+# What an integer of LAMMPS holds.
+_INTEGERS = (-(2**31), 2**31 - 1)
+# Of a number that LAMMPS can still calculate with.
+_LARGEST = 1e300
+
+
+@dataclass(frozen=True)
+class Bound:
+    """One end of a range.
+
+    Attributes
+    ----------
+    text : as it is written in the table
+    included : whether the value itself is allowed
+    """
+
+    text: str
+    included: bool
+
+    @property
+    def value(self) -> float:
+        """The number."""
+        return float(self.text)
 
 
 @dataclass(frozen=True)
 class Rule:
-    """Which values a variable may have.
+    """What a parameter may be.
 
     Attributes
     ----------
-    allowed : in words, for error lines
-    accepts : says of a value whether it is one of them
+    kind : integer, number, words or folder
+    low, high : the range of a number; None: no bound
+    words : those that are allowed
+    file : whether the name of a file that is there is allowed, too
     """
 
-    allowed: str
-    accepts: Callable[[Value], bool]
+    kind: str
+    low: Bound | None = None
+    high: Bound | None = None
+    words: tuple[str, ...] = ()
+    file: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """What is allowed, in words, for error lines: those of the command `parameters`."""
+        if self.kind == "folder":
+            return "a folder for output"
+        if self.kind == "words":
+            choices = [*self.words, *(["a file that is there"] if self.file else [])]
+            return " or ".join([", ".join(choices[:-1]), choices[-1]] if choices[1:] else choices)
+        text = "a whole number" if self.kind == "integer" else "a number"
+        low, high = self.low, self.high
+        if low is not None:
+            from_ = " from " if high is not None else " of at least "
+            text += f"{from_ if low.included else ' above '}{low.text}"
+        if high is not None:
+            if low is None:
+                text += " of at most " if high.included else " below "
+            elif high.included:
+                text += " to " if low.included else " and up to "
+            else:
+                text += " to below " if low.included else " and below "
+            text += high.text
+        return text
+
+    def accepts(self, value: Value) -> bool:
+        """Say whether a value is allowed; of a file only the words that it may be instead."""
+        if self.kind == "folder":
+            return isinstance(value, str) and value != ""
+        if self.kind == "words":
+            return value in self.words
+        kinds = int if self.kind == "integer" else int | float
+        if isinstance(value, bool) or not isinstance(value, kinds):
+            return False
+        # A whole number may have more digits than float() takes.
+        if not abs(value) < _LARGEST:
+            return False
+        if self.low and not (
+            value >= self.low.value if self.low.included else value > self.low.value
+        ):
+            return False
+        return not self.high or (
+            value <= self.high.value if self.high.included else value < self.high.value
+        )
 
 
-def _number(value: Value) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    # A whole number may have more digits than float() takes.
-    return abs(value) < 1e300
+def read_rule(text: str) -> Rule:
+    """Return the rule that a table states, such as `integer >= 1` or `random or file`.
 
-
-def _numbers(allowed: str, accepts: Callable[[float], bool]) -> Rule:
-    return Rule(
-        f"a number {allowed}",
-        lambda value: _number(value) and accepts(float(value)),
-    )
-
-
-def _integers(least: int) -> Rule:
-    return Rule(
-        f"a whole number of at least {least}",
-        lambda value: isinstance(value, int) and not isinstance(value, bool) and value >= least,
-    )
-
-
-def _words(*words: str) -> Rule:
-    return Rule(" or ".join(words), lambda value: value in words)
-
-
-_POSITIVE = _numbers("above 0", lambda value: 0 < value < float("inf"))
-_NOT_NEGATIVE = _numbers("of at least 0", lambda value: 0 <= value < float("inf"))
-
-RULES: Mapping[str, Rule] = {
-    "particles": _integers(1),
-    "diameter": _numbers("between 0 and 1", lambda value: 0 < value < 1),
-    "aspect_ratio": _numbers("above 1 and up to 2", lambda value: 1 < value <= 2),
-    "tolerance": _POSITIVE,
-    "tolerance_agitated": _POSITIVE,
-    "tolerance_measuring": _POSITIVE,
-    "dt": _POSITIVE,
-    "steps_agitated": _integers(0),
-    "steps_settling": _integers(0),
-    "steps_tightening": _integers(0),
-    # 0: the contacts of the packing as it is.
-    "steps_measuring": _integers(0),
-    "steps_changing": _integers(1),
-    "random_force": _NOT_NEGATIVE,
-    "drag": _NOT_NEGATIVE,
-    "seed": Rule(
-        "a whole number from 1 to 2147483647",
-        lambda value: isinstance(value, int) and not isinstance(value, bool) and 1 <= value < 2**31,
-    ),
-    "dump_every": _integers(1),
-    "inertia": _words("point", "solid"),
-    "solver": _words("apgd", "uzawa"),
-    "extent": _NOT_NEGATIVE,
-    "change": _words("walls", "tilt"),
-    "angle": _numbers("from -90 to 90", lambda value: -90 <= value <= 90),
-    "particle": _words("spheres", "dimers"),
-    "contacts": _words("hard", "soft"),
-    "reach": _POSITIVE,
-    "time_settling": _POSITIVE,
-    "time_between": _POSITIVE,
-}
-
-# Variables that name a file, and the words that they may be instead, deck by deck.
-FILES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "start": {"spheres": ("random",), "dimers": ("random", "regular")},
-    "shape": {"clusters": ("tetrahedron",)},
-}
+    Raises ValueError that says what is wrong.
+    """
+    words = text.split()
+    if words == ["folder"]:
+        return Rule("folder")
+    if words and words[0] in ("integer", "number"):
+        kind, *pairs = words
+        least, most = _INTEGERS
+        bounds: dict[str, Bound] = {}
+        for sign, number in zip(pairs[::2], [*pairs[1::2], ""], strict=False):
+            end = sign[0]
+            if (
+                sign not in (">", ">=", "<", "<=")
+                or end in bounds
+                or not _NUMBER.fullmatch(number)
+                or math.isinf(float(number))
+            ):
+                raise ValueError("the bounds must be > or >= and a number, < or <= and a number")
+            bounds[end] = Bound(number, len(sign) == 2)
+        if kind == "integer":
+            bounds = {">": Bound(str(least), True), "<": Bound(str(most), True)} | bounds
+        return Rule(kind, bounds.get(">"), bounds.get("<"))
+    if len(words) % 2 == 0 or any((word == "or") != (i % 2 == 1) for i, word in enumerate(words)):
+        raise ValueError(
+            'it must be integer or number with bounds, words with "or" between them, or folder'
+        )
+    choices = words[::2]
+    return Rule("words", words=tuple(w for w in choices if w != "file"), file="file" in choices)
 
 
 @dataclass(frozen=True)
@@ -118,7 +161,7 @@ class Deck:
     ----------
     name : of the file, without `.in`
     text : the whole file
-    shipped : whether it is one of ours, whose variables have rules
+    shipped : whether it is one of ours
     """
 
     name: str
@@ -126,8 +169,37 @@ class Deck:
     shipped: bool
 
     @cached_property
+    def _table(self) -> Mapping[str, tuple[Value, Rule]]:
+        """Default and rule of every parameter in the deck's table; empty if it has none.
+
+        Raises WorkflowError that quotes the line that cannot be read.
+        """
+        found = _TABLE.search(self.text)
+        table: dict[str, tuple[Value, Rule]] = {}
+        for line in found.group(1).splitlines() if found else ():
+            words = line.partition("#")[0].split(maxsplit=2)
+            if not words:
+                continue
+            try:
+                name, default, rule = words
+                if not re.fullmatch(r"\w+", name, re.ASCII) or name in table:
+                    raise ValueError("its name is no name, or there twice")
+                table[name] = as_value(default), read_rule(rule)
+            except ValueError as error:
+                why = error if len(words) == 3 else "it must be name, default and what is allowed"
+                raise WorkflowError(f"a line of its parameters: {line.strip()}: {why}") from None
+        return table
+
+    @property
+    def rules(self) -> Mapping[str, Rule]:
+        """What the parameters may be; empty for a deck without a table."""
+        return {name: rule for name, (_, rule) in self._table.items()}
+
+    @cached_property
     def variables(self) -> Mapping[str, Value]:
-        """The variables that `-var` can set, with their defaults, in the order of the deck."""
+        """The parameters that `-var` can set, with their defaults, in the order of the deck."""
+        if _TABLE.search(self.text):
+            return {name: default for name, (default, _) in self._table.items()}
         return {name: as_value(default) for name, default in _VARIABLE.findall(self.text)}
 
     @property
@@ -143,6 +215,15 @@ class Deck:
         what = "\n".join(" ".join(line.split()) for line in lines if not line.startswith("#"))
         return hashlib.sha256(what.encode()).hexdigest()[:16]
 
+    def names_file(self, name: str, value: Value) -> bool:
+        """Say whether a parameter's value is the name of a file, not one of the words instead."""
+        if name not in self.parameters:
+            return False
+        rule = self.rules.get(name)
+        if rule is None:
+            return name in FILES
+        return rule.file and value not in rule.words
+
 
 def as_value(text: str) -> Value:
     """Return the number that a deck's word stands for, or the word."""
@@ -154,17 +235,32 @@ def as_value(text: str) -> Value:
     return text
 
 
+def file_of(decks: Sequence[Deck], name: str, value: Value, folder: Path) -> Path | None:
+    """Return the file that a parameter's value names as seen from a folder; None if it is none."""
+    path = folder / str(value)
+    there = any(deck.names_file(name, value) for deck in decks) and is_file(path)
+    return path if there else None
+
+
 def find_deck(name: str, folder: Path) -> Deck:
-    """Return a shipped deck by its name, or the user's own by its file's, seen from `folder`."""
+    """Return a shipped deck by its name, or the user's own by its file's, seen from `folder`.
+
+    Raises WorkflowError if there is none, or if it cannot be read.
+    """
     if name in SHIPPED:
         text = (files("lammps_inelastic.inputs") / f"{name}.in").read_text()
         return Deck(name, text, shipped=True)
     path = folder / name
-    if not path.is_file():
+    if not is_file(path):
         raise WorkflowError(
             f"no deck {name!r}: it must be {', '.join(SHIPPED)} or a file as seen from {folder}"
         )
     try:
-        return Deck(path.stem, path.read_text(encoding="utf-8"), shipped=False)
+        deck = Deck(path.stem, path.read_text(encoding="utf-8"), shipped=False)
+        # Its table is read now, while the file's name is known.
+        _ = deck.variables
+        return deck
     except UnicodeDecodeError as error:
         raise WorkflowError(f"{path}: not UTF-8: {error}") from None
+    except WorkflowError as error:
+        raise WorkflowError(f"{path}: {error}") from None

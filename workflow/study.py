@@ -36,7 +36,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator
 
-from .decks import FILES, OUT, PACKING, RULES, SHIPPED, Deck, Value, find_deck
+from .decks import OUT, PACKING, SHIPPED, Deck, Value, file_of, find_deck
 from .errors import StudyError, WorkflowError
 from .files import digest_of, is_file, read_regular
 from .stages import Bounds, container_of, last_step_of, misfit, takes_out
@@ -523,7 +523,7 @@ def _values(
         values = value if isinstance(value, list) else [value]
     if isinstance(value, list) and not values:
         mistakes.append(f"{key}: the list is empty")
-    shipped = any(deck.shipped and name in deck.parameters for deck in decks)
+    rules = [deck.rules[name] for deck in decks if name in deck.rules]
     for each in values:
         if isinstance(each, bool) or not isinstance(each, int | float | str):
             mistakes.append(
@@ -534,16 +534,14 @@ def _values(
             mistakes.append(f"{key}: {each} is not allowed: it must be finite")
         elif isinstance(each, str) and not is_word(each):
             mistakes.append(f"{key}: {each!r} must be one word, without spaces, quotes, $ and &")
-        elif shipped and name in RULES and not RULES[name].accepts(each):
-            mistakes.append(f"{key}: {each!r} is not allowed: it must be {RULES[name].allowed}")
         elif isinstance(each, int) and abs(each) >= 2**63:
             mistakes.append(f"{key}: {each} is not allowed: whole numbers must be below 2^63")
-        elif name in FILES and not is_file(folder / str(each)):
-            words = [word for deck in decks for word in FILES[name].get(deck.name, ())]
-            if shipped and each not in words:
-                mistakes.append(
-                    f"{key}: {each} is not allowed: it must be {' or '.join(words)}, or a file"
-                )
+        elif file_of(decks, name, each, folder) is None:
+            mistakes.extend(
+                f"{key}: {each!r} is not allowed: it must be {rule.allowed}"
+                for rule in rules
+                if not rule.accepts(each)
+            )
     return values
 
 
@@ -585,13 +583,9 @@ def _case(
     Raises WorkflowError if a file cannot be read, or if two have the same name.
     """
     inputs: dict[str, Input] = {}
-    for name, words in FILES.items():
-        value = values.get(name)
-        # A word of a deck means the same whatever files there are.
-        if value is None or any(value in words.get(deck.name, ()) for deck in decks):
-            continue
-        path = folder / str(value)
-        if not is_file(path):
+    for name in values:
+        path = file_of(decks, name, values[name], folder)
+        if path is None:
             continue
         if path not in files:
             try:

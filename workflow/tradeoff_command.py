@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from .decks import RULES, Rule, Value, as_value
+from .decks import SETTLING, Rule, Value, as_value, find_deck, read_rule
 from .errors import StudyError
 from .files import is_file, whole
 from .folder import Folder
@@ -160,11 +160,15 @@ def read_plan(options: argparse.Namespace) -> Plan:
     Raises StudyError with one line for every mistake.
     """
     mistakes: list[str] = []
+    settling = find_deck(SETTLING, Path()).rules
+    dimers = find_deck("dimers", Path()).rules
 
-    def values_of(name: str, text: str, rule: Rule, *, several: bool = True) -> list[Any]:
+    def values_of(
+        name: str, text: str, rule: Rule, *, several: bool = True, why: str = ""
+    ) -> list[Any]:
         values = [as_value(word.strip()) for word in (text.split(",") if several else [text])]
         mistakes.extend(
-            f"{name}: {value} is not allowed: it must be {rule.allowed}"
+            f"{name}: {value} is not allowed: it must be {rule.allowed}{why}"
             for value in values
             if not rule.accepts(value)
         )
@@ -174,18 +178,18 @@ def read_plan(options: argparse.Namespace) -> Plan:
         (value,) = values_of(name, text, rule, several=False)
         return value
 
-    particle = value_of("--particle", options.particle, RULES["particle"])
+    particle = value_of("--particle", options.particle, settling["particle"])
     values: dict[str, Value] = {
-        "diameter": value_of("--diameter", options.diameter, RULES["diameter"]),
-        "time_settling": value_of("--time", options.time, RULES["time_settling"]),
+        "diameter": value_of("--diameter", options.diameter, settling["diameter"]),
+        "time_settling": value_of("--time", options.time, settling["time_settling"]),
     }
     if options.aspect_ratio is not None:
-        ratio = value_of("--aspect-ratio", options.aspect_ratio, RULES["aspect_ratio"])
+        ratio = value_of("--aspect-ratio", options.aspect_ratio, dimers["aspect_ratio"])
         values["aspect_ratio"] = ratio
         if particle != "dimers":
             mistakes.append("--aspect-ratio: only dimers have one (--particle dimers)")
-    particles = value_of("--particles", options.particles, RULES["particles"])
-    count = value_of("--seeds", options.seeds, _whole_number_to(MOST_CASES))
+    particles = value_of("--particles", options.particles, dimers["particles"])
+    count = value_of("--seeds", options.seeds, read_rule(f"integer >= 1 <= {MOST_CASES}"))
     seeds: list[int] = []
     files: list[Path] = options.start or []
     for path in files:
@@ -197,14 +201,21 @@ def read_plan(options: argparse.Namespace) -> Plan:
             mistakes.append(f"--start: {path}: no such file")
     if len({path.name for path in files}) < len(files):
         mistakes.append("--start: two files have the same name, which tells starts apart")
+    words = dimers["start"].words
+    mistakes += [
+        f"--start: {path}: {path.name} is no name for a file"
+        for path in files
+        if path.name in words
+    ]
     soft = options.soft_tolerances
-    tolerances = values_of("--tolerances", options.tolerances, RULES["tolerance"])
+    tolerances = values_of("--tolerances", options.tolerances, settling["tolerance"])
     soft_tolerances = (
-        [] if soft == NONE else values_of("--soft-tolerances", soft, RULES["tolerance"])
+        [] if soft == NONE else values_of("--soft-tolerances", soft, settling["tolerance"])
     )
-    dts = values_of("--dts", options.dts, RULES["dt"])
-    solvers = values_of("--solvers", options.solvers, RULES["solver"])
-    ranks = values_of("--ranks", options.ranks, _whole_number_to(cores(), ", the cores there are"))
+    dts = values_of("--dts", options.dts, settling["dt"])
+    solvers = values_of("--solvers", options.solvers, settling["solver"])
+    most = read_rule(f"integer >= 1 <= {cores()}")
+    ranks = values_of("--ranks", options.ranks, most, why=", the cores there are")
     if mistakes:
         raise StudyError(mistakes)
     if not files:
@@ -217,14 +228,6 @@ def read_plan(options: argparse.Namespace) -> Plan:
 def cores() -> int:
     """Return how many cores there are for this process."""
     return len(os.sched_getaffinity(0))
-
-
-def _whole_number_to(most: int, why: str = "") -> Rule:
-    accepts = RULES["particles"].accepts
-    return Rule(
-        f"a whole number from 1 to {most}{why}",
-        lambda value: accepts(value) and float(value) <= most,
-    )
 
 
 def command_line(plan: Plan) -> str:

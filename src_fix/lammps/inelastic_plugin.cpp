@@ -1,7 +1,8 @@
-// Registers the fixes when LAMMPS loads this file as a plugin.
+// Registers the fixes and the command when LAMMPS loads this file as a plugin.
 
 #include "fix_inelastic.h"
 #include "fix_random_force.h"
+#include "parameters.h"
 
 #include "comm.h"
 #include "error.h"
@@ -43,6 +44,9 @@ Fix *create_fix_inelastic(LAMMPS *lmp, int narg, char **arg)
 Fix *create_fix_random_force(LAMMPS *lmp, int narg, char **arg)
 { return new FixRandomForce(lmp, narg, arg); }
 
+Command *create_parameters(LAMMPS *lmp)
+{ return new Parameters(lmp); }
+
 }    // namespace
 
 void lammpsplugin_init(void *lmp_pointer, void *handle, void *register_function)
@@ -76,5 +80,11 @@ void lammpsplugin_init(void *lmp_pointer, void *handle, void *register_function)
   plugin.name = "random/force";
   plugin.info = "random force that is the same on any number of ranks";
   plugin.creator.v2 = reinterpret_cast<lammpsplugin_factory2 *>(&create_fix_random_force);
+  register_plugin(&plugin, lmp);
+
+  plugin.style = "command";
+  plugin.name = "parameters";
+  plugin.info = "a table of a deck's parameters, checked and listed";
+  plugin.creator.v1 = reinterpret_cast<lammpsplugin_factory1 *>(&create_parameters);
   register_plugin(&plugin, lmp);
 }

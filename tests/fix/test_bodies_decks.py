@@ -92,12 +92,6 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "variables", "message"),
     [
-        ("dimers.in", {"aspect_ratio": 1}, "use spheres.in"),
-        ("dimers.in", {"aspect_ratio": 1.0}, "use spheres.in"),
-        ("dimers.in", {"aspect_ratio": 0.9}, "aspect_ratio must be above 1"),
-        ("dimers.in", {"aspect_ratio": 2.1}, "aspect_ratio must be above 1"),
-        ("dimers.in", {"inertia": "hollow"}, "inertia must be point or solid"),
-        ("dimers.in", {"start": "ordered"}, "start must be random, regular or a data file, not"),
         (
             "dimers.in",
             {"start": "regular", "particles": 2000, "aspect_ratio": 2},
@@ -105,7 +99,6 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
         ),
         ("dimers.in", {"diameter": 0.7}, "dimers are too long"),
         ("dimers.in", {"diameter": 0.2}, "no room"),
-        ("clusters.in", {"extent": 0}, "extent must be above 0"),
         ("clusters.in", {"extent": 5}, "too large for the container"),
         ("clusters.in", {"shape": "missing.txt"}, "missing.txt"),
     ],

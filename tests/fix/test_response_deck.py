@@ -73,7 +73,6 @@ def test_without_side_walls_the_packing_flows_out(packing: Path, lmp: Runner) ->
 @pytest.mark.parametrize(
     ("variables", "named"),
     [
-        ({"change": "floor"}, "change must be walls or tilt"),
         ({"diameter": 0.1}, "diameter must be that of the largest sphere"),
     ],
 )
