@@ -30,6 +30,8 @@ UNITS = {
     "metal": (1 / 1.0364269e-4, 1.6021765e6),
     "electron": (0.937582899, 2.94210108e13),
 }
+# Of a place for a sphere or a body.
+TRIALS = 100
 FREE, FROZEN, OUTSIDE, CREATED = 1, 2, 3, 4
 CONTACTS = "id1 id2 x y z nx ny nz gap force"
 BODY_COLUMNS = "mol mass x y z vx vy vz angmomx angmomy angmomz"
@@ -546,26 +548,22 @@ class _Draw:
         for shape in self.shapes:
             shape.setdefault("number", 1)
         self.overlapping = False
+        misses = 0
         for offsets, radii in self.to_place:
-            for _ in range(200):
-                turned = Rotation.from_quat(self.random.normal(size=4)).apply(offsets)
-                trial = turned + self.random.uniform(self.low, self.high)
-                gap = np.inf
-                for shape in self.shapes:
-                    for view in views(shape, trial, 0.0):
-                        gap = min(gap, float(((view.distance - radii) / radii).min()))
-                if gap < -depth:
-                    continue
-                if len(x):
-                    away = trial[:, None] - x
-                    away -= np.rint(away / period) * wide
-                    sizes = radii[:, None] + r
-                    gap = min(gap, float((np.linalg.norm(away, axis=2) / sizes - 1).min()))
-                if gap < -depth:
-                    continue
-                break
-            else:
+            trials = self.trials(offsets)
+            gaps = self.gaps_at_walls(trials, radii)
+            if len(x):
+                away = trials[:, :, None] - x
+                away -= np.rint(away / period) * wide
+                apart = np.linalg.norm(away, axis=3) / (radii[:, None] + r) - 1
+                gaps = np.minimum(gaps, apart.min(axis=(1, 2)))
+            fits = np.flatnonzero(gaps >= -depth)
+            if not len(fits):
+                misses += 1
+                if misses > 10:
+                    break
                 continue
+            trial, gap = trials[fits[0]], gaps[fits[0]]
             x, r = np.vstack([x, trial]), np.concatenate([r, radii])
             body = len(radii) > 1
             self.overlapping = self.overlapping or gap < 0
@@ -630,6 +628,21 @@ class _Draw:
         self.spheres = _Spheres(x, v, w, r, density, kinds, molecules)
         if self.has_bodies and 0 in molecules:
             self.note("bodies and free spheres")
+
+    def trials(self, offsets: FloatArray) -> FloatArray:
+        """Some places and orientations of a body, (trials, spheres, 3)."""
+        turns = Rotation.from_quat(self.random.normal(size=(TRIALS, 4))).as_matrix()
+        turned = np.einsum("tab,sb->tsa", turns, offsets)
+        return np.asarray(turned + self.random.uniform(self.low, self.high, (TRIALS, 1, 3)))
+
+    def gaps_at_walls(self, trials: FloatArray, radii: FloatArray) -> FloatArray:
+        """The smallest gap of each trial at a wall, in radii of the sphere."""
+        gaps = np.full(len(trials), np.inf)
+        for shape in self.shapes:
+            for view in views(shape, trials.reshape(-1, 3), 0.0):
+                gap = view.distance.reshape(len(trials), -1) / radii - 1
+                gaps = np.minimum(gaps, gap.min(axis=1))
+        return gaps
 
     # --- commands
 
