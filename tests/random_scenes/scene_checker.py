@@ -191,9 +191,10 @@ class _Part:
         self.eps = tolerance
         self.shapes: list[Shape] = facts["shapes"]
         self.to_v = facts["acceleration_of_force"]
-        self.curved = any(
-            s["inside"] and s["kind"] in ("sphere", "cylinder", "cone") for s in self.shapes
-        ) or any("intersect" in word or "union" in word for word in facts["words"])
+        self.curved = (
+            any(s["inside"] and s["kind"] in ("sphere", "cylinder", "cone") for s in self.shapes)
+            or "intersect" in facts["words"]
+        )
 
     def frame(
         self,
@@ -723,7 +724,7 @@ class _Part:
             )
 
     def followed(self, new: _Frame, last: _Frame) -> None:
-        """(d) Bodies and curved walls: the gap at the end is small, or the linearised one is.
+        """(d) Bodies, and walls that turn: the gap at the end is small, or the linearised one is.
 
         The fix raises a gap that it lowered for an earlier solution in the first twenty rounds of a
         step, where it is more than 1.1 EPS; what it divides by a cosine of at least 0.5.
@@ -742,6 +743,9 @@ class _Part:
             else:
                 seen = [self.seen_by(s, wall, new.x[i : i + 1], new.time) for s in self.shapes]
                 (view,) = [view for view in seen if view is not None]
+                if view.curved:
+                    # A tangent plane holds, from which the wall curves away.
+                    continue
                 end = float(view.distance[0] - new.radius[i])
             self.report.seen["followed contacts"] += 1
             if end > 2 * 1.1 * self.eps + slack:

@@ -516,19 +516,6 @@ class _Draw:
                     shape["radius"] = size * float(self.random.uniform(0.2, 1))
             found.append(shape)
         self.note("obstacles")
-        # LAMMPS misplaces the caps of such a cone within a union (documented).
-        joined = len(found) > 1 and self.chance(0.5)
-        if joined and not any(s["kind"] == "cone" and s["axis_name"] == "y" for s in found):
-            self.note("union")
-            commands = []
-            for k, shape in enumerate(found):
-                shape["offset"] = k
-                commands.append(self.command(f"o{k}", {**shape, "inside": True}))
-            names = " ".join(f"o{k}" for k in range(len(found)))
-            commands.append(f"region obstacles union {len(found)} {names} side out")
-            walls = sum(WALLS_OF_KIND[shape["kind"]] for shape in found)
-            self.add("obstacles", commands, found, walls)
-            return
         for k, shape in enumerate(found):
             self.single(f"o{k}", shape)
 

@@ -105,6 +105,7 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
         r"is on the wrong side of region",
         lambda facts: facts["closing"] or "created" in facts["words"] or facts["bad_start"],
     ),
+    (r"run pre no cannot go on from a step that was pushing", lambda facts: facts["bad_start"]),
     (r"The tolerance is below the round-off of these forces", lambda facts: facts["spread"] > 4),
     # LAMMPS's own: all spheres together pass through a periodic box between two lists.
     (r"Lost atoms", lambda facts: facts["sweeps"]),
