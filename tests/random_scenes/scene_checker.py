@@ -145,7 +145,8 @@ def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
             of_bodies = bodies[k] if k < len(bodies) else None
             if facts["inertia"] and of_bodies is None:
                 break
-            last = part.frame(table, rows, thermo[table.step], of_bodies, last)
+            final = k + 1 == len(particles)
+            last = part.frame(table, rows, thermo[table.step], of_bodies, last, final)
     return report
 
 
@@ -178,7 +179,14 @@ class _Frame:
     listed: dict[str, Any] | None = None
     ends: FloatArray = field(default_factory=lambda: np.zeros(0))
     plain: FloatArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    # No bad overlap now and in the frame before; none now; the last frame of a run.
     quiet: bool = False
+    settled: bool = True
+    final: bool = False
+    # Momentum without what pushes apart, for bodies; the largest that free spheres had meanwhile.
+    kept_v: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    kept_l: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    momentum_size: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 class _Part:
@@ -203,6 +211,7 @@ class _Part:
         thermo: dict[str, float],
         bodies: Table | None,
         last: _Frame | None,
+        final: bool,
     ) -> _Frame:
         wide = table.box[:, 1] - table.box[:, 0]
         new = _Frame(
@@ -222,7 +231,7 @@ class _Part:
             thermo,
             last is None,
         )
-        new.bodies = bodies
+        new.bodies, new.final = bodies, final
         self.where = f"{self.name}, step {table.step}"
         self.report.seen["frames"] += 1
         values = [table.rows, rows.rows, np.array(list(thermo.values()))]
@@ -330,7 +339,8 @@ class _Part:
         """Overlaps beyond the bound are those of the frame before, and no deeper."""
         if last is None:
             # What a run begins with is the deck's, or that of an earlier tolerance.
-            if (depth > bound).any() and not self.facts["bad_start"]:
+            started_well = not (self.facts["bad_start"] or self.facts["warn"])
+            if (depth > bound).any() and started_well:
                 worst = int(np.argmax(depth - bound))
                 self.wrong(f"{kind} at the start", self.pair(frame, i, j, worst, depth[worst]))
             return
@@ -582,17 +592,30 @@ class _Part:
             wanted = np.where(held[:, None], 0.0, listed["total"])
             self.close("force added to a sphere", added, wanted, slack, new.id)
             self.report.seen["momenta"] += int(alone.sum())
+        settled = new.deepest <= 1.999 * self.eps
+        if settled and not quiet:
+            # Nothing of what pushed spheres apart is left when the overlaps are gone.
+            kept = last.momentum_size if last is not None else 0.0
+            new.momentum_size = np.maximum(sizes, kept)
+            slack = 10 * ROUND_OFF * (new.momentum_size + 1e-300)[:, None]
+            names = new.id[alone]
+            self.close("push kept", after[alone], momentum[alone], slack[alone], names)
+            self.report.seen["ends of pushing"] += 1
+        elif not settled and last is not None:
+            new.momentum_size = np.maximum(sizes, last.momentum_size)
+        else:
+            new.momentum_size = sizes
         new.momentum = np.where(alone[:, None], after if quiet else momentum, after)
         new.quiet = quiet
         if not quiet:
             self.report.seen["pushed frames"] += 1
         if new.bodies is not None:
-            self.turned(new, last, quiet)
-        velocity, spread = self.velocities(new)
+            self.turned(new, last)
+            self.pushed(new, last, listed, settled)
+        velocity = self.velocities(new)
         self.complementary(new, listed, velocity, quiet)
         if quiet:
             self.energy(new, listed, predicted, velocity, kick, alone, sizes)
-        del spread
 
     def moved(self, new: _Frame, last: _Frame) -> None:
         """Positions follow from velocities and forces; and velocities from one kick."""
@@ -620,6 +643,15 @@ class _Part:
             moments += np.eye(3) * (0.4 * m * frame.radius[mine] ** 2).sum()
         return np.asarray(moments)
 
+    def spin(
+        self, frame: _Frame, mine: FloatArray, arm: FloatArray, momentum: FloatArray
+    ) -> FloatArray:
+        """Angular velocity of a body by its angular momentum."""
+        values, axes = np.linalg.eigh(self.inertia(frame, mine, arm))
+        # Point masses on a line do not turn about it.
+        inverse = np.where(values > 1e-10 * values.max(), 1 / np.maximum(values, 1e-300), 0.0)
+        return np.asarray(axes @ (inverse * (axes.T @ momentum)))
+
     def members(self, frame: _Frame) -> Iterator[tuple[int, FloatArray, FloatArray]]:
         """Each row of the bodies' dump, its spheres, and their arms from the centre of mass."""
         assert frame.bodies is not None
@@ -631,7 +663,7 @@ class _Part:
                     arm[:, axis] -= period * np.rint(arm[:, axis] / period)
             yield row, mine, arm
 
-    def turned(self, new: _Frame, last: _Frame | None, quiet: bool) -> None:
+    def turned(self, new: _Frame, last: _Frame | None) -> None:
         """Momentum and angular momentum of every body: one kick by the forces of its spheres."""
         assert new.bodies is not None
         order = np.argsort(new.bodies["mol"])
@@ -656,7 +688,7 @@ class _Part:
         sizes *= half
         before_v, before_l = v - half * force / mass, angular - half * moment
         new.body_v, new.body_l = v + half * force / mass, angular + half * moment
-        if last is None or not quiet:
+        if last is None:
             return
         names = new.bodies["mol"]
         reach = new.bodies["mass"] * self.facts["largest"] * np.linalg.norm(v, axis=1)
@@ -669,23 +701,65 @@ class _Part:
         self.close("angular momentum of a body", before_l, last.body_l, slack_l[:, None], names)
         self.report.seen["momenta of bodies"] += count
 
-    def velocities(self, frame: _Frame) -> tuple[FloatArray, FloatArray]:
+    def pushed(
+        self, new: _Frame, last: _Frame | None, listed: dict[str, FloatArray], settled: bool
+    ) -> None:
+        """Of what pushed bodies apart nothing is left when the overlaps are gone, to EPS / h."""
+        assert new.bodies is not None
+        acting = new.before + listed["total"]
+        kick = (0.5 * new.h if last is None else new.h) * self.to_v
+        if last is None:
+            kept_v, kept_l = new.bodies["vx vy vz"], new.bodies["angmomx angmomy angmomz"]
+        else:
+            kept_v, kept_l = last.kept_v, last.kept_l
+        kept_v, kept_l = kept_v.copy(), kept_l.copy()
+        lengths = np.zeros(len(kept_v))
+        for row, mine, arm in self.members(new):
+            kept_v[row] += kick * acting[mine].sum(axis=0) / new.bodies["mass"][row]
+            kept_l[row] += kick * np.cross(arm, acting[mine]).sum(axis=0)
+            lengths[row] = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
+        was_pushed = last is not None and not last.settled
+        # The last step of a run takes the push out of the whole-step velocity, not out of this one.
+        if settled and not (was_pushed and new.final):
+            mass = new.bodies["mass"]
+            speed = np.linalg.norm(new.body_v, axis=1) + np.linalg.norm(kept_v, axis=1)
+            strong = kick * self.to_strength(new, acting) / mass
+            allowed = 100 * ROUND_OFF * (speed + strong) + 1e-300
+            arms = ROUND_OFF * self.lengths(new) / self.facts["smallest"]
+            turning = (100 * ROUND_OFF + 10 * arms) * (
+                np.linalg.norm(new.body_l, axis=1) + mass * lengths * (speed + strong)
+            ) + 1e-300
+            names = new.bodies["mol"]
+            if was_pushed:
+                allowed += 2 * self.eps / new.h
+                # Angular momentum along a line of point masses turns nothing, and may be left.
+                for row, mine, arm in self.members(new):
+                    left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
+                    speeds = np.linalg.norm(np.cross(left, arm), axis=1)
+                    self.close("turning push kept", speeds, 0 * speeds, allowed[row], new.id[mine])
+            else:
+                self.close("turning of a body", new.body_l, kept_l, turning[:, None], names)
+            self.close("push of a body kept", new.body_v, kept_v, allowed[:, None], names)
+            self.report.seen["ends of pushing bodies"] += int(was_pushed)
+            kept_v, kept_l = new.body_v, new.body_l
+        new.kept_v, new.kept_l, new.settled = kept_v, kept_l, settled
+
+    def to_strength(self, frame: _Frame, forces: FloatArray) -> FloatArray:
+        """Sum of the sizes of the forces on each body's spheres."""
+        size = np.linalg.norm(forces, axis=1) + np.linalg.norm(frame.force, axis=1)
+        return np.array([size[mine].sum() for _, mine, _ in self.members(frame)])
+
+    def velocities(self, frame: _Frame) -> FloatArray:
         """Of the spheres during the step, from momentum alone; those of bodies by their turning."""
         velocity = frame.momentum.copy()
         fixed = (frame.kind == FROZEN) | (frame.kind == OUTSIDE)
         velocity[fixed] = frame.v[fixed]
-        spread = np.zeros(len(velocity))
         if frame.bodies is None:
-            return velocity, spread
+            return velocity
         for row, mine, arm in self.members(frame):
-            moments = self.inertia(frame, mine, arm)
-            values, axes = np.linalg.eigh(moments)
-            # Point masses on a line do not turn about it.
-            inverse = np.where(values > 1e-10 * values.max(), 1 / np.maximum(values, 1e-300), 0.0)
-            spin = axes @ (inverse * (axes.T @ frame.body_l[row]))
+            spin = self.spin(frame, mine, arm, frame.body_l[row])
             velocity[mine] = frame.body_v[row] + np.cross(spin, arm)
-            spread[mine] = np.linalg.norm(np.cross(spin, np.cross(spin, arm)), axis=1)
-        return velocity, spread
+        return velocity
 
     def complementary(
         self, new: _Frame, listed: dict[str, FloatArray], velocity: FloatArray, quiet: bool

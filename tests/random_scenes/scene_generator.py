@@ -706,8 +706,9 @@ class _Draw:
             "delay 0 every 1 check no",
         )
         lines.append(f"neigh_modify {often}")
-        if self.chance(0.1):
-            lines.append("neigh_modify one 5000 page 100000")
+        if self.chance(0.1) or self.skin > 2 * self.largest:
+            # Narrow periodic boxes show the same spheres many times.
+            lines.append("neigh_modify one 20000 page 400000")
         if self.chance(0.1) and list_style == "bin":
             width = (largest + self.skin) * float(self.random.uniform(0.3, 1.5))
             lines.append(f"neigh_modify binsize {numbers(width)}")

@@ -34,9 +34,10 @@ class Answer:
 
     @property
     def errors(self) -> list[str]:
-        """The lines that start with ERROR, each once."""
+        """The lines that start with ERROR, each once, whatever the rank."""
         lines = [line for line in self.screen.splitlines() if line.startswith("ERROR")]
-        return list(dict.fromkeys(lines))
+        # LAMMPS names the rank where each has found the same by itself.
+        return list(dict.fromkeys(re.sub(r"on proc \d+", "on a rank", line) for line in lines))
 
 
 def answer(
