@@ -35,6 +35,8 @@ from scene_walls import FloatArray, Shape, View, moves, turns, views
 ROUND_OFF = 1e-12
 # In EPS. More than this is a bad start for the fix, which knows gaps to round-off as we do.
 REGULAR = 2.0
+# Dimensions that the spheres of a body need, for forces on them to turn it about every axis.
+REAL_TURNING = 2
 # Of the length of a normal at a wall.
 NORMAL_AT_WALL = 1e-9
 
@@ -732,8 +734,15 @@ class _Part:
             names = new.bodies["mol"]
             if was_pushed:
                 allowed += 2 * self.eps / new.h
-                # Angular momentum along a line of point masses turns nothing, and may be left.
                 for row, mine, arm in self.members(new):
+                    if (
+                        self.facts["inertia"] == "point"
+                        and np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
+                        < REAL_TURNING
+                    ):
+                        # No force on spheres in a line takes away what lies along it; it turns the
+                        # body later, when the line has turned.
+                        continue
                     left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
                     speeds = np.linalg.norm(np.cross(left, arm), axis=1)
                     self.close("turning push kept", speeds, 0 * speeds, allowed[row], new.id[mine])

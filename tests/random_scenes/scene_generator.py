@@ -210,6 +210,8 @@ class _Draw:
         self.periodic = [self.chance(0.35) for _ in range(3)]
         if self.crowded:
             self.count, self.periodic, self.solver = 300, [True] * 3, "apgd"
+            self.spread, self.bad = 1.0, False
+            self.tolerance = self.radius * self.log(-5, -3)
         self.draw_units()
         self.draw_space()
         self.place()
@@ -288,6 +290,11 @@ class _Draw:
                 size[axis] = max(size[axis], room * self.largest)
                 if self.bodies:
                     size[axis] = max(size[axis], 2.05 * self.ghosts)
+        widest = float(np.where(self.periodic, size, np.inf).min())
+        if self.skin > widest and not self.bodies:
+            # Thousands of images of every sphere; steps as long as that are shortened.
+            self.skin, self.shorten = widest, True
+            self.ghosts = 2 * self.largest + self.skin
         origin = self.random.uniform(-3, 3, 3) * self.radius if self.chance(0.5) else np.zeros(3)
         self.low, self.high = origin, origin + size
         self.closing = False
