@@ -826,7 +826,7 @@ class _Part:
             else:
                 seen = [self.seen_by(s, wall, new.x[i : i + 1], new.time) for s in self.shapes]
                 (view,) = [view for view in seen if view is not None]
-                if view.curved:
+                if not self.is_flat(wall):
                     # A tangent plane holds, from which the wall curves away.
                     continue
                 end = float(view.distance[0] - new.radius[i])
@@ -839,6 +839,11 @@ class _Part:
                     f"apart (linearised {last.ends[row] / self.eps:.4g} EPS), under a force of "
                     f"{listed['force'][row]:.4g}",
                 )
+
+    def is_flat(self, number: int) -> bool:
+        """Whether a wall is plane, and not the side of an obstacle, which has edges."""
+        seen = [(s, self.seen_by(s, number, np.zeros((1, 3)), 0.0)) for s in self.shapes]
+        return any(s["inside"] and view and not view.curved for s, view in seen)
 
     def is_exact(self, number: int) -> bool:
         """Whether a wall is plane, and keeps its direction."""

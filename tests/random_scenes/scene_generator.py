@@ -672,7 +672,7 @@ class _Draw:
         if self.ranks == 2:
             self.note("two ranks")
         self.setup: list[str] = []
-        if self.chance(0.3):
+        if self.chance(0.3) or (self.crowded and self.seed % 2):
             self.setup.append("newton off")
             self.note("newton off")
         widths = [w for w, p in zip(self.high - self.low, self.periodic, strict=True) if p]
