@@ -1,0 +1,897 @@
+"""Checks what fix inelastic wrote, from the dumps and thermo output alone.
+
+It shares no code with the fix. Between the frames of two steps LAMMPS's leapfrog holds, which makes
+momentum exact: with the force F_n of frame n (all forces), the time step h_n (thermo's `dt`, which
+the fix may shorten) and the velocity v_n of the whole step,
+
+    V_(n-1/2) = v_n - h_n F_n / 2m
+    V_(n+1/2) = v_n + h_n F_n / 2m
+    x_(n+1)   = x_n + h_n V_(n+1/2)
+
+and the same for bodies, with their mass and momentum, and with their angular momentum and the
+moments of the forces, as `compute rigid/local` gives them. Fix store/force keeps the forces before
+the fix. In the first frame of a run v_n has no first half: the fix then projects v_n + h F / 2m.
+
+What pushes a bad start apart is no momentum. Where V_(n+1/2) is more than the kicks by all forces
+and the list's contacts give, the rest is that push: there must be none unless something overlaps
+by more than 2 EPS.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scene_generator import BODY_COLUMNS, CONTACTS, FROZEN, OUTSIDE
+from scene_walls import FloatArray, Shape, View, moves, turns, views
+
+# Of lengths and forces that are sums of some terms of that size; doubles have 1.1e-16.
+ROUND_OFF = 1e-12
+# In EPS. More than this is a bad start for the fix, which knows gaps to round-off as we do.
+REGULAR = 2.0
+# Dimensions that the spheres of a body need, for forces on them to turn it about every axis.
+REAL_TURNING = 2
+# Of the length of a normal at a wall.
+NORMAL_AT_WALL = 1e-9
+
+
+@dataclass
+class Report:
+    """What was looked at, and what is wrong.
+
+    Attributes
+    ----------
+    problems : one line each, the first of each kind
+    seen : how often something was checked: frames, contacts, pushed frames ...
+    """
+
+    problems: list[str] = field(default_factory=list)
+    seen: Counter[str] = field(default_factory=Counter)
+    _kinds: set[str] = field(default_factory=set)
+
+    def wrong(self, kind: str, where: str, what: str) -> None:
+        """Note a problem, once of each kind."""
+        self.seen["problems"] += 1
+        if kind not in self._kinds:
+            self._kinds.add(kind)
+            self.problems.append(f"{kind}: {where}: {what}")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """One frame of a dump."""
+
+    step: int
+    box: FloatArray
+    columns: dict[str, int]
+    rows: FloatArray
+
+    def __getitem__(self, names: str) -> FloatArray:
+        """One column, or several side by side."""
+        wanted = [self.columns[name] for name in names.split()]
+        return self.rows[:, wanted[0]] if len(wanted) == 1 else self.rows[:, wanted]
+
+
+def read_tables(path: Path, names: str = "") -> list[Table]:
+    """Read all whole frames of a text dump; `names` in place of those in the file."""
+    if not path.exists():
+        return []
+    lines = path.read_text().splitlines()
+    found, at = [], 0
+    while at + 9 <= len(lines):
+        count = int(lines[at + 3])
+        block = lines[at + 9 : at + 9 + count]
+        columns = names.split() or lines[at + 8].split()[2:]
+        if len(block) < count:
+            break
+        try:
+            rows = np.array([line.split() for line in block], dtype=float)
+            rows = rows.reshape(count, len(columns))
+        except ValueError:
+            # The last line of a run that was stopped.
+            if at + 9 + count < len(lines):
+                raise
+            break
+        box = np.array([line.split()[:2] for line in lines[at + 5 : at + 8]], dtype=float)
+        step = int(lines[at + 1])
+        found.append(Table(step, box, {name: k for k, name in enumerate(columns)}, rows))
+        at += 9 + count
+    return found
+
+
+def read_thermo(screen: str) -> dict[int, tuple[float, dict[int, dict[str, float]]]]:
+    """EPS, and the thermo output of each step, of every part that the deck announced."""
+    parts: dict[int, tuple[float, dict[int, dict[str, float]]]] = {}
+    part, names = 0, None
+    for line in screen.splitlines():
+        begins = re.match(r"@part (\d+) eps (\S+)", line)
+        if begins:
+            part = int(begins.group(1))
+            parts[part] = (float(begins.group(2)), {})
+            names = None
+        elif line.startswith("@"):
+            part = 0
+        elif re.match(r"\s*Step\b", line):
+            names = line.split()
+        elif line.startswith(("Loop time", "ERROR")):
+            names = None
+        elif names and part:
+            fields = line.split()
+            if len(fields) != len(names) or not re.match(r"-?\d+$", fields[0]):
+                continue
+            values = dict(zip(names, map(float, fields), strict=True))
+            parts[part][1][int(fields[0])] = values
+    return parts
+
+
+def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
+    """Check all parts of a scene that ran in a folder. See `scene_generator` for the facts."""
+    report = Report()
+    for number, (tolerance, thermo) in read_thermo(screen).items():
+        particles = read_tables(folder / f"particles.{number:02d}.dump")
+        contacts = read_tables(folder / f"contacts.{number:02d}.dump", CONTACTS)
+        bodies = read_tables(folder / f"bodies.{number:02d}.dump", BODY_COLUMNS)
+        part = _Part(report, facts, f"part {number}", tolerance)
+        last: _Frame | None = None
+        for k, (table, rows) in enumerate(zip(particles, contacts, strict=False)):
+            if table.step != rows.step or table.step not in thermo:
+                if table.step != rows.step:
+                    report.wrong("frames", part.name, f"steps {table.step} and {rows.step}")
+                break
+            of_bodies = bodies[k] if k < len(bodies) else None
+            if facts["inertia"] and of_bodies is None:
+                break
+            final = k + 1 == len(particles)
+            last = part.frame(table, rows, thermo[table.step], of_bodies, last, final)
+    return report
+
+
+@dataclass(eq=False)
+class _Frame:
+    """One step: what was read, and what follows from it."""
+
+    step: int
+    x: FloatArray
+    v: FloatArray
+    force: FloatArray
+    before: FloatArray
+    radius: FloatArray
+    mass: FloatArray
+    id: FloatArray
+    kind: FloatArray
+    molecule: FloatArray
+    h: float
+    time: float
+    periods: FloatArray
+    thermo: dict[str, float]
+    first: bool
+    deepest: float = 0.0
+    # Momentum, as a velocity, of free spheres, and of bodies in the order of their dump.
+    momentum: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    body_v: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    body_l: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    bodies: Table | None = None
+    # The list, the linearised gaps at the end of the step, and where these are exact.
+    listed: dict[str, Any] | None = None
+    ends: FloatArray = field(default_factory=lambda: np.zeros(0))
+    plain: FloatArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    # No bad overlap now and in the frame before; none now; the last frame of a run.
+    quiet: bool = False
+    settled: bool = True
+    final: bool = False
+    # Momentum without what pushes apart, for bodies; the largest that free spheres had meanwhile.
+    kept_v: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    kept_l: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    momentum_size: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+
+class _Part:
+    """The frames of one run, and of those that go on from it without being set up."""
+
+    def __init__(self, report: Report, facts: dict[str, Any], name: str, tolerance: float) -> None:
+        self.report = report
+        self.facts = facts
+        self.name = name
+        self.eps = tolerance
+        self.shapes: list[Shape] = facts["shapes"]
+        self.to_v = facts["acceleration_of_force"]
+        self.curved = (
+            any(s["inside"] and s["kind"] in ("sphere", "cylinder", "cone") for s in self.shapes)
+            or "intersect" in facts["words"]
+        )
+
+    def frame(
+        self,
+        table: Table,
+        rows: Table,
+        thermo: dict[str, float],
+        bodies: Table | None,
+        last: _Frame | None,
+        final: bool,
+    ) -> _Frame:
+        wide = table.box[:, 1] - table.box[:, 0]
+        new = _Frame(
+            table.step,
+            table["x y z"],
+            table["vx vy vz"],
+            table["fx fy fz"],
+            table["f_before[1] f_before[2] f_before[3]"],
+            table["radius"],
+            table["mass"],
+            table["id"],
+            table["type"],
+            table["mol"] if "mol" in table.columns else np.zeros(len(table.rows)),
+            thermo["Dt"],
+            thermo["Time"],
+            np.where(self.facts["periodic"], wide, 0.0),
+            thermo,
+            last is None,
+        )
+        new.bodies, new.final = bodies, final
+        self.where = f"{self.name}, step {table.step}"
+        self.report.seen["frames"] += 1
+        values = [table.rows, rows.rows, np.array(list(thermo.values()))]
+        if not all(np.isfinite(v).all() for v in values):
+            self.wrong("not a number", "a dump or thermo output holds nan or inf")
+            return new
+        if last is not None and not np.array_equal(last.id, new.id):
+            self.wrong("lost", "IDs differ from those of the frame before")
+            return new
+        self.overlaps(new, last)
+        listed = self.contacts(new, rows)
+        if listed is None:
+            return new
+        self.forces(new, table, listed)
+        self.virial(new, table, listed)
+        self.motion(new, last, listed)
+        if last is not None:
+            self.followed(new, last)
+        return new
+
+    def wrong(self, kind: str, what: str) -> None:
+        self.report.wrong(kind, self.where, what)
+
+    def close(self, kind: str, a: FloatArray, b: FloatArray, allowed: Any, ids: Any = None) -> None:
+        """Note where two arrays differ by more than is allowed; `ids` names the rows."""
+        off = np.abs(np.asarray(a) - np.asarray(b))
+        beyond = ~(off <= allowed)
+        if beyond.any():
+            at = np.unravel_index(np.argmax(np.where(beyond, off, -1.0)), off.shape)
+            row = f" of {int(ids[at[0]])}" if ids is not None else ""
+            self.wrong(
+                kind,
+                f"{np.asarray(a)[at]:.17g}{row} is not {np.asarray(b)[at]:.17g} (off by "
+                f"{off[at]:.3g}, {np.broadcast_to(allowed, off.shape)[at]:.3g} allowed)",
+            )
+
+    # --- overlaps
+
+    def lengths(self, frame: _Frame) -> float:
+        """The largest length there is: positions are known to a part of it."""
+        return float(np.abs(frame.x).max() + frame.radius.max() + frame.periods.max())
+
+    def apart(self, frame: _Frame, i: Any, j: Any) -> FloatArray:
+        """Vector from the nearest image of j to i."""
+        away = frame.x[i] - frame.x[j]
+        for axis, period in enumerate(frame.periods):
+            if period > 0:
+                away[..., axis] -= period * np.rint(away[..., axis] / period)
+        return np.asarray(away)
+
+    def gaps(self, frame: _Frame) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Pairs that see each other, with their gaps."""
+        i, j = np.triu_indices(len(frame.x), 1)
+        seen = (frame.kind[i] != OUTSIDE) & (frame.kind[j] != OUTSIDE)
+        seen &= (frame.kind[i] != FROZEN) | (frame.kind[j] != FROZEN)
+        seen &= (frame.molecule[i] != frame.molecule[j]) | (frame.molecule[i] == 0)
+        i, j = i[seen], j[seen]
+        gap = np.linalg.norm(self.apart(frame, i, j), axis=1) - frame.radius[i] - frame.radius[j]
+        return i, j, gap
+
+    def movable(self, frame: _Frame) -> FloatArray:
+        """Indices of the spheres that walls hold back."""
+        return np.flatnonzero((frame.kind != OUTSIDE) & (frame.kind != FROZEN))
+
+    def overlaps(self, frame: _Frame, last: _Frame | None) -> None:
+        """(a) Bounds, and the fix's own number."""
+        slack = ROUND_OFF * self.lengths(frame)
+        i, j, gap = self.gaps(frame)
+        turning = (frame.molecule[i] > 0) | (frame.molecule[j] > 0)
+        bound = np.where(turning, REGULAR, 1.0) * self.eps + slack
+        self.deep("overlap", frame, last, i, j, -gap, bound)
+        frame.deepest = max(0.0, float(-gap.min(initial=0.0)))
+        who = self.movable(frame)
+        for shape in self.shapes:
+            for view in views(shape, frame.x[who], frame.time):
+                depth = frame.radius[who] - view.distance
+                frame.deepest = max(frame.deepest, float(depth.max(initial=0.0)))
+                exact = not (view.curved or self.curved)
+                factor = np.where((frame.molecule[who] > 0) | (not exact), REGULAR, 1.0)
+                wall = np.full(len(who), -view.number)
+                self.deep(
+                    "overlap with a wall",
+                    frame,
+                    last,
+                    who,
+                    wall,
+                    depth,
+                    factor * self.eps + slack,
+                    shape,
+                )
+        self.close("reported overlap", frame.thermo["f_contact[4]"], frame.deepest, slack)
+        self.report.seen["overlapping frames"] += int(frame.deepest > REGULAR * self.eps)
+
+    def deep(
+        self,
+        kind: str,
+        frame: _Frame,
+        last: _Frame | None,
+        i: FloatArray,
+        j: FloatArray,
+        depth: FloatArray,
+        bound: FloatArray,
+        shape: Shape | None = None,
+    ) -> None:
+        """Overlaps beyond the bound are those of the frame before, and no deeper."""
+        if last is None:
+            # What a run begins with is the deck's, or that of an earlier tolerance.
+            started_well = not (self.facts["bad_start"] or self.facts["warn"])
+            if (depth > bound).any() and started_well:
+                worst = int(np.argmax(depth - bound))
+                self.wrong(f"{kind} at the start", self.pair(frame, i, j, worst, depth[worst]))
+            return
+        # What the fix owned up to at the end of the last step.
+        bound = bound + last.thermo["f_contact[11]"]
+        if self.facts["warn"]:
+            bound = bound + max(0.0, last.thermo["f_contact[2]"] - self.eps)
+        beyond = np.flatnonzero(depth > bound)
+        if not len(beyond):
+            return
+        if shape is None:
+            away = self.apart(last, i[beyond], j[beyond])
+            sizes = last.radius[i[beyond]] + last.radius[j[beyond]]
+            earlier = sizes - np.linalg.norm(away, axis=1)
+        else:
+            earlier = np.array(
+                [
+                    max(
+                        last.radius[k] - view.distance[0]
+                        for view in views(shape, last.x[k], last.time)
+                        if view.number == -wall
+                    )
+                    for k, wall in zip(i[beyond], j[beyond], strict=True)
+                ]
+            )
+        # What overlapped may be as deep as it was, to within the bound of a regular contact.
+        deeper = (
+            depth[beyond] - np.where(earlier > REGULAR * self.eps, earlier, 0.0) > bound[beyond]
+        )
+        if deeper.any():
+            worst = int(beyond[deeper][np.argmax(depth[beyond][deeper])])
+            self.wrong(kind, self.pair(frame, i, j, worst, depth[worst]))
+
+    def pair(self, frame: _Frame, i: FloatArray, j: FloatArray, k: int, depth: float) -> str:
+        second = int(frame.id[j[k]]) if j[k] >= 0 else f"wall {-int(j[k])}"
+        return (
+            f"{int(frame.id[i[k]])} and {second} overlap by {depth:.6g} = {depth / self.eps:.4g} "
+            f"EPS"
+        )
+
+    # --- the list of contacts
+
+    def contacts(self, frame: _Frame, rows: Table) -> dict[str, FloatArray] | None:
+        """(e) Check each row; return the list with indices instead of IDs."""
+        index = {int(name): k for k, name in enumerate(frame.id)}
+        first, second = rows["id1"].astype(int), rows["id2"].astype(int)
+        self.report.seen["contacts"] += len(first)
+        pairs = second > 0
+        known = [
+            a in index and (b in index or -self.facts["walls"] <= b < 0)
+            for a, b in zip(first, second, strict=True)
+        ]
+        if not all(known):
+            row = int(np.flatnonzero(~np.array(known))[0])
+            self.wrong("contact IDs", f"there is no {first[row]} or {second[row]}")
+            return None
+        i = np.array([index[a] for a in first], dtype=int)
+        j = np.array([index.get(b, -1) for b in second], dtype=int)
+        n, gap, force = rows["nx ny nz"], rows["gap"], rows["force"]
+        slack = 10 * ROUND_OFF * self.lengths(frame)
+        # Vectors to curved walls are small differences of large numbers just inside of the wall.
+        unit = np.where(pairs, ROUND_OFF, NORMAL_AT_WALL)
+        self.close("normal's length", np.linalg.norm(n, axis=1), np.ones(len(n)), unit, first)
+        if (force <= 0).any():
+            self.wrong("force of a contact", f"{force.min()} is not greater than 0")
+        kinds = frame.kind[i]
+        if (kinds == OUTSIDE).any() or (frame.kind[j[pairs]] == OUTSIDE).any():
+            self.wrong("group", "a contact of a sphere outside of the group")
+        stuck = (kinds == FROZEN) & np.where(pairs, frame.kind[j] == FROZEN, True)
+        if stuck.any():
+            self.wrong("frozen", "a contact of a frozen sphere with a frozen one or a wall")
+        one = pairs & (frame.molecule[i] > 0) & (frame.molecule[i] == frame.molecule[j])
+        if one.any():
+            self.wrong("body", "a contact within a body")
+        # The line between the centres, which may be those of periodic images.
+        size = frame.radius[i] + np.where(pairs, frame.radius[j], 0.0)
+        image = np.zeros_like(n)
+        away = frame.x[i] - frame.x[j] - n * (size + gap)[:, None]
+        for axis, period in enumerate(frame.periods):
+            if period > 0:
+                image[:, axis] = np.rint(away[:, axis] / period)
+                away[:, axis] -= period * image[:, axis]
+        self.close("line of the centres", away[pairs], 0 * away[pairs], slack, first[pairs])
+        to_point = frame.radius[i] + np.where(pairs, gap / 2, gap)
+        self.close("contact point", rows["x y z"], frame.x[i] - n * to_point[:, None], slack, first)
+        # Each once: with its images a pair may meet twice in a narrow box, and walls curve.
+        flip = pairs & (second < first)
+        keys = np.column_stack(
+            [
+                np.minimum(first, second),
+                np.maximum(first, second),
+                np.where(flip[:, None], -image, image) * pairs[:, None],
+            ]
+        )
+        rounded = np.where(pairs[:, None], 0.0, np.round(n, 9))
+        keys = np.column_stack([keys, rounded])
+        _, counts = np.unique(keys, axis=0, return_counts=True)
+        if (counts > 1).any():
+            self.wrong("contact", "one is listed twice")
+        listed = {
+            "i": i,
+            "j": j,
+            "n": n,
+            "gap": gap,
+            "force": force,
+            "pair": pairs,
+            "wall": np.where(pairs, 0, -second),
+        }
+        self.wall_contacts(frame, listed)
+        return listed
+
+    def seen_by(self, shape: Shape, number: int, x: FloatArray, time: float) -> View | None:
+        """The view of one wall of a shape, if it has that wall."""
+        for view in views(shape, x, time):
+            if view.number == number:
+                return view
+        return None
+
+    def wall_contacts(self, frame: _Frame, listed: dict[str, FloatArray]) -> None:
+        """Normals and gaps of walls, where these are not tangent planes added for the end."""
+        slack = 10 * ROUND_OFF * self.lengths(frame)
+        for row in np.flatnonzero(~listed["pair"]):
+            k, number = listed["i"][row], listed["wall"][row]
+            found = [
+                (shape, view)
+                for shape in self.shapes
+                if (view := self.seen_by(shape, number, frame.x[k : k + 1], frame.time))
+            ]
+            if len(found) != 1:
+                self.wrong("wall", f"there are {len(found)} walls {number}")
+                continue
+            shape, view = found[0]
+            same = np.linalg.norm(view.normal[0] - listed["n"][row]) < 1e-9
+            planar = shape["inside"] and not view.curved and not turns(shape)
+            body = frame.molecule[k] > 0
+            if planar and not same:
+                self.wrong("normal of a wall", f"wall {number}, sphere {int(frame.id[k])}")
+            if same and not turns(shape) and (planar or not (body or moves(shape))):
+                gap = view.distance[0] - frame.radius[k]
+                self.close("gap at a wall", listed["gap"][row], gap, slack + 1e-9 * abs(gap))
+
+    # --- forces
+
+    def forces(self, frame: _Frame, table: Table, listed: dict[str, FloatArray]) -> None:
+        """(e, g, h) Counts and forces of spheres and walls are those of the list."""
+        count = len(frame.x)
+        i, j, pair = listed["i"], listed["j"], listed["pair"]
+        push = listed["n"] * listed["force"][:, None]
+        total, size = np.zeros((count, 3)), np.zeros(count)
+        with_spheres, with_walls = np.zeros(count), np.zeros(count)
+        np.add.at(total, i, push)
+        np.add.at(size, i, listed["force"])
+        np.add.at(total, j[pair], -push[pair])
+        np.add.at(size, j[pair], listed["force"][pair])
+        np.add.at(with_spheres, i[pair], 1)
+        np.add.at(with_spheres, j[pair], 1)
+        np.add.at(with_walls, i[~pair], 1)
+        self.close("contacts of a sphere", table["f_contact[1]"], with_spheres, 0, frame.id)
+        self.close("walls of a sphere", table["f_contact[2]"], with_walls, 0, frame.id)
+        self.close("contacts in all", frame.thermo["f_contact[5]"], pair.sum(), 0)
+        self.close("wall contacts in all", frame.thermo["f_contact[6]"], (~pair).sum(), 0)
+        slack = ROUND_OFF * (size + 1e-300)[:, None]
+        listed["total"], listed["size"] = total, size
+        columns = table["f_contact[3] f_contact[4] f_contact[5]"]
+        self.close("force on a sphere", columns, total, slack, frame.id)
+        for wall in range(1, self.facts["walls"] + 1):
+            mine = listed["wall"] == wall
+            given = np.array([frame.thermo[f"f_contact[{wall}][{k}]"] for k in (1, 2, 3)])
+            allowed = ROUND_OFF * (listed["force"][mine].sum() + 1e-300)
+            self.close("force on a wall", given, -push[mine].sum(axis=0), allowed)
+
+    def virial(self, frame: _Frame, table: Table, listed: dict[str, FloatArray]) -> None:
+        """(f) Of the whole and of each sphere, half of a pair's to either."""
+        i, j, pair, n = listed["i"], listed["j"], listed["pair"], listed["n"]
+        arm = frame.radius[i] + listed["gap"] + np.where(pair, frame.radius[j], 0.0)
+        weight = arm * listed["force"]
+        of_row = np.stack(
+            [
+                weight * n[:, a] * n[:, b]
+                for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+            ],
+            axis=1,
+        ).reshape(len(n), 6)
+        to_pressure = self.facts["pressure_of_energy"]
+        whole = of_row.sum(axis=0) * to_pressure
+        given = np.array([frame.thermo[f"c_press[{k}]"] for k in range(1, 7)])
+        size = np.abs(weight).sum() * to_pressure
+        allowed = ROUND_OFF * (size + 1e-300)
+        self.close("virial", given * frame.thermo["Volume"], whole, allowed)
+        of_sphere, sizes = np.zeros((len(frame.x), 6)), np.zeros(len(frame.x))
+        np.add.at(of_sphere, i, 0.5 * of_row)
+        np.add.at(of_sphere, np.where(pair, j, i), 0.5 * of_row)
+        np.add.at(sizes, i, np.abs(weight))
+        np.add.at(sizes, np.where(pair, j, i), np.abs(weight))
+        stress = np.column_stack([table[f"c_stress[{k}]"] for k in range(1, 7)])
+        slack = ROUND_OFF * to_pressure * (sizes + 1e-300)[:, None]
+        self.close("virial of a sphere", -stress, of_sphere * to_pressure, slack, frame.id)
+
+    # --- motion
+
+    def motion(self, new: _Frame, last: _Frame | None, listed: dict[str, FloatArray]) -> None:
+        """(b, c, d) Momentum, energy and complementarity of the step that begins here."""
+        residual = new.thermo["f_contact[2]"]
+        if self.facts["solver"] != "uzawa":
+            residual = max(residual, new.thermo["f_contact[3]"])
+        if not self.facts["warn"] and residual > self.eps:
+            self.wrong("residual", f"{residual / self.eps:.4g} EPS")
+        kick = 0.5 * new.h if last is None else new.h
+        quiet = new.deepest <= 1.999 * self.eps and (
+            last is None or last.deepest <= 1.999 * self.eps
+        )
+        # A run ends by taking the push out; and begins without.
+        accelerate = self.to_v / new.mass[:, None]
+        after = new.v + 0.5 * new.h * accelerate * new.force
+        if last is not None:
+            self.moved(new, last)
+            started = last.momentum if not quiet else new.v - 0.5 * new.h * accelerate * new.force
+        else:
+            started = new.v
+        predicted = started + kick * accelerate * new.before
+        contact = kick * accelerate * listed["total"]
+        momentum = predicted + contact
+        sizes = (
+            np.linalg.norm(started, axis=1)
+            + np.linalg.norm(new.v, axis=1)
+            + kick
+            * (
+                self.to_v
+                / new.mass
+                * (
+                    np.linalg.norm(new.before, axis=1)
+                    + np.linalg.norm(new.force, axis=1)
+                    + listed["size"]
+                )
+            )
+        )
+        alone = (new.molecule == 0) & (new.kind != FROZEN) & (new.kind != OUTSIDE)
+        added = new.force - new.before
+        if quiet:
+            # Between one frame and the next nothing but forces: exact, whatever the kick was.
+            scale = (
+                np.linalg.norm(new.force, axis=1)
+                + listed["size"]
+                + np.linalg.norm(new.before, axis=1)
+            )
+            inertia = new.mass / self.to_v / kick * np.linalg.norm(after, axis=1)
+            slack = 10 * ROUND_OFF * (scale + inertia + 1e-300)[:, None]
+            held = (new.kind == FROZEN) | (new.kind == OUTSIDE)
+            wanted = np.where(held[:, None], 0.0, listed["total"])
+            self.close("force added to a sphere", added, wanted, slack, new.id)
+            self.report.seen["momenta"] += int(alone.sum())
+        settled = new.deepest <= 1.999 * self.eps
+        if settled and not quiet:
+            # Nothing of what pushed spheres apart is left when the overlaps are gone.
+            kept = last.momentum_size if last is not None else 0.0
+            new.momentum_size = np.maximum(sizes, kept)
+            slack = 10 * ROUND_OFF * (new.momentum_size + 1e-300)[:, None]
+            names = new.id[alone]
+            self.close("push kept", after[alone], momentum[alone], slack[alone], names)
+            self.report.seen["ends of pushing"] += 1
+        elif not settled and last is not None:
+            new.momentum_size = np.maximum(sizes, last.momentum_size)
+        else:
+            new.momentum_size = sizes
+        new.momentum = np.where(alone[:, None], after if quiet else momentum, after)
+        new.quiet = quiet
+        if not quiet:
+            self.report.seen["pushed frames"] += 1
+        if new.bodies is not None:
+            self.turned(new, last)
+            self.pushed(new, last, listed, settled)
+        velocity = self.velocities(new)
+        self.complementary(new, listed, velocity, quiet)
+        if quiet:
+            self.energy(new, listed, predicted, velocity, kick, alone, sizes)
+
+    def moved(self, new: _Frame, last: _Frame) -> None:
+        """Positions follow from velocities and forces; and velocities from one kick."""
+        accelerate = self.to_v / last.mass[:, None]
+        after = last.v + 0.5 * last.h * accelerate * last.force
+        alone = (new.molecule == 0) & (new.kind != FROZEN) & (new.kind != OUTSIDE)
+        off = new.x - last.x - last.h * after
+        for axis, period in enumerate(new.periods):
+            if period > 0:
+                off[:, axis] -= period * np.rint(off[:, axis] / period)
+        step = last.h * np.linalg.norm(after, axis=1) + last.h * np.linalg.norm(last.v, axis=1)
+        slack = ROUND_OFF * (self.lengths(new) + step)[:, None]
+        self.close("motion", off[alone], 0 * off[alone], slack[alone], new.id[alone])
+        now = new.v - 0.5 * new.h * accelerate * new.force
+        sizes = np.linalg.norm(new.v, axis=1) + np.linalg.norm(last.v, axis=1)
+        sizes += np.linalg.norm(now - new.v, axis=1) + np.linalg.norm(after - last.v, axis=1)
+        slack = ROUND_OFF * (sizes + 1e-300)[:, None]
+        self.close("velocity", now[alone], after[alone], slack[alone], new.id[alone])
+
+    def inertia(self, frame: _Frame, mine: FloatArray, arm: FloatArray) -> FloatArray:
+        """Moments of a body about its centre of mass."""
+        m = frame.mass[mine]
+        moments = np.eye(3) * (m * (arm**2).sum(axis=1)).sum() - (arm * m[:, None]).T @ arm
+        if self.facts["inertia"] == "solid":
+            moments += np.eye(3) * (0.4 * m * frame.radius[mine] ** 2).sum()
+        return np.asarray(moments)
+
+    def spin(
+        self, frame: _Frame, mine: FloatArray, arm: FloatArray, momentum: FloatArray
+    ) -> FloatArray:
+        """Angular velocity of a body by its angular momentum."""
+        values, axes = np.linalg.eigh(self.inertia(frame, mine, arm))
+        # Point masses on a line do not turn about it.
+        inverse = np.where(values > 1e-10 * values.max(), 1 / np.maximum(values, 1e-300), 0.0)
+        return np.asarray(axes @ (inverse * (axes.T @ momentum)))
+
+    def members(self, frame: _Frame) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+        """Each row of the bodies' dump, its spheres, and their arms from the centre of mass."""
+        assert frame.bodies is not None
+        for row, molecule in enumerate(frame.bodies["mol"]):
+            mine = np.flatnonzero(frame.molecule == molecule)
+            arm = frame.x[mine] - frame.bodies["x y z"][row]
+            for axis, period in enumerate(frame.periods):
+                if period > 0:
+                    arm[:, axis] -= period * np.rint(arm[:, axis] / period)
+            yield row, mine, arm
+
+    def turned(self, new: _Frame, last: _Frame | None) -> None:
+        """Momentum and angular momentum of every body: one kick by the forces of its spheres."""
+        assert new.bodies is not None
+        order = np.argsort(new.bodies["mol"])
+        new.bodies = Table(new.step, new.bodies.box, new.bodies.columns, new.bodies.rows[order])
+        count = len(order)
+        force, moment, sizes = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 2))
+        for row, mine, arm in self.members(new):
+            mass = new.mass[mine].sum()
+            length = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
+            self.close("mass of a body", new.bodies["mass"][row], mass, ROUND_OFF * mass)
+            centre = (new.mass[mine, None] * arm).sum(axis=0) / mass
+            # The spheres are put in place anew in each step.
+            slack = 100 * ROUND_OFF * self.lengths(new)
+            self.close("centre of a body", centre, np.zeros(3), slack)
+            force[row] = new.force[mine].sum(axis=0)
+            moment[row] = np.cross(arm, new.force[mine]).sum(axis=0)
+            strong = np.linalg.norm(new.force[mine], axis=1).sum()
+            sizes[row] = strong / mass, strong * length
+        mass = new.bodies["mass"][:, None]
+        v, angular = new.bodies["vx vy vz"], new.bodies["angmomx angmomy angmomz"]
+        half = 0.5 * new.h * self.to_v
+        sizes *= half
+        before_v, before_l = v - half * force / mass, angular - half * moment
+        new.body_v, new.body_l = v + half * force / mass, angular + half * moment
+        if last is None:
+            return
+        names = new.bodies["mol"]
+        reach = new.bodies["mass"] * self.facts["largest"] * np.linalg.norm(v, axis=1)
+        slack_v = 10 * ROUND_OFF * (sizes[:, 0] + np.linalg.norm(v, axis=1) + 1e-300)
+        slack_l = 10 * ROUND_OFF * (sizes[:, 1] + np.linalg.norm(angular, axis=1) + reach + 1e-300)
+        # Coordinates round the arms.
+        arms = ROUND_OFF * self.lengths(new) / self.facts["smallest"]
+        slack_l += arms * (sizes[:, 1] + np.linalg.norm(angular, axis=1))
+        self.close("momentum of a body", before_v, last.body_v, slack_v[:, None], names)
+        self.close("angular momentum of a body", before_l, last.body_l, slack_l[:, None], names)
+        self.report.seen["momenta of bodies"] += count
+
+    def pushed(
+        self, new: _Frame, last: _Frame | None, listed: dict[str, FloatArray], settled: bool
+    ) -> None:
+        """Of what pushed bodies apart nothing is left when the overlaps are gone, to EPS / h."""
+        assert new.bodies is not None
+        acting = new.before + listed["total"]
+        kick = (0.5 * new.h if last is None else new.h) * self.to_v
+        if last is None:
+            kept_v, kept_l = new.bodies["vx vy vz"], new.bodies["angmomx angmomy angmomz"]
+        else:
+            kept_v, kept_l = last.kept_v, last.kept_l
+        kept_v, kept_l = kept_v.copy(), kept_l.copy()
+        lengths = np.zeros(len(kept_v))
+        for row, mine, arm in self.members(new):
+            kept_v[row] += kick * acting[mine].sum(axis=0) / new.bodies["mass"][row]
+            kept_l[row] += kick * np.cross(arm, acting[mine]).sum(axis=0)
+            lengths[row] = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
+        was_pushed = last is not None and not last.settled
+        # The last step of a run takes the push out of the whole-step velocity, not out of this one.
+        if settled and not (was_pushed and new.final):
+            mass = new.bodies["mass"]
+            speed = np.linalg.norm(new.body_v, axis=1) + np.linalg.norm(kept_v, axis=1)
+            strong = kick * self.to_strength(new, acting) / mass
+            allowed = 100 * ROUND_OFF * (speed + strong) + 1e-300
+            arms = ROUND_OFF * self.lengths(new) / self.facts["smallest"]
+            turning = (100 * ROUND_OFF + 10 * arms) * (
+                np.linalg.norm(new.body_l, axis=1) + mass * lengths * (speed + strong)
+            ) + 1e-300
+            names = new.bodies["mol"]
+            if was_pushed:
+                allowed += 2 * self.eps / new.h
+                for row, mine, arm in self.members(new):
+                    if (
+                        self.facts["inertia"] == "point"
+                        and np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
+                        < REAL_TURNING
+                    ):
+                        # No force on spheres in a line takes away what lies along it; it turns the
+                        # body later, when the line has turned.
+                        continue
+                    left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
+                    speeds = np.linalg.norm(np.cross(left, arm), axis=1)
+                    self.close("turning push kept", speeds, 0 * speeds, allowed[row], new.id[mine])
+            else:
+                self.close("turning of a body", new.body_l, kept_l, turning[:, None], names)
+            self.close("push of a body kept", new.body_v, kept_v, allowed[:, None], names)
+            self.report.seen["ends of pushing bodies"] += int(was_pushed)
+            kept_v, kept_l = new.body_v, new.body_l
+        new.kept_v, new.kept_l, new.settled = kept_v, kept_l, settled
+
+    def to_strength(self, frame: _Frame, forces: FloatArray) -> FloatArray:
+        """Sum of the sizes of the forces on each body's spheres."""
+        size = np.linalg.norm(forces, axis=1) + np.linalg.norm(frame.force, axis=1)
+        return np.array([size[mine].sum() for _, mine, _ in self.members(frame)])
+
+    def velocities(self, frame: _Frame) -> FloatArray:
+        """Of the spheres during the step, from momentum alone; those of bodies by their turning."""
+        velocity = frame.momentum.copy()
+        fixed = (frame.kind == FROZEN) | (frame.kind == OUTSIDE)
+        velocity[fixed] = frame.v[fixed]
+        if frame.bodies is None:
+            return velocity
+        for row, mine, arm in self.members(frame):
+            spin = self.spin(frame, mine, arm, frame.body_l[row])
+            velocity[mine] = frame.body_v[row] + np.cross(spin, arm)
+        return velocity
+
+    def complementary(
+        self, new: _Frame, listed: dict[str, FloatArray], velocity: FloatArray, quiet: bool
+    ) -> None:
+        """(d) Where a force acts, the gap at the end of the step is within the tolerance."""
+        if self.facts["solver"] == "uzawa" or (new.bodies is not None and not quiet):
+            return
+        i, j, pair, n = listed["i"], listed["j"], listed["pair"], listed["n"]
+        relative = velocity[i] - np.where(pair[:, None], velocity[j], 0.0)
+        asked = np.where(listed["gap"] < -REGULAR * self.eps, 0.0, listed["gap"])
+        end = asked + new.h * (n * relative).sum(axis=1)
+        for row in np.flatnonzero(~pair):
+            end[row] -= self.wall_motion(new, listed, row)
+        ends = np.full(len(i), self.eps)
+        if self.facts["warn"]:
+            ends = np.maximum(ends, new.thermo["f_contact[3]"])
+        large = self.lengths(new) + new.h * np.linalg.norm(relative, axis=1)
+        slack = 100 * ROUND_OFF * large
+        # Walls that curve or turn, and bodies: the constraint was set for the end of the step.
+        plain = (new.molecule[i] == 0) & (~pair | (new.molecule[j] == 0))
+        new.listed, new.ends = listed, end
+        for row in np.flatnonzero(~pair & plain):
+            plain[row] = self.is_exact(listed["wall"][row])
+        new.plain = plain
+        borderline = np.abs(listed["gap"] + REGULAR * self.eps) < 1e-3 * self.eps
+        checked = plain & ~borderline
+        self.report.seen["complementary contacts"] += int(checked.sum())
+        beyond = checked & (end > ends * (1 + 1e-9) + slack)
+        if beyond.any():
+            row = int(np.argmax(np.where(beyond, end, -np.inf)))
+            second = int(new.id[j[row]]) if pair[row] else f"wall {listed['wall'][row]}"
+            self.wrong(
+                "complementarity",
+                f"{int(new.id[i[row]])} and {second} keep {end[row] / self.eps:.4g} EPS under a "
+                f"force of {listed['force'][row]:.4g}",
+            )
+
+    def followed(self, new: _Frame, last: _Frame) -> None:
+        """(d) Bodies, and walls that turn: the gap at the end is small, or the linearised one is.
+
+        The fix raises a gap that it lowered for an earlier solution in the first twenty rounds of a
+        step, where it is more than 1.1 EPS; what it divides by a cosine of at least 0.5.
+        """
+        if last.listed is None or not last.quiet or last.thermo["f_contact[8]"] > 20:
+            return
+        if self.facts["warn"]:
+            return
+        listed = last.listed
+        slack = 100 * ROUND_OFF * self.lengths(new)
+        for row in np.flatnonzero(~last.plain & (last.ends > self.eps * (1 + 1e-9) + slack)):
+            i, j, wall = listed["i"][row], listed["j"][row], int(listed["wall"][row])
+            if listed["pair"][row]:
+                end = float(np.linalg.norm(self.apart(new, i, j)))
+                end -= new.radius[i] + new.radius[j]
+            else:
+                seen = [self.seen_by(s, wall, new.x[i : i + 1], new.time) for s in self.shapes]
+                (view,) = [view for view in seen if view is not None]
+                if not self.is_flat(wall):
+                    # A tangent plane holds, from which the wall curves away.
+                    continue
+                end = float(view.distance[0] - new.radius[i])
+            self.report.seen["followed contacts"] += 1
+            if end > 2 * 1.1 * self.eps + slack:
+                second = f"wall {wall}" if wall else int(new.id[j])
+                self.wrong(
+                    "gap under a force",
+                    f"{int(new.id[i])} and {second} end the step before {end / self.eps:.4g} EPS "
+                    f"apart (linearised {last.ends[row] / self.eps:.4g} EPS), under a force of "
+                    f"{listed['force'][row]:.4g}",
+                )
+
+    def is_flat(self, number: int) -> bool:
+        """Whether a wall is plane, and not the side of an obstacle, which has edges."""
+        seen = [(s, self.seen_by(s, number, np.zeros((1, 3)), 0.0)) for s in self.shapes]
+        return any(s["inside"] and view and not view.curved for s, view in seen)
+
+    def is_exact(self, number: int) -> bool:
+        """Whether a wall is plane, and keeps its direction."""
+        for shape in self.shapes:
+            if shape["inside"] and not turns(shape):
+                for view in views(shape, np.zeros((1, 3)), 0.0):
+                    if view.number == number:
+                        return not view.curved
+        return False
+
+    def wall_motion(self, new: _Frame, listed: dict[str, FloatArray], row: int) -> float:
+        """How far a wall comes nearer in the step, seen from where the sphere is now."""
+        k, number = listed["i"][row], listed["wall"][row]
+        for shape in self.shapes:
+            now = self.seen_by(shape, number, new.x[k : k + 1], new.time)
+            if now is not None and moves(shape):
+                later = self.seen_by(shape, number, new.x[k : k + 1], new.time + new.h)
+                assert later is not None
+                return float(now.distance[0] - later.distance[0])
+        return 0.0
+
+    def energy(
+        self,
+        new: _Frame,
+        listed: dict[str, FloatArray],
+        predicted: FloatArray,
+        velocity: FloatArray,
+        kick: float,
+        alone: FloatArray,
+        sizes: FloatArray,
+    ) -> None:
+        """(c) T(V+) <= T(V*) + sum lambda (max(0, -D) + EPS) / h + the work of what moves."""
+        if new.bodies is not None or self.facts["warn"]:
+            return
+        m = new.mass[alone]
+        gained = 0.5 * (m * (velocity[alone] ** 2 - predicted[alone] ** 2).sum(axis=1)).sum()
+        i, j, pair, n = listed["i"], listed["j"], listed["pair"], listed["n"]
+        impulse = listed["force"] * kick * self.to_v
+        allowed = (impulse * (np.maximum(0, -listed["gap"]) + self.eps)).sum() / new.h
+        for row in np.flatnonzero(~pair):
+            allowed += impulse[row] * max(0.0, self.wall_motion(new, listed, row)) / new.h
+        for side, sign in ((i, -1.0), (np.where(pair, j, i), 1.0)):
+            frozen = new.kind[side] == FROZEN
+            work = sign * (n[frozen] * velocity[side[frozen]]).sum(axis=1)
+            allowed += (impulse[frozen] * np.maximum(0, work)).sum()
+        if any(turns(shape) for shape in self.shapes) or self.curved:
+            return
+        slack = 10 * ROUND_OFF * (m * sizes[alone] ** 2).sum()
+        self.report.seen["energies"] += 1
+        if gained > allowed * (1 + 1e-9) + slack:
+            self.wrong("energy", f"gained {gained:.6g}, {allowed:.6g} allowed")

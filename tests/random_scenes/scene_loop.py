@@ -1,0 +1,150 @@
+"""One scene from its seed to a verdict, and what many of them have in common."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import traceback
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from building import REPOSITORY, cmake, generator, run
+from lammps_run import without_launcher
+from scene_checker import Report, check
+from scene_generator import Scene, random_scene
+from scene_run import TIMEOUT, answer, finding
+from test_plugin import plugin_file
+
+
+@dataclass(frozen=True)
+class Programs:
+    """How LAMMPS is started with the plugin."""
+
+    program: Sequence[str]
+    environment: Mapping[str, str]
+    timeout: float = TIMEOUT
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of one scene.
+
+    Attributes
+    ----------
+    problems : findings, one line each; empty if all is well
+    ended : `ended`, or the refusal with which LAMMPS stopped
+    """
+
+    seed: int
+    words: Sequence[str]
+    ranks: int
+    seconds: float
+    problems: Sequence[str]
+    ended: str
+    report: Report = field(default_factory=Report)
+
+    def line(self) -> str:
+        """One line, and one more for each problem."""
+        said = "FINDING" if self.problems else "ok" if self.ended == "ended" else "refused"
+        seen = self.report.seen
+        text = (
+            f"{self.seed} {said} {self.seconds:.1f} s, {self.ranks} rank(s): "
+            f"{', '.join(self.words)}; {seen['frames']} frames, {seen['contacts']} contacts"
+        )
+        if self.ended != "ended" and not self.problems:
+            text += f"; {self.ended[:110]}"
+        return "\n".join([text, *(f"    {problem}" for problem in self.problems)])
+
+
+def installed() -> Programs:
+    """LAMMPS with the plugin of this Python's package."""
+    program, environment = without_launcher(plugin_file().parent)
+    return Programs([program], environment)
+
+
+def sanitized(build: Path) -> Programs:
+    """LAMMPS with a plugin that is built with the address sanitizer, in a folder."""
+    run(
+        *cmake(),
+        *("-S", str(REPOSITORY), "-B", str(build)),
+        *generator(),
+        "-DINELASTIC_PYTHON=OFF",
+        "-DINELASTIC_PLUGIN=ON",
+        "-DINELASTIC_SANITIZE=ON",
+        f"-DPython_EXECUTABLE={sys.executable}",
+        *("-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1"),
+    )
+    run(*cmake(), "--build", str(build), "--target", "inelasticplugin")
+    (plugin,) = build.glob("src_fix/lammps/inelasticplugin.so")
+    libraries = []
+    for name in ("libasan.so", "libubsan.so"):
+        said = subprocess.run(
+            ["c++", f"-print-file-name={name}"], capture_output=True, text=True, check=True
+        )
+        libraries.append(str(Path(said.stdout.strip()).resolve()))
+    program, environment = without_launcher(plugin.parent)
+    # Leaks are those of the scenes that LAMMPS ends with an error: test_memory.py looks for others.
+    return Programs(
+        ["env", f"LD_PRELOAD={' '.join(libraries)}", program],
+        {**environment, "ASAN_OPTIONS": "detect_leaks=0"},
+        4 * TIMEOUT,
+    )
+
+
+def judge(
+    seed: int,
+    folder: Path,
+    programs: Programs,
+    *,
+    ranks: int | None = None,
+    without: Sequence[str] = (),
+    only: Sequence[str] = (),
+    keep: bool = False,
+    scene: Scene | None = None,
+) -> Verdict | None:
+    """Draw, run and check a scene in a folder, which stays only where something is wrong.
+
+    None if it has one of the words `without`, or lacks one of `only`. `scene` is that of the seed
+    unless given.
+    """
+    if scene is None:
+        scene = random_scene(seed)
+    if any(word in scene.words for word in without) or any(w not in scene.words for w in only):
+        return None
+    if folder.exists():
+        shutil.rmtree(folder)
+    scene.write(folder)
+    processes = ranks or scene.ranks
+    result = answer(folder, processes, programs.program, programs.environment, programs.timeout)
+    problems = [text] if (text := finding(result, scene.facts)) else []
+    report = Report()
+    try:
+        report = check(folder, scene.facts, result.screen)
+        problems += report.problems
+    except Exception:
+        problems.append(f"the checker failed: {traceback.format_exc()}")
+    if not (problems or keep):
+        shutil.rmtree(folder)
+    ended = "ended" if not result.errors else result.errors[0]
+    return Verdict(seed, scene.words, processes, result.seconds, problems, ended, report)
+
+
+def summary(verdicts: Sequence[Verdict]) -> str:
+    """How many scenes of which kind, and the seeds of the findings."""
+    words = Counter(word for verdict in verdicts for word in verdict.words)
+    seen = sum((verdict.report.seen for verdict in verdicts), Counter[str]())
+    bad = [verdict.seed for verdict in verdicts if verdict.problems]
+    refused = Counter(
+        verdict.ended[:60]
+        for verdict in verdicts
+        if verdict.ended != "ended" and not verdict.problems
+    )
+    lines = [f"{len(verdicts)} scenes, {sum(v.seconds for v in verdicts):.0f} s"]
+    lines.append("  with " + ", ".join(f"{word} {count}" for word, count in words.most_common()))
+    lines.append("  checked " + ", ".join(f"{name} {count}" for name, count in seen.most_common()))
+    lines += [f"  refused {count}: {text}" for text, count in refused.most_common()]
+    lines.append(f"  {len(bad)} findings" + (f": seeds {' '.join(map(str, bad))}" if bad else ""))
+    return "\n".join(lines)

@@ -1,0 +1,133 @@
+"""Runs a scene with real LAMMPS, and says which answers are allowed."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lammps_run import BIN, OF_A_LAUNCHER
+
+TIMEOUT = 60.0
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What LAMMPS answered.
+
+    Attributes
+    ----------
+    status : exit code; None if it had to be stopped
+    screen : all that it printed
+    seconds : wall time
+    """
+
+    status: int | None
+    screen: str
+    seconds: float
+
+    @property
+    def errors(self) -> list[str]:
+        """The lines that start with ERROR, each once, whatever the rank."""
+        lines = [line for line in self.screen.splitlines() if line.startswith("ERROR")]
+        # LAMMPS names the rank where each has found the same by itself.
+        return list(dict.fromkeys(re.sub(r"on proc \d+", "on a rank", line) for line in lines))
+
+
+def answer(
+    folder: Path,
+    ranks: int,
+    program: Sequence[str],
+    environment: Mapping[str, str],
+    timeout: float = TIMEOUT,
+) -> Answer:
+    """Run `deck.in` of a folder."""
+    command = [*program, "-in", "deck.in", "-log", "none", "-nocite"]
+    if ranks > 1:
+        command = [str(BIN / "mpiexec"), "-bind-to", "core", "-n", str(ranks), *command]
+    around = {
+        name: value for name, value in os.environ.items() if not name.startswith(OF_A_LAUNCHER)
+    }
+    start = time.monotonic()
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        env=around | {"OMP_NUM_THREADS": "1"} | dict(environment),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,
+        text=True,
+        errors="replace",
+    )
+    status: int | None
+    try:
+        screen, _ = process.communicate(timeout=timeout)
+        status = process.returncode
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        screen, _ = process.communicate()
+        status = None
+    (folder / "screen.txt").write_text(screen)
+    return Answer(status, screen, time.monotonic() - start)
+
+
+Facts = dict[str, Any]
+
+
+def _may_be_slow(facts: Facts) -> bool:
+    """Whether more than 100,000 iterations are no surprise: unequal masses, or walls that close."""
+    return (
+        facts["spread"] > 2
+        or facts["closing"]
+        or facts["warn"]
+        or "densities differ" in facts["words"]
+        or facts["tightest"] < 1e-6 * facts["smallest"]
+    )
+
+
+# A message of the fix, and the scenes in which it is the right answer.
+REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
+    (r"further than the neighbour list reaches", lambda facts: not facts["shorten"]),
+    (r"the scene leaves no room for the spheres: they have a volume", lambda facts: False),
+    (
+        r"no velocities keep the surfaces apart",
+        lambda facts: facts["closing"] or facts["bad_start"],
+    ),
+    (r"no time step above .* keeps the spheres apart", lambda facts: facts["closing"]),
+    (r"iterations left an overlap", _may_be_slow),
+    (
+        r"is on the wrong side of region",
+        lambda facts: facts["closing"] or "created" in facts["words"] or facts["bad_start"],
+    ),
+    (r"run pre no cannot go on from a step that was pushing", lambda facts: facts["bad_start"]),
+    (r"The tolerance is below the round-off of these forces", lambda facts: facts["spread"] > 4),
+    # LAMMPS's own: all spheres together pass through a periodic box between two lists.
+    (r"Lost atoms", lambda facts: facts["sweeps"]),
+)
+
+
+def finding(of: Answer, facts: Facts) -> str:
+    """What is wrong with an answer; empty if it is the end of the deck, or a right refusal."""
+    if of.status is None:
+        return f"hangs: still running after {of.seconds:.0f} s"
+    if "Sanitizer" in of.screen or "runtime error" in of.screen:
+        found = re.search(r".*(Sanitizer|runtime error).*", of.screen)
+        return f"sanitizer: {found.group(0) if found else ''}"
+    if of.status == 0 and "@end" in of.screen:
+        return ""
+    errors = of.errors
+    if not errors:
+        return f"crash: exit code {of.status} without an ERROR line: {of.screen[-300:]!r}"
+    if len(errors) > 1:
+        return "two different errors: " + " / ".join(errors)
+    for pattern, condition in REFUSALS:
+        if re.search(pattern, errors[0]):
+            return "" if condition(facts) else f"a refusal that does not fit: {errors[0]}"
+    return f"an error that no scene should meet: {errors[0]}"

@@ -1,0 +1,41 @@
+"""Some hundred random scenes, each checked at every step; the seeds are printed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scene_generator import random_scene
+from scene_loop import Programs, Verdict, installed, judge, summary
+
+pytestmark = pytest.mark.validation
+
+SCENES = 400
+IN_A_BLOCK = 50
+
+
+@pytest.fixture(scope="module")
+def programs() -> Programs:
+    return installed()
+
+
+@pytest.mark.parametrize("first", range(0, SCENES, IN_A_BLOCK))
+def test_random_scenes(first: int, tmp_path: Path, programs: Programs) -> None:
+    verdicts: list[Verdict] = []
+    for seed in range(first, first + IN_A_BLOCK):
+        verdict = judge(seed, tmp_path / str(seed), programs)
+        assert verdict is not None
+        verdicts.append(verdict)
+    print(f"seeds {first} to {first + IN_A_BLOCK - 1}: {summary(verdicts)}")
+    assert not [verdict.line() for verdict in verdicts if verdict.problems]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_more_ghosts_than_spheres(seed: int, tmp_path: Path, programs: Programs) -> None:
+    """LAMMPS's buffers begin with room for a thousand numbers, which small scenes never fill."""
+    scene = random_scene(seed, crowded=True)
+    verdict = judge(seed, tmp_path / "scene", programs, scene=scene)
+    assert verdict is not None
+    print(f"crowded seed {verdict.line()}")
+    assert not verdict.problems
