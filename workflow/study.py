@@ -534,14 +534,13 @@ def _values(
             mistakes.append(f"{key}: {each} is not allowed: it must be finite")
         elif isinstance(each, str) and not is_word(each):
             mistakes.append(f"{key}: {each!r} must be one word, without spaces, quotes, $ and &")
-        elif isinstance(each, int) and abs(each) >= 2**63:
-            mistakes.append(f"{key}: {each} is not allowed: whole numbers must be below 2^63")
         elif file_of(decks, name, each, folder) is None:
+            refusing = [rule for rule in rules if not rule.accepts(each)]
             mistakes.extend(
-                f"{key}: {each!r} is not allowed: it must be {rule.allowed}"
-                for rule in rules
-                if not rule.accepts(each)
+                f"{key}: {each!r} is not allowed: it must be {rule.allowed}" for rule in refusing
             )
+            if not refusing and isinstance(each, int) and abs(each) >= 2**63:
+                mistakes.append(f"{key}: {each} is not allowed: whole numbers must be below 2^63")
     return values
 
 

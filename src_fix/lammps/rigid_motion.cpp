@@ -411,8 +411,10 @@ void RigidMotion::predict(inelastic::ContactProblem &problem, inelastic::Host &h
     double *const part = &carried_part_[3 * i];
     if (bodies.place[i] == bodies.start[b]) {
       // Forces on the spheres can take away no more of a push than this.
-      double slow[3], removed[3];
-      multiply(body.point_inverse, push.angular_momentum.data(), slow);
+      double pushed[3], slow[3], removed[3];
+      for (int d = 0; d < 3; ++d)
+        pushed[d] = push.angular_momentum[d] + (carried ? of_body.left_over[d] : 0.0);
+      multiply(body.point_inverse, pushed, slow);
       multiply(body.point_inertia, slow, removed);
       for (int d = 0; d < 3; ++d)
         part[d] = (carried ? of_body.angular_momentum[d] : 0.0) - removed[d];
@@ -556,8 +558,16 @@ void RigidMotion::finish(const inelastic::ContactProblem &problem, int i, const 
   const Push &before = kick.whole ? of_body.next : of_body.held;
   // Forces m (a + alpha x r) with the right sum and the right moment.
   double change[3], spin[3], around[3];
-  for (int d = 0; d < 3; ++d) change[d] = push.angular_momentum[d] - before.angular_momentum[d];
+  for (int d = 0; d < 3; ++d)
+    change[d] = push.angular_momentum[d] - before.angular_momentum[d] -
+        (kick.whole ? of_body.left_over[d] : 0.0);
   multiply(body.point_inverse, change, spin);
+  of_body.left_over = {};
+  if (body.collinear) {
+    double made[3];
+    multiply(body.point_inertia, spin, made);
+    for (int d = 0; d < 3; ++d) of_body.left_over[d] = made[d] - change[d];
+  }
   cross(spin, &bodies.arm[3 * bodies.place[i]], around);
   for (int d = 0; d < 3; ++d)
     force[d] += mass(i) * (push.velocity[d] - before.velocity[d] + around[d]) / kick.strength;
@@ -591,6 +601,7 @@ int RigidMotion::pack(int i, double *buffer) const
     out = std::copy_n(push->velocity.begin(), 3, out);
     out = std::copy_n(push->angular_momentum.begin(), 3, out);
   }
+  out = std::copy_n(of_body.left_over.begin(), 3, out);
   *out++ = of_body.angle;
   return static_cast<int>(out - buffer);
 }
@@ -608,6 +619,7 @@ int RigidMotion::unpack(int i, const double *buffer)
     take(push->velocity);
     take(push->angular_momentum);
   }
+  take(of_body.left_over);
   of_body.angle = *in++;
   return static_cast<int>(in - buffer);
 }

@@ -114,7 +114,7 @@ class RigidMotion : protected Pointers {
   bool has_held(int i) const;
   void pack_held(int i, double *buffer) const;
   void unpack_held(int i, const double *buffer);
-  static constexpr int CARRIED_SIZE = 16;
+  static constexpr int CARRIED_SIZE = 19;
 
  private:
   struct Push {
@@ -126,6 +126,9 @@ class RigidMotion : protected Pointers {
     std::array<double, 3> angular_momentum;    // after the last move, push included
     Push next;                                 // part of the motion after the last move
     Push held;                                 // at whole steps
+    // The angular momentum of earlier pushes that is still in the motion: forces on spheres in a line
+    // cannot take away what lies along it, until the line has turned.
+    std::array<double, 3> left_over;
     double angle;    // the largest one turned in a step of this run, by motion and by moments of
                      // contacts [radians]
   };

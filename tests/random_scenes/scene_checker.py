@@ -732,25 +732,35 @@ class _Part:
                 np.linalg.norm(new.body_l, axis=1) + mass * lengths * (speed + strong)
             ) + 1e-300
             names = new.bodies["mol"]
+            in_line = np.zeros(len(names), dtype=bool)
             if was_pushed:
                 allowed += 2 * self.eps / new.h
-                for row, mine, arm in self.members(new):
-                    if (
-                        self.facts["inertia"] == "point"
-                        and np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
-                        < REAL_TURNING
-                    ):
-                        # No force on spheres in a line takes away what lies along it; it turns the
-                        # body later, when the line has turned.
-                        continue
-                    left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
-                    speeds = np.linalg.norm(np.cross(left, arm), axis=1)
-                    self.close("turning push kept", speeds, 0 * speeds, allowed[row], new.id[mine])
-            else:
-                self.close("turning of a body", new.body_l, kept_l, turning[:, None], names)
+            for row, mine, arm in self.members(new):
+                rank = np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
+                in_line[row] = self.facts["inertia"] == "point" and rank < REAL_TURNING
+                if not (was_pushed or in_line[row]):
+                    continue
+                left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
+                speeds = np.linalg.norm(np.cross(left, arm), axis=1)
+                # No force on spheres in a line takes away what lies along it, until the line has
+                # turned: what is kept of such bodies is followed from the start.
+                slack = 2 * self.eps / new.h if in_line[row] else 0.0
+                self.close(
+                    "turning push kept", speeds, 0 * speeds, allowed[row] + slack, new.id[mine]
+                )
+            if not was_pushed:
+                free = ~in_line
+                self.close(
+                    "turning of a body",
+                    new.body_l[free],
+                    kept_l[free],
+                    turning[free, None],
+                    names[free],
+                )
             self.close("push of a body kept", new.body_v, kept_v, allowed[:, None], names)
             self.report.seen["ends of pushing bodies"] += int(was_pushed)
-            kept_v, kept_l = new.body_v, new.body_l
+            kept_v = new.body_v
+            kept_l = np.where(in_line[:, None], kept_l, new.body_l)
         new.kept_v, new.kept_l, new.settled = kept_v, kept_l, settled
 
     def to_strength(self, frame: _Frame, forces: FloatArray) -> FloatArray:
