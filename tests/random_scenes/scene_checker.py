@@ -39,6 +39,8 @@ REGULAR = 2.0
 REAL_TURNING = 2
 # [radians] With some room: bodies turn a little faster or slower at the end of a step.
 HALF_A_TURN = 3.0
+# Of the sum of two radii, the overlap from which bodies are pushed along the line of their centres.
+ENTANGLED = 0.05
 # Of the length of a normal at a wall.
 NORMAL_AT_WALL = 1e-9
 
@@ -375,9 +377,30 @@ class _Part:
         deeper = (
             depth[beyond] - np.where(earlier > REGULAR * self.eps, earlier, 0.0) > bound[beyond]
         )
+        if shape is None:
+            for k in np.flatnonzero(deeper):
+                deeper[k] = not self.are_entangled(last, i[beyond[k]], j[beyond[k]])
         if deeper.any():
             worst = int(beyond[deeper][np.argmax(depth[beyond][deeper])])
             self.wrong(kind, self.pair(frame, i, j, worst, depth[worst]))
+
+    def are_entangled(self, frame: _Frame, i: int, j: int) -> bool:
+        """Whether two bodies, or a body and a sphere, are deep in one another somewhere.
+
+        The fix pushes these along the line between their centres; what else is between them waits.
+        """
+        sides = [
+            np.flatnonzero(frame.molecule == frame.molecule[k])
+            if frame.molecule[k]
+            else np.array([k])
+            for k in (i, j)
+        ]
+        if len(sides[0]) + len(sides[1]) == 2:
+            return False
+        one, other = (side.ravel() for side in np.meshgrid(*sides))
+        sizes = frame.radius[one] + frame.radius[other]
+        depth = sizes - np.linalg.norm(self.apart(frame, one, other), axis=1)
+        return bool((depth > ENTANGLED * sizes).any())
 
     def pair(self, frame: _Frame, i: FloatArray, j: FloatArray, k: int, depth: float) -> str:
         second = int(frame.id[j[k]]) if j[k] >= 0 else f"wall {-int(j[k])}"
@@ -774,9 +797,9 @@ class _Part:
         new.kept_v, new.kept_l, new.settled = kept_v, kept_l, settled
 
     def is_in_line(self, arm: FloatArray) -> bool:
-        """Whether a body is of point masses on a line, about which no force on them turns it."""
+        """Whether a body's spheres lie on a line, about which no force on them turns it."""
         rank = np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
-        return bool(self.facts["inertia"] == "point" and rank < REAL_TURNING)
+        return bool(rank < REAL_TURNING)
 
     def to_strength(self, frame: _Frame, forces: FloatArray) -> FloatArray:
         """Sum of the sizes of the forces on each body's spheres."""
