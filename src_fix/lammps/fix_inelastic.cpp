@@ -38,7 +38,7 @@ constexpr double PUSH_LIMIT =
 constexpr double RELINEARISE_BEYOND = 1.1;    // in eps, overlap at the end of the step
 // [radians] Beyond, where a body ends says little about the wall that it has met.
 constexpr double HALF_A_TURN = 3.14;
-constexpr double SHORTEST_STEP = 1.0e-6;      // of the regular one: below, something else is wrong
+constexpr double SHORTEST_STEP = 1.0e-6;    // of the regular one: below, something else is wrong
 constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
 constexpr double COINCIDENT = 1.0e-10;          // of the sum of radii: no normal can be computed
 constexpr double EXPECTED_IN_EPS = 1.0e-7;      // how well the predicted motion must be met ...
@@ -101,12 +101,10 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     relinearised_(false), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
     pushed_before_(false), left_overlap_(EXTREME), unexpected_overlap_(0.0), state_(nullptr),
     largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
-    strayed_(0.0), own_width_{EXTREME, EXTREME, EXTREME},
-    regular_timestep_(0.0), setting_timestep_(false), expecting_(false), goes_on_(false),
-    ended_pushing_(false),
-    kick_(0.0), largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0),
-    max_contacts_(0), exchanging_(Exchange::VECTORS), exchanged_(nullptr),
-    exchanged_single_(nullptr)
+    strayed_(0.0), own_width_{EXTREME, EXTREME, EXTREME}, regular_timestep_(0.0),
+    setting_timestep_(false), expecting_(false), goes_on_(false), ended_pushing_(false), kick_(0.0),
+    largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
+    exchanging_(Exchange::VECTORS), exchanged_(nullptr), exchanged_single_(nullptr)
 {
   begin_summary();
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
@@ -282,10 +280,11 @@ void FixInelastic::init()
   const int walls_before = walls_->number_of_walls();
   walls_->init();
   if (walls_->number_of_walls() != walls_before)
-    error->all(FLERR,
-               "Fix inelastic: its regions have {} walls, and had {} when the fix was defined: define "
-               "fix {} again after its regions",
-               walls_->number_of_walls(), walls_before, id);
+    error->all(
+        FLERR,
+        "Fix inelastic: its regions have {} walls, and had {} when the fix was defined: define "
+        "fix {} again after its regions",
+        walls_->number_of_walls(), walls_before, id);
   walls_->warn();
   scene_.init({groupbit, frozen_bit_, rigid_ != nullptr});
   // With newton off LAMMPS makes its buffers for reverse communication as large as the pair style
@@ -311,10 +310,11 @@ void FixInelastic::init()
     error->all(FLERR, "Fix inelastic: an atom of group {} has no radius: set its diameter",
                group->names[igroup]);
   if (largest_radius_ > 0.0 && tolerance_ >= smallest_radius)
-    error->all(FLERR,
-               "Fix inelastic: the tolerance {:.4g}, the largest overlap allowed, must be below the "
-               "smallest radius of group {}, {:.4g}",
-               tolerance_, group->names[igroup], smallest_radius);
+    error->all(
+        FLERR,
+        "Fix inelastic: the tolerance {:.4g}, the largest overlap allowed, must be below the "
+        "smallest radius of group {}, {:.4g}",
+        tolerance_, group->names[igroup], smallest_radius);
   if (margin_ < 0.0 && largest_radius_ > 0.0) margin_ = FIRST_MARGIN * smallest_radius;
 
   // With equal radii the pair style's own list serves, and no second one is built.
@@ -368,8 +368,9 @@ void FixInelastic::post_neighbor()
   for (int d = 0; d < 3; ++d) {
     own_width_[d] = EXTREME;
     if (domain->periodicity[d] || comm->procgrid[d] > 1) {
-      const double part = domain->triclinic ? domain->subhi_lamda[d] - domain->sublo_lamda[d]
-                                            : (domain->subhi[d] - domain->sublo[d]) / domain->prd[d];
+      const double part = domain->triclinic
+          ? domain->subhi_lamda[d] - domain->sublo_lamda[d]
+          : (domain->subhi[d] - domain->sublo[d]) / domain->prd[d];
       own_width_[d] = part * domain->prd[d];
     }
   }
@@ -472,10 +473,11 @@ void FixInelastic::log_run() const
         rigid_ ? "turning bodies, or the curvature of walls," : "the curvature of walls",
         run_largest_excess_);
   if (run_pushed_ > 0)
-    utils::logmesg(lmp,
-                   "  {} steps began with overlaps of more than 2 tolerances, up to {:.6g}, and pushed "
-                   "them apart; in {} of them such an overlap had appeared that no step had left\n",
-                   run_pushed_, run_deepest_start_, run_unexpected_);
+    utils::logmesg(
+        lmp,
+        "  {} steps began with overlaps of more than 2 tolerances, up to {:.6g}, and pushed "
+        "them apart; in {} of them such an overlap had appeared that no step had left\n",
+        run_pushed_, run_deepest_start_, run_unexpected_);
   if (run_unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
                    run_unconverged_);
@@ -575,9 +577,9 @@ void FixInelastic::advance(int vflag, double kick_steps)
   restart_peratom = bad_overlap_ || pushed_before_;
   pushed_before_ = bad_overlap_;
   const bool certain = result.converged && result.complete && entangled_.empty();
-  left_overlap_ = certain ? REGULAR_OVERLAP * tolerance_ + (bad_overlap_ ? output_[OVERLAP] : 0.0) +
-          output_[EXCESS]
-                          : EXTREME;
+  left_overlap_ = certain
+      ? REGULAR_OVERLAP * tolerance_ + (bad_overlap_ ? output_[OVERLAP] : 0.0) + output_[EXCESS]
+      : EXTREME;
   restart_global = update->dt != regular_timestep_;
   remember_contacts();
 
@@ -634,7 +636,8 @@ void FixInelastic::check_continuation()
   std::string message;
   if (expecting_ && !goes_on_) {
     if (ended_pushing_)
-      message = "run pre no cannot go on from a step that was pushing overlaps apart: leave out pre no";
+      message =
+          "run pre no cannot go on from a step that was pushing overlaps apart: leave out pre no";
     goes_on_ = true;
   }
   if (expecting_ && message.empty()) message = scene_.change_of_box();
@@ -793,9 +796,8 @@ void FixInelastic::note_overlap(double gap, int i, tagint partner)
   bad_overlap_ = true;
   if (-gap <= std::max(left_overlap_, unexpected_overlap_)) return;
   unexpected_overlap_ = -gap;
-  unexpected_ = partner < 0
-      ? fmt::format("atom {} overlaps wall {}", atom->tag[i], -partner)
-      : fmt::format("atoms {} and {} overlap", atom->tag[i], partner);
+  unexpected_ = partner < 0 ? fmt::format("atom {} overlaps wall {}", atom->tag[i], -partner)
+                            : fmt::format("atoms {} and {} overlap", atom->tag[i], partner);
 }
 
 // Collective. Once a run; the summary counts the steps.
@@ -809,12 +811,13 @@ void FixInelastic::warn_of_unexpected_overlap()
   MPI_Allreduce(&mine, &deepest, 1, MPI_DOUBLE_INT, MPI_MAXLOC, world);
   const std::string who = said_by(deepest.rank, unexpected_);
   if (comm->me == 0)
-    error->warning(FLERR,
-                   "Fix inelastic: step {}: {} by {:.4g} ({:.3g} tolerances), which no earlier step has "
-                   "left: something else has moved or changed the spheres, the box, a region or the "
-                   "group. Such overlaps are pushed apart without momentum; the summary counts the "
-                   "steps",
-                   update->ntimestep, who, deepest.depth, deepest.depth / tolerance_);
+    error->warning(
+        FLERR,
+        "Fix inelastic: step {}: {} by {:.4g} ({:.3g} tolerances), which no earlier step has "
+        "left: something else has moved or changed the spheres, the box, a region or the "
+        "group. Such overlaps are pushed apart without momentum; the summary counts the "
+        "steps",
+        update->ntimestep, who, deepest.depth, deepest.depth / tolerance_);
 }
 
 // Looks at the walls from where atoms are, as far as the step takes them.
@@ -848,8 +851,7 @@ FixInelastic::looks_at_end(const std::vector<double> &velocity)
     if (problem_.inverse_mass[i] == 0.0 || (walls_->exact() && !is_member(i))) continue;
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
-    const double reach =
-        followed.count(i) ? EXTREME : atom->radius[i] + (rigid_ ? margin_ : 0.0);
+    const double reach = followed.count(i) ? EXTREME : atom->radius[i] + (rigid_ ? margin_ : 0.0);
     if (reach + h * norm(v) < clear_of_walls_[i]) continue;
     looks_.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
   }
@@ -1310,8 +1312,9 @@ void FixInelastic::check_expected()
     if (!(atom->mask[i] & groupbit)) continue;
     const double *const state = state_[i];
     if (state[EXPECTED_RADIUS] == OUTSIDE) {
-      message = fmt::format("atom {} has joined group {} during the run: change groups between runs",
-                            atom->tag[i], group->names[igroup]);
+      message =
+          fmt::format("atom {} has joined group {} during the run: change groups between runs",
+                      atom->tag[i], group->names[igroup]);
       break;
     }
     if (atom->radius[i] != state[EXPECTED_RADIUS]) {
@@ -1357,9 +1360,10 @@ void FixInelastic::check_expected()
     std::string unfrozen;
     for (const Fix *fix : modify->get_fix_by_style("^move$"))
       if (atom->mask[i] & fix->groupbit)
-        unfrozen = fmt::format("atom {} is moved by fix {} (move) and is not frozen: name its group "
-                               "with the keyword frozen",
-                               atom->tag[i], fix->id);
+        unfrozen =
+            fmt::format("atom {} is moved by fix {} (move) and is not frozen: name its group "
+                        "with the keyword frozen",
+                        atom->tag[i], fix->id);
     if (!unfrozen.empty()) {
       message = unfrozen;
       break;
@@ -1991,26 +1995,28 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
                           "force of {:.4g}, where {:.4g} is allowed{}",
                           update->ntimestep, result.iterations, result.residual.feasibility,
                           result.residual.complementarity, tolerance_, named);
-    const std::string help =
-        fmt::format("raise maxiter ({}), raise the tolerance, or lower the timestep",
-                    max_iterations_);
+    const std::string help = fmt::format(
+        "raise maxiter ({}), raise the tolerance, or lower the timestep", max_iterations_);
     double before = result.trend.earlier();
     const double now = result.trend.least();
     // Of constraints that were found after the last iteration it knows nothing.
-    if (result.residual.feasibility > UNSEEN * now) before = std::numeric_limits<double>::infinity();
+    if (result.residual.feasibility > UNSEEN * now)
+      before = std::numeric_limits<double>::infinity();
     if (tolerance_ < NEAR_ROUND_OFF * result.round_off)
-      cause = fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
-                          NEAR_ROUND_OFF * result.round_off);
+      cause =
+          fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
+                      NEAR_ROUND_OFF * result.round_off);
     else if (now < STILL_FALLS * before && std::isfinite(before))
       cause = fmt::format("There is room as far as one can tell: the residual is still coming down "
                           "(from {:.3g} to {:.3g} lately): {}",
                           before, now, help);
     else if (std::isfinite(before))
-      cause = fmt::format("The residual no longer comes down (from {:.3g} to {:.3g} lately): the scene "
-                          "leaves no room for the spheres, or needs far more iterations: {}",
-                          before, now, help);
+      cause =
+          fmt::format("The residual no longer comes down (from {:.3g} to {:.3g} lately): the scene "
+                      "leaves no room for the spheres, or needs far more iterations: {}",
+                      before, now, help);
     else
-      cause = fmt::format("These were too few to tell whether there is room: {}", help);
+      cause = fmt::format("It cannot be told from these whether there is room: {}", help);
   }
   if (!warn_only_) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);

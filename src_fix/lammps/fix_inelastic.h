@@ -124,7 +124,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   enum class Phase { CONTACT, PUSH };
   Phase phase_;
   bool bad_overlap_;
-  bool pushed_before_;                             // in the step before
+  bool pushed_before_;    // in the step before
   // The largest overlap that the last step may have left behind; infinite where one may have left any.
   double left_overlap_;
   double unexpected_overlap_;    // the largest that no step has left, at the start of this one
@@ -158,9 +158,9 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   bool setting_timestep_;      // the fix itself is changing it
   bool expecting_;             // state_ holds a prediction to compare with
   bool goes_on_;               // between setup and the end of the run
-  bool ended_pushing_;         // what the end of the last run took out of velocities is missing there
-  double kick_;                // time for which the force acts before the next move
-  double largest_kick_;        // [velocity] that one of the last contacts gave, on any rank
+  bool ended_pushing_;     // what the end of the last run took out of velocities is missing there
+  double kick_;            // time for which the force acts before the next move
+  double largest_kick_;    // [velocity] that one of the last contacts gave, on any rank
 
   // Output
   enum Output {

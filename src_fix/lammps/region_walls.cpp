@@ -54,8 +54,8 @@ void RegionWalls::init()
         strcmp(region->style, "prism") == 0;
     // The distance to a convex obstacle (side out) is a convex function, like the one to a flat
     // wall. Motion changes nothing: walls are taken where they stand at the end of the step.
-    const bool convex_obstacle = !region->interior && !region->openflag &&
-        strcmp(region->style, "intersect") != 0;
+    const bool convex_obstacle =
+        !region->interior && !region->openflag && strcmp(region->style, "intersect") != 0;
     const bool exact = (flat && !region->openflag) || convex_obstacle;
     if (strcmp(region->style, "ellipsoid") == 0)
       error->all(FLERR,
@@ -65,10 +65,11 @@ void RegionWalls::init()
                  id);
     // LAMMPS keeps those surface points of a part that lie in the other parts, and drops all others.
     if (strcmp(region->style, "union") == 0 && !region->interior)
-      error->all(FLERR,
-                 "Fix inelastic: region {} is a union with side out, of whose parts LAMMPS does not show "
-                 "the walls: list the parts instead, each with side out",
-                 id);
+      error->all(
+          FLERR,
+          "Fix inelastic: region {} is a union with side out, of whose parts LAMMPS does not show "
+          "the walls: list the parts instead, each with side out",
+          id);
     // Cones can also be parts of these.
     const bool joined = strcmp(region->style, "union") == 0 ||
         strcmp(region->style, "intersect") == 0;

@@ -301,10 +301,11 @@ std::string RigidMotion::explained(const std::string &message, inelastic::Host &
   for (const MoleculeSizes::Molecule &molecule : molecules_.all())
     expected += static_cast<double>(molecule.spheres);
   if (message.empty() || sums[1] >= expected) return message;
-  return fmt::format("{:.0f} of the {:.0f} spheres of bodies are lost, because they left the box or were "
-                     "deleted: walls must keep bodies inside of the box, and whole bodies alone may be "
-                     "deleted, between runs",
-                     expected - sums[1], expected);
+  return fmt::format(
+      "{:.0f} of the {:.0f} spheres of bodies are lost, because they left the box or were "
+      "deleted: walls must keep bodies inside of the box, and whole bodies alone may be "
+      "deleted, between runs",
+      expected - sums[1], expected);
 }
 
 // A sphere of another rank that touches one of this rank's brings its whole body with it.
@@ -692,10 +693,11 @@ std::string RigidMotion::disagreement(const inelastic::ContactProblem &problem)
     const double extent = std::sqrt(trace(body.point_inertia) / body.mass);
     const double rounded = std::numeric_limits<double>::epsilon() * norm(atom->x[i]);
     if (inertia_ == Inertia::POINT && extent < RESOLVED_ARM * rounded) {
-      message = fmt::format("the spheres of molecule {} are about {:.2g} apart, too near to one another "
-                            "for point masses at coordinates that are rounded by {:.1g}: at least {:.1g} "
-                            "is needed, or rigid {} solid, or one sphere in their place",
-                            molecule, extent, rounded, RESOLVED_ARM * rounded, fix_id_);
+      message =
+          fmt::format("the spheres of molecule {} are about {:.2g} apart, too near to one another "
+                      "for point masses at coordinates that are rounded by {:.1g}: at least {:.1g} "
+                      "is needed, or rigid {} solid, or one sphere in their place",
+                      molecule, extent, rounded, RESOLVED_ARM * rounded, fix_id_);
       continue;
     }
     const double *const moments = found + 2;

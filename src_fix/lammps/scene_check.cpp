@@ -26,15 +26,17 @@ void SceneCheck::init(const Group &group) const
 {
   // LAMMPS accepts neigh_modify include and comm_modify group for the group of atom_modify first alone.
   if (neighbor->includegroup)
-    error->all(FLERR,
-               "Fix inelastic does not work with neigh_modify include {}, which keeps pairs of other "
-               "spheres out of the neighbour list: leave it out",
-               this->group->names[neighbor->includegroup]);
+    error->all(
+        FLERR,
+        "Fix inelastic does not work with neigh_modify include {}, which keeps pairs of other "
+        "spheres out of the neighbour list: leave it out",
+        this->group->names[neighbor->includegroup]);
   if (atom->firstgroupname)
-    error->all(FLERR,
-               "Fix inelastic does not work with atom_modify first {}, nor with comm_modify group and "
-               "neigh_modify include, which need it and hide spheres: leave it out",
-               atom->firstgroupname);
+    error->all(
+        FLERR,
+        "Fix inelastic does not work with atom_modify first {}, nor with comm_modify group and "
+        "neigh_modify include, which need it and hide spheres: leave it out",
+        atom->firstgroupname);
   for (const Fix *fix : modify->get_fix_list()) {
     if (changes_periods(fix))
       error->all(FLERR,
@@ -42,10 +44,11 @@ void SceneCheck::init(const Group &group) const
                  "follow it: use many short runs with change_box between them, or walls that move",
                  fix->id, fix->style);
     if (fix->diam_flag && fix->nevery > 0)
-      error->all(FLERR,
-                 "Fix inelastic: fix {} ({}) changes diameters during a run, and the contacts do not "
-                 "follow them: use many short runs and change the diameters between them (adapt 0)",
-                 fix->id, fix->style);
+      error->all(
+          FLERR,
+          "Fix inelastic: fix {} ({}) changes diameters during a run, and the contacts do not "
+          "follow them: use many short runs and change the diameters between them (adapt 0)",
+          fix->id, fix->style);
   }
   warn_of_hidden_pairs(group);
 }
@@ -92,19 +95,32 @@ void SceneCheck::warn_of_hidden_pairs(const Group &group) const
   };
   for (int k = 0; k < neighbor->nex_group; ++k) {
     const int one = neighbor->ex1_group[k], other = neighbor->ex2_group[k];
-    if (hides([&](int i) { return in_group(i, one); }, [&](int i) { return in_group(i, other); }))
+    if (hides(
+            [&](int i) {
+              return in_group(i, one);
+            },
+            [&](int i) {
+              return in_group(i, other);
+            }))
       warn(fmt::format("neigh_modify exclude group {} {}", this->group->names[one],
                        this->group->names[other]));
   }
   for (int k = 0; k < neighbor->nex_type; ++k)
-    if (hides([&](int i) { return atom->type[i] == neighbor->ex1_type[k]; },
-              [&](int i) { return atom->type[i] == neighbor->ex2_type[k]; }))
+    if (hides(
+            [&](int i) {
+              return atom->type[i] == neighbor->ex1_type[k];
+            },
+            [&](int i) {
+              return atom->type[i] == neighbor->ex2_type[k];
+            }))
       warn(fmt::format("neigh_modify exclude type {} {}", neighbor->ex1_type[k],
                        neighbor->ex2_type[k]));
   for (int k = 0; k < neighbor->nex_mol; ++k) {
     // The spheres of one body are kept apart anyway; free spheres are looked at with the bodies.
     if (neighbor->ex_mol_intra[k] && group.bodies) continue;
-    auto chosen = [&](int i) { return in_group(i, neighbor->ex_mol_group[k]); };
+    auto chosen = [&](int i) {
+      return in_group(i, neighbor->ex_mol_group[k]);
+    };
     if (hides(chosen, chosen))
       warn(fmt::format("neigh_modify exclude molecule/{} {}",
                        neighbor->ex_mol_intra[k] ? "intra" : "inter",
@@ -133,7 +149,8 @@ void SceneCheck::remember_box()
 std::string SceneCheck::change_of_box() const
 {
   if (box() == box_at_start_) return "";
-  return "the periodic box has changed during the run, and the contacts do not follow it: change it "
+  return "the periodic box has changed during the run, and the contacts do not follow it: change "
+         "it "
          "between runs (change_box)";
 }
 
