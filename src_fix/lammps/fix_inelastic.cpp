@@ -367,7 +367,7 @@ void FixInelastic::post_neighbor()
   // A motion that all share costs no reach, but takes atoms away from their rank and their box.
   for (int d = 0; d < 3; ++d) {
     own_width_[d] = EXTREME;
-    if (domain->periodicity[d] || comm->procgrid[d] > 1) {
+    if (domain->periodicity[d] || comm->nprocs > 1) {
       const double part = domain->triclinic
           ? domain->subhi_lamda[d] - domain->sublo_lamda[d]
           : (domain->subhi[d] - domain->sublo[d]) / domain->prd[d];
@@ -512,9 +512,10 @@ void FixInelastic::advance(int vflag, double kick_steps)
 {
   const PhaseClock::Within within(clock_, PhaseClock::CHECK);
   v_init(vflag);
-  check_continuation();
   restore_timestep();
-  check_finite(kick_steps);
+  // Together, and before a time step is shortened for what is no number.
+  const std::string broken = break_in_run();
+  fail_together(broken.empty() ? not_finite(kick_steps) : broken);
   if (expecting_) check_expected();
 
   spread_at_start_ = spread_since_build(nullptr);
@@ -609,11 +610,10 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   return result;
 }
 
-// A time step is shortened and a motion bounded by numbers alone: nothing else must come before this.
-void FixInelastic::check_finite(double kick_steps)
+// Names a force or velocity of this rank that is no number; empty if there is none.
+std::string FixInelastic::not_finite(double kick_steps) const
 {
-  std::string message;
-  for (int i = 0; i < atom->nlocal && message.empty(); ++i) {
+  for (int i = 0; i < atom->nlocal; ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
     const bool moves = !(atom->mask[i] & frozen_bit_);
     const double kick = moves ? kick_steps * update->dt * force->ftm2v / mass(i) : 0.0;
@@ -621,27 +621,24 @@ void FixInelastic::check_finite(double kick_steps)
     const double *const f = atom->f[i];
     const double after[3] = {v[0] + kick * f[0], v[1] + kick * f[1], v[2] + kick * f[2]};
     if (std::isfinite(norm(v)) && std::isfinite(norm(after))) continue;
-    message = !std::isfinite(norm(v))
+    return !std::isfinite(norm(v))
         ? fmt::format("the velocity of atom {} is not a finite number", atom->tag[i])
         : fmt::format("the force on atom {} is not a finite number, or too large to be one",
                       atom->tag[i]);
   }
-  fail_together(message);
+  return "";
 }
 
 // Without a setup the next step follows from the last one's forces: what the end of the run has taken
-// out of the velocities, or somebody has changed since, is missing.
-void FixInelastic::check_continuation()
+// out of the velocities, or somebody has changed since, is missing. Empty if nothing is.
+std::string FixInelastic::break_in_run()
 {
-  std::string message;
-  if (expecting_ && !goes_on_) {
-    if (ended_pushing_)
-      message =
-          "run pre no cannot go on from a step that was pushing overlaps apart: leave out pre no";
-    goes_on_ = true;
-  }
-  if (expecting_ && message.empty()) message = scene_.change_of_box();
-  fail_together(message);
+  if (!expecting_) return "";
+  const bool went_on = goes_on_;
+  goes_on_ = true;
+  if (!went_on && ended_pushing_)
+    return "run pre no cannot go on from a step that was pushing overlaps apart: leave out pre no";
+  return scene_.change_of_box();
 }
 
 // Every other fix and force has done its work: the velocities that the step would end with.

@@ -218,8 +218,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
 
   // One step
   void advance(int vflag, double kick_steps);
-  void check_continuation();
-  void check_finite(double kick_steps);
+  std::string break_in_run();
+  std::string not_finite(double kick_steps) const;
   void check_expected();
   void check_volume();
   void predict(double kick_steps);
