@@ -776,6 +776,9 @@ class _Draw:
             self.note("warn")
         group = "grains" if self.outside else "all"
         self.random.shuffle(words)
+        if not self.warn:
+            # A step that needs more ends the run, with a line that is allowed; no scene takes minutes.
+            words.append("maxiter 20000")
         return f"fix contact {group} inelastic ${{eps}} {' '.join(words)}"
 
     def rigid(self) -> tuple[list[str], list[str]]:
