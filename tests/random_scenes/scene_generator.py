@@ -777,7 +777,7 @@ class _Draw:
         group = "grains" if self.outside else "all"
         self.random.shuffle(words)
         if not self.warn:
-            # A step that needs more ends the run, with a line that is allowed; no scene takes minutes.
+            # A step that needs more ends the run, with a line that is allowed, within the minute.
             words.append("maxiter 20000")
         return f"fix contact {group} inelastic ${{eps}} {' '.join(words)}"
 
