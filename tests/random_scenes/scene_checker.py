@@ -867,7 +867,8 @@ class _Part:
             return
         listed = last.listed
         slack = 100 * ROUND_OFF * self.lengths(new)
-        for row in np.flatnonzero(~last.plain & (last.ends > self.eps * (1 + 1e-9) + slack)):
+        # A gap that was lowered by less than 1.1 EPS is not worth raising, beside the residual's EPS.
+        for row in np.flatnonzero(~last.plain & (last.ends > 2.1 * self.eps * (1 + 1e-9) + slack)):
             i, j, wall = listed["i"][row], listed["j"][row], int(listed["wall"][row])
             if listed["pair"][row]:
                 end = float(np.linalg.norm(self.apart(new, i, j)))
