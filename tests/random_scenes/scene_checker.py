@@ -867,7 +867,7 @@ class _Part:
             return
         listed = last.listed
         slack = 100 * ROUND_OFF * self.lengths(new)
-        # A gap that was lowered by less than 1.1 EPS is not worth raising, beside the residual's EPS.
+        # Beside the residual's EPS: a lowering of less than 1.1 EPS is not worth raising again.
         for row in np.flatnonzero(~last.plain & (last.ends > 2.1 * self.eps * (1 + 1e-9) + slack)):
             i, j, wall = listed["i"][row], listed["j"][row], int(listed["wall"][row])
             if listed["pair"][row]:
