@@ -1967,6 +1967,16 @@ void FixInelastic::note_worst(const inelastic::ProjectionResult &result)
   worst_ = said_by(worst.rank, worst_);
 }
 
+// Collective: by which a body turns in the step [radians].
+double FixInelastic::largest_angle()
+{
+  double angle = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (is_member(i)) angle = std::max(angle, rigid_->angle_turned(problem_, i));
+  reduce(nullptr, 0, &angle, 1);
+  return angle;
+}
+
 void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool no_room)
 {
   // Up to here a residual can come down, but need not.
@@ -1974,6 +1984,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
   // In half of the iterations or more; without room it stays, and otherwise falls by half or faster.
   constexpr double STILL_FALLS = 0.7;
   constexpr double UNSEEN = 100.0;
+  constexpr double LONG_ARC = 1.0;    // [radians]
   ++run_unconverged_;
   const std::string named = worst_.empty() ? "" : ": " + worst_;    // numbers may not be finite
   std::string message, cause;
@@ -2015,6 +2026,11 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
     else
       cause = fmt::format("It cannot be told from these whether there is room: {}", help);
   }
+  // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
+  const double angle = rigid_ && relinearised_ ? largest_angle() : 0.0;
+  if (angle > LONG_ARC)
+    cause = fmt::format("Bodies turn by up to {:.3g} radians in this step: lower the timestep{}",
+                        angle, shorten_ ? "" : ", or use shorten yes");
   if (!warn_only_) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
 }

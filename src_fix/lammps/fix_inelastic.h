@@ -279,6 +279,7 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   void tally_virial(int i, int j, const double *virial);
   void share_virial();
   void note_worst(const inelastic::ProjectionResult &);
+  double largest_angle();
   void unconverged(const inelastic::ProjectionResult &, bool no_room);
   void fail_together(const std::string &message);
   std::string said_by(int rank, std::string text) const;

@@ -14,6 +14,7 @@ from bodies import (
     BENT,
     DUMP_BODY_SPHERES,
     INERTIAS,
+    ROD,
     Bodies,
     body_scene,
     dimer,
@@ -241,6 +242,32 @@ def test_point_masses_too_near_one_another(
     error = refused(text + "run 20\n")
     assert "the spheres of molecule 1 are about" in error, error
     assert "too near to one another for point masses" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_bodies_that_turn_too_far_in_a_step(ranks: int, tmp_path: Path, refused: Refused) -> None:
+    """Not the room is missing: ends of long arcs contradict one another."""
+    centres = ((0.1, 0.47), (0.1, 0.9), (0.1, 0.47))
+    rods = random_bodies([ROD] * 12, RADIUS, centres, seed=2)
+    speeds = np.random.default_rng(3).normal(0, 100, (12, 3))
+    velocities, spins = rigid_velocities(rods, RADIUS, [0, 0, 0], speeds)
+    text = body_scene(
+        rods,
+        RADIUS,
+        tmp_path,
+        inertia="solid",
+        tolerance=EPS,
+        box=BOX,
+        timestep=0.05,
+        skin=8,
+        options="region container maxiter 100",
+        velocities=velocities,
+        spins=spins,
+    )
+    error = refused(text + "run 5\n", ranks=ranks)
+    found = re.search(r"Bodies turn by up to ([\d.e+]+) radians in this step: lower the t", error)
+    assert found is not None, error
+    assert float(found[1]) > 1
 
 
 def test_an_infile_with_other_values(tmp_path: Path, refused: Refused) -> None:

@@ -95,6 +95,9 @@ def _may_be_slow(facts: Facts) -> bool:
 # A message of the fix, and the scenes in which it is the right answer.
 REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
     (r"further than the neighbour list reaches", lambda facts: not facts["shorten"]),
+    (r"Bodies turn by up to .* radians in this step", lambda facts: not facts["shorten"]),
+    # Fewer iterations are allowed here than by default.
+    (r"the residual is still coming down", lambda facts: True),
     (r"the scene leaves no room for the spheres: they have a volume", lambda facts: False),
     (
         r"no velocities keep the surfaces apart",
