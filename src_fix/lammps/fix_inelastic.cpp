@@ -2015,7 +2015,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
           fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
                       NEAR_ROUND_OFF * result.round_off);
     else if (now < STILL_FALLS * before && std::isfinite(before))
-      cause = fmt::format("There is room as far as one can tell: the residual is still coming down "
+      cause = fmt::format("The residual is still coming down, as it does where there is room "
                           "(from {:.3g} to {:.3g} lately): {}",
                           before, now, help);
     else if (std::isfinite(before))
@@ -2024,7 +2024,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
                       "leaves no room for the spheres, or needs far more iterations: {}",
                       before, now, help);
     else
-      cause = fmt::format("It cannot be told from these whether there is room: {}", help);
+      cause = fmt::format("Either the scene leaves no room for the spheres, or: {}", help);
   }
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
   const double angle = rigid_ && relinearised_ ? largest_angle() : 0.0;
