@@ -1967,12 +1967,12 @@ void FixInelastic::note_worst(const inelastic::ProjectionResult &result)
   worst_ = said_by(worst.rank, worst_);
 }
 
-// Collective: by which a body turns in the step [radians].
+// Collective: by which a body would turn in the step without contacts [radians].
 double FixInelastic::largest_angle()
 {
   double angle = 0.0;
   for (int i = 0; i < atom->nlocal; ++i)
-    if (is_member(i)) angle = std::max(angle, rigid_->angle_turned(problem_, i));
+    if (is_member(i)) angle = std::max(angle, rigid_->angle_predicted(problem_, i));
   reduce(nullptr, 0, &angle, 1);
   return angle;
 }
@@ -2029,7 +2029,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
   const double angle = rigid_ && relinearised_ ? largest_angle() : 0.0;
   if (angle > LONG_ARC)
-    cause = fmt::format("Bodies turn by up to {:.3g} radians in this step: lower the timestep{}",
+    cause = fmt::format("Bodies spin by up to {:.3g} radians in this step: lower the timestep{}",
                         angle, shorten_ ? "" : ", or use shorten yes");
   if (!warn_only_) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);

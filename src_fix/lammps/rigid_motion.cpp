@@ -523,6 +523,14 @@ void RigidMotion::turn(const inelastic::ContactProblem &problem,
 double RigidMotion::angle_turned(const inelastic::ContactProblem &problem, int i) const
 { return problem.timestep * norm(bodies_[problem.bodies.body[i]].angular_velocity_end); }
 
+double RigidMotion::angle_predicted(const inelastic::ContactProblem &problem, int i) const
+{
+  const int b = problem.bodies.body[i];
+  double spin[3];
+  multiply(&problem.bodies.inverse_inertia[6 * b], bodies_[b].angular_momentum, spin);
+  return problem.timestep * norm(spin);
+}
+
 void RigidMotion::velocity_after(const inelastic::ContactProblem &problem, int i,
                                  double *velocity) const
 {

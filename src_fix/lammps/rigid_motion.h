@@ -75,6 +75,8 @@ class RigidMotion : protected Pointers {
 
   // By how much the step of the last turn() turns the body of a member [radians].
   double angle_turned(const inelastic::ContactProblem &problem, int i) const;
+  // The same without the contacts, after predict().
+  double angle_predicted(const inelastic::ContactProblem &problem, int i) const;
 
   // Velocity of a member after the step of the last turn().
   void velocity_after(const inelastic::ContactProblem &problem, int i, double *velocity) const;

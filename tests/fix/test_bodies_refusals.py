@@ -265,7 +265,7 @@ def test_bodies_that_turn_too_far_in_a_step(ranks: int, tmp_path: Path, refused:
         spins=spins,
     )
     error = refused(text + "run 5\n", ranks=ranks)
-    found = re.search(r"Bodies turn by up to ([\d.e+]+) radians in this step: lower the t", error)
+    found = re.search(r"Bodies spin by up to ([\d.e+]+) radians in this step: lower the t", error)
     assert found is not None, error
     assert float(found[1]) > 1
 

@@ -413,7 +413,7 @@ def column(folder: Path, maxiter: int, lid: float) -> str:
 @pytest.mark.parametrize(
     ("maxiter", "lid", "words"),
     [
-        (300, 1, "the residual is still coming down"),
+        (300, 1, "The residual is still coming down"),
         (400, -0.02, "leaves no room"),
         (2, 1, "Either the scene leaves no room for the spheres, or"),
     ],

@@ -95,9 +95,9 @@ def _may_be_slow(facts: Facts) -> bool:
 # A message of the fix, and the scenes in which it is the right answer.
 REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
     (r"further than the neighbour list reaches", lambda facts: not facts["shorten"]),
-    (r"Bodies turn by up to .* radians in this step", lambda facts: not facts["shorten"]),
+    (r"Bodies spin by up to .* radians in this step", lambda facts: not facts["shorten"]),
     # Fewer iterations are allowed here than by default.
-    (r"the residual is still coming down", lambda facts: True),
+    (r"The residual is still coming down", lambda facts: True),
     (r"the scene leaves no room for the spheres: they have a volume", lambda facts: False),
     (
         r"no velocities keep the surfaces apart",
@@ -107,7 +107,13 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
     (r"iterations left an overlap", _may_be_slow),
     (
         r"is on the wrong side of region",
-        lambda facts: facts["closing"] or "created" in facts["words"] or facts["bad_start"],
+        lambda facts: (
+            facts["closing"]
+            or "created" in facts["words"]
+            or facts["bad_start"]
+            # A step that was not solved may go anywhere.
+            or facts["warn"]
+        ),
     ),
     (r"run pre no cannot go on from a step that was pushing", lambda facts: facts["bad_start"]),
     (r"The tolerance is below the round-off of these forces", lambda facts: facts["spread"] > 4),
