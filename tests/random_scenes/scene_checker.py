@@ -206,6 +206,7 @@ class _Part:
         self.name = name
         self.eps = tolerance
         self.has_pushed = False
+        self.push_unknown = False
         self.shapes: list[Shape] = facts["shapes"]
         self.to_v = facts["acceleration_of_force"]
         self.curved = (
@@ -331,8 +332,8 @@ class _Part:
                     factor * self.eps + slack,
                     shape,
                 )
-        # The fix looks at curved walls from a point that is off an axis by 1e-12 of the distance.
-        looks = 2e-12 * self.facts["largest"] if self.shapes and self.curved else 0.0
+        # The fix looks at curved walls from a point that is 1e-12 off in each direction.
+        looks = 2e-12 * min(1.0, 10 * self.facts["largest"]) if self.curved else 0.0
         self.close("reported overlap", frame.thermo["f_contact[4]"], frame.deepest, slack + looks)
         self.report.seen["overlapping frames"] += int(frame.deepest > REGULAR * self.eps)
 
@@ -753,6 +754,8 @@ class _Part:
         kick = (0.5 * new.h if last is None else new.h) * self.to_v
         if last is None:
             kept_v, kept_l = new.bodies["vx vy vz"], new.bodies["angmomx angmomy angmomz"]
+            # A restart file of a step that pushes holds a part of the push in these velocities.
+            self.push_unknown = not settled and "restart within a run" in self.facts["words"]
         else:
             kept_v, kept_l = last.kept_v, last.kept_l
         kept_v, kept_l = kept_v.copy(), kept_l.copy()
@@ -763,7 +766,10 @@ class _Part:
             lengths[row] = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
         was_pushed = last is not None and not last.settled
         # The last step of a run takes the push out of the whole-step velocity, not out of this one.
-        if settled and not (was_pushed and new.final):
+        if settled and self.push_unknown:
+            self.push_unknown = False
+            kept_v, kept_l = new.body_v, new.body_l
+        elif settled and not (was_pushed and new.final):
             mass = new.bodies["mass"]
             speed = np.linalg.norm(new.body_v, axis=1) + np.linalg.norm(kept_v, axis=1)
             strong = kick * self.to_strength(new, acting) / mass
