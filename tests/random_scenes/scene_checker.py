@@ -206,7 +206,7 @@ class _Part:
         self.name = name
         self.eps = tolerance
         self.has_pushed = False
-        self.push_unknown = False
+        self.push_unknown = self.lines_unknown = False
         self.shapes: list[Shape] = facts["shapes"]
         self.to_v = facts["acceleration_of_force"]
         self.curved = (
@@ -756,6 +756,7 @@ class _Part:
             kept_v, kept_l = new.bodies["vx vy vz"], new.bodies["angmomx angmomy angmomz"]
             # A restart file of a step that pushes holds a part of the push in these velocities.
             self.push_unknown = not settled and "restart within a run" in self.facts["words"]
+            self.lines_unknown = self.push_unknown
         else:
             kept_v, kept_l = last.kept_v, last.kept_l
         kept_v, kept_l = kept_v.copy(), kept_l.copy()
@@ -784,7 +785,7 @@ class _Part:
                 allowed += 2 * self.eps / new.h
             for row, mine, arm in self.members(new):
                 in_line[row] = self.is_in_line(arm)
-                if not (was_pushed or in_line[row]):
+                if not (was_pushed or in_line[row]) or (in_line[row] and self.lines_unknown):
                     continue
                 left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
                 speeds = np.linalg.norm(np.cross(left, arm), axis=1)
