@@ -1303,7 +1303,7 @@ void FixInelastic::apply_forces(double kick_steps)
 // Compares what moved with what the last step predicted.
 void FixInelastic::check_expected()
 {
-  const double h = regular_timestep_;
+  const double h = problem_.timestep;    // of the step that is over, shortened or not
   std::string message;
   for (int i = 0; i < atom->nlocal && message.empty(); ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
