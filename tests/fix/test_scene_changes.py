@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bodies import body_scene, dimer, random_bodies, rigid_velocities
 from lammps_inelastic.analysis import iterate_contact_frames
 from lammps_run import Run, Runner
 from scenes import (
@@ -415,34 +414,6 @@ def test_restart_files_tell_the_regular_time_step(
     result = lmp(first + write + "clear\n" + again + "velocity all set 0 0 0\nrun 2\n")
     assert result.runs[0]["Dt"][-1] < 0.01
     assert (result.thermo["Dt"] == 0.01).all()
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_round_off_in_steps_that_are_shortened_a_lot(
-    seed: int, tmp_path: Path, lmp: Runner
-) -> None:
-    """Bodies move as predicted to the round-off of the step that they move in, not of a long one."""
-    random = np.random.default_rng(seed)
-    bodies = random_bodies([dimer(1.3)] * 8, 2.0, ((150, 190),) * 3, seed=seed)
-    velocities, spins = rigid_velocities(
-        bodies, 2.0, random.normal(0, 4, (8, 3)), random.normal(0, 3, (8, 3))
-    )
-    text = body_scene(
-        bodies,
-        2.0,
-        tmp_path,
-        inertia="point",
-        tolerance=1e-7,
-        box=((100, 240),) * 3,
-        gravity=False,
-        timestep=100.0,
-        skin=4.0,
-        options="region container shorten yes",
-        velocities=velocities,
-        spins=spins,
-    )
-    result = lmp(text + "run 40\n")
-    assert result.thermo["f_contact[10]"][-1] > 30
 
 
 def test_run_pre_no_in_a_bad_start(tmp_path: Path, refused: Refused) -> None:
