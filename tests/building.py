@@ -40,3 +40,39 @@ def run(*command: str) -> None:
     )
     if done.returncode:
         pytest.fail(f"{' '.join(command)}\n{done.stdout}", pytrace=False)
+
+
+def sanitized_plugin(build: Path) -> Path:
+    """Build the plugin with both sanitizers in a folder; return the folder that holds it."""
+    run(
+        *cmake(),
+        *("-S", str(REPOSITORY), "-B", str(build)),
+        *generator(),
+        "-DINELASTIC_PYTHON=OFF",
+        "-DINELASTIC_PLUGIN=ON",
+        "-DINELASTIC_SANITIZE=ON",
+        f"-DPython_EXECUTABLE={sys.executable}",
+        # To optimise more would take most of the time of the build.
+        *("-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1"),
+    )
+    run(*cmake(), "--build", str(build), "--target", "inelasticplugin")
+    (plugin,) = build.glob("src_fix/lammps/inelasticplugin.so")
+    return plugin.parent
+
+
+def sanitizer_libraries() -> str:
+    """Return the libraries to be loaded first, for LD_PRELOAD; LAMMPS itself was built without.
+
+    Raises FileNotFoundError with the name of one that the compiler does not have: others than GCC
+    link theirs into the program, and LAMMPS's program is not ours.
+    """
+    found = []
+    for name in ("libasan.so", "libubsan.so"):
+        said = subprocess.run(
+            ["c++", f"-print-file-name={name}"], capture_output=True, text=True, check=True
+        )
+        path = Path(said.stdout.strip())
+        if not path.is_absolute():
+            raise FileNotFoundError(f"the compiler has no {name} to be loaded first (GCC has)")
+        found.append(str(path.resolve()))
+    return " ".join(found)

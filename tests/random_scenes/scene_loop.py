@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 import traceback
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from building import REPOSITORY, cmake, generator, run
+from building import sanitized_plugin, sanitizer_libraries
 from lammps_run import without_launcher
 from scene_checker import Report, check
 from scene_generator import Scene, random_scene
@@ -67,28 +65,11 @@ def installed() -> Programs:
 
 def sanitized(build: Path) -> Programs:
     """LAMMPS with a plugin that is built with the address sanitizer, in a folder."""
-    run(
-        *cmake(),
-        *("-S", str(REPOSITORY), "-B", str(build)),
-        *generator(),
-        "-DINELASTIC_PYTHON=OFF",
-        "-DINELASTIC_PLUGIN=ON",
-        "-DINELASTIC_SANITIZE=ON",
-        f"-DPython_EXECUTABLE={sys.executable}",
-        *("-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1"),
-    )
-    run(*cmake(), "--build", str(build), "--target", "inelasticplugin")
-    (plugin,) = build.glob("src_fix/lammps/inelasticplugin.so")
-    libraries = []
-    for name in ("libasan.so", "libubsan.so"):
-        said = subprocess.run(
-            ["c++", f"-print-file-name={name}"], capture_output=True, text=True, check=True
-        )
-        libraries.append(str(Path(said.stdout.strip()).resolve()))
-    program, environment = without_launcher(plugin.parent)
+    plugin = sanitized_plugin(build)
+    program, environment = without_launcher(plugin)
     # Leaks are those of the scenes that LAMMPS ends with an error: test_memory.py looks for others.
     return Programs(
-        ["env", f"LD_PRELOAD={' '.join(libraries)}", program],
+        ["env", f"LD_PRELOAD={sanitizer_libraries()}", program],
         {**environment, "ASAN_OPTIONS": "detect_leaks=0"},
         4 * TIMEOUT,
     )

@@ -21,7 +21,7 @@ import test_continuation as of_spheres
 import test_determinism as moving
 import test_scene_changes as scene_changes
 from bodies import DUMP_BODIES
-from building import REPOSITORY, cmake, generator, run
+from building import sanitized_plugin, sanitizer_libraries
 from lammps_run import BIN, run_lmp, without_launcher
 from scenes import DUMP_CONTACTS, DUMP_FORCES, DUMP_PARTICLES
 from test_plugin import plugin_file
@@ -80,37 +80,17 @@ REFUSED = {
 @pytest.fixture(scope="module")
 def sanitized(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the plugin with both sanitizers; return its folder."""
-    build = tmp_path_factory.mktemp("build")
-    run(
-        *cmake(),
-        *("-S", str(REPOSITORY), "-B", str(build)),
-        *generator(),
-        "-DINELASTIC_PYTHON=OFF",
-        "-DINELASTIC_PLUGIN=ON",
-        "-DINELASTIC_SANITIZE=ON",
-        f"-DPython_EXECUTABLE={sys.executable}",
-        # To optimise more would take most of the time of the build.
-        *("-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1"),
-    )
-    run(*cmake(), "--build", str(build), "--target", "inelasticplugin")
-    (plugin,) = build.glob("src_fix/lammps/inelasticplugin.so")
-    return plugin.parent
+    return sanitized_plugin(tmp_path_factory.mktemp("build"))
 
 
 @pytest.fixture(scope="module")
 def preloaded() -> str:
     """The sanitizers' libraries of the compiler: LAMMPS itself was built without."""
-    found = []
-    for name in ("libasan.so", "libubsan.so"):
-        said = subprocess.run(
-            ["c++", f"-print-file-name={name}"], capture_output=True, text=True, check=True
-        )
-        path = Path(said.stdout.strip())
-        if not path.is_absolute():
-            # Other compilers link theirs into the program, and LAMMPS's program is not ours.
-            pytest.skip(f"the compiler has no {name} to be loaded first (GCC has)")
-        found.append(str(path.resolve()))
-    return " ".join(found)
+    try:
+        return sanitizer_libraries()
+    except FileNotFoundError as error:
+        # Other compilers link theirs into the program, and LAMMPS's program is not ours.
+        pytest.skip(str(error))
 
 
 def watched(plugin: Path, preloaded: str, *, leaks: bool) -> dict[str, object]:
