@@ -98,13 +98,14 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), tolerance_(0.0), solver_name_("apgd"), max_iterations_(100000),
     warn_only_(false), shorten_(false), frozen_bit_(0), record_every_(0), scene_(lmp),
     first_list_of_run_(false), list_(nullptr), looked_(false), margin_(-1.0), came_back_(false),
-    relinearised_(false), relinearisations_(0), phase_(Phase::CONTACT), bad_overlap_(false),
-    pushed_before_(false), left_overlap_(EXTREME), unexpected_overlap_(0.0), state_(nullptr),
-    largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0), spread_at_start_(0.0), growth_(0.0),
-    strayed_(0.0), own_width_{EXTREME, EXTREME, EXTREME}, regular_timestep_(0.0),
-    setting_timestep_(false), expecting_(false), goes_on_(false), ended_pushing_(false), kick_(0.0),
-    largest_kick_(0.0), output_{}, wall_force_step_(-1), max_atoms_(0), max_contacts_(0),
-    exchanging_(Exchange::VECTORS), exchanged_(nullptr), exchanged_single_(nullptr)
+    relinearised_(false), solved_relinearised_(false), relinearisations_(0), phase_(Phase::CONTACT),
+    bad_overlap_(false), pushed_before_(false), left_overlap_(EXTREME), unexpected_overlap_(0.0),
+    state_(nullptr), largest_radius_(0.0), one_cutoff_(true), list_reach_(0.0),
+    spread_at_start_(0.0), growth_(0.0), strayed_(0.0), own_width_{EXTREME, EXTREME, EXTREME},
+    regular_timestep_(0.0), setting_timestep_(false), expecting_(false), goes_on_(false),
+    ended_pushing_(false), kick_(0.0), largest_kick_(0.0), output_{}, wall_force_step_(-1),
+    max_atoms_(0), max_contacts_(0), exchanging_(Exchange::VECTORS), exchanged_(nullptr),
+    exchanged_single_(nullptr)
 {
   begin_summary();
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", error);
@@ -682,7 +683,7 @@ void FixInelastic::collect()
   unexpected_overlap_ = 0.0;
   output_[OVERLAP] = output_[EXCESS] = 0.0;
   relinearisations_ = 0;
-  came_back_ = relinearised_ = looked_ = false;
+  came_back_ = relinearised_ = solved_relinearised_ = looked_ = false;
   collect_pairs();
   if (!walls_->empty()) collect_walls();
 
@@ -896,6 +897,7 @@ long FixInelastic::refine(const std::vector<double> &velocity, inelastic::Contac
 {
   const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   message_.clear();
+  solved_relinearised_ = relinearised_;
   if (rigid_) rigid_->turn(problem_, velocity);
   long added = add_violated_pairs(velocity);
   if (!walls_->empty()) added += add_violated_walls(velocity);
@@ -1996,8 +1998,14 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
     message = fmt::format("step {}: no velocities keep the surfaces apart{}{}, where {:.4g} is "
                           "allowed",
                           update->ntimestep, shorter, named, tolerance_);
-    cause = "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
-            "are too many spheres";
+    // With the gaps of the present positions alone there were velocities.
+    const bool at_end_alone = solved_relinearised_ && !shorten_;
+    cause = at_end_alone
+        ? fmt::format("There are some for the gaps as they change at first, and none for those at "
+                      "the end of the step, until which {}: lower the timestep, or use shorten yes",
+                      rigid_ ? "bodies turn" : "walls curve")
+        : "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
+          "are too many spheres";
   } else {
     message = fmt::format("step {}: {} iterations left an overlap of {:.4g} and a gap under a "
                           "force of {:.4g}, where {:.4g} is allowed{}",

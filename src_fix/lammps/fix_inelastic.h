@@ -113,12 +113,13 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::vector<double> velocity_looked_at_, motion_looked_at_;    // ... with these
   std::vector<RegionWalls::Look> looks_;                         // room for them
   std::vector<double> clear_of_walls_;    // per local atom: in this step no wall is as near as this
-  double margin_;           // what comes closer than this is in the problem from the start
-  bool came_back_;          // for constraints that were not in the problem from the start
-  bool relinearised_;       // about the end of the step, any of them
-  int relinearisations_;    // in this step
-  std::string message_;     // what went wrong on this rank while collecting
-  std::string worst_;       // the constraint that is farthest from being met, after a failure
+  double margin_;               // what comes closer than this is in the problem from the start
+  bool came_back_;              // for constraints that were not in the problem from the start
+  bool relinearised_;           // about the end of the step, any of them ...
+  bool solved_relinearised_;    // ... before the last solve
+  int relinearisations_;        // in this step
+  std::string message_;         // what went wrong on this rank while collecting
+  std::string worst_;           // the constraint that is farthest from being met, after a failure
 
   // A bad start: overlaps beyond the regular ones are first treated as touching, then pushed apart.
   enum class Phase { CONTACT, PUSH };

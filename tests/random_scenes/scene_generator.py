@@ -32,6 +32,8 @@ UNITS = {
 }
 # Of a place for a sphere or a body.
 TRIALS = 100
+# A fifth of the default: where there is room most steps need far fewer.
+ITERATIONS = "maxiter 20000"
 FREE, FROZEN, OUTSIDE, CREATED = 1, 2, 3, 4
 CONTACTS = "id1 id2 x y z nx ny nz gap force"
 BODY_COLUMNS = "mol mass x y z vx vy vz angmomx angmomy angmomz"
@@ -778,7 +780,7 @@ class _Draw:
         self.random.shuffle(words)
         if not self.warn:
             # A step that needs more ends the run, with a line that is allowed, within the minute.
-            words.append("maxiter 20000")
+            words.append(ITERATIONS)
         return f"fix contact {group} inelastic ${{eps}} {' '.join(words)}"
 
     def rigid(self) -> tuple[list[str], list[str]]:

@@ -12,9 +12,11 @@ from pathlib import Path
 from building import sanitized_plugin, sanitizer_libraries
 from lammps_run import without_launcher
 from scene_checker import Report, check
-from scene_generator import Scene, random_scene
+from scene_generator import ITERATIONS, Scene, random_scene
 from scene_run import TIMEOUT, answer, finding
 from test_plugin import plugin_file
+
+MANY_ITERATIONS = "maxiter 1000000"
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,12 @@ def judge(
     scene.write(folder)
     processes = ranks or scene.ranks
     result = answer(folder, processes, programs.program, programs.environment, programs.timeout)
+    if finding(result, scene.facts) and any("iterations left" in text for text in result.errors):
+        # Some scenes need more iterations than others; where there is room, so many are enough.
+        deck = folder / "deck.in"
+        deck.write_text(deck.read_text().replace(ITERATIONS, MANY_ITERATIONS))
+        longer = 4 * programs.timeout
+        result = answer(folder, processes, programs.program, programs.environment, longer)
     problems = [text] if (text := finding(result, scene.facts)) else []
     report = Report()
     try:

@@ -100,6 +100,10 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
     (r"The residual is still coming down", lambda facts: True),
     (r"the scene leaves no room for the spheres: they have a volume", lambda facts: False),
     (
+        r"no velocities keep .* none for those at the end of the step",
+        lambda facts: facts["inertia"] or any(shape["inside"] for shape in facts["shapes"]),
+    ),
+    (
         r"no velocities keep the surfaces apart",
         lambda facts: facts["closing"] or facts["bad_start"],
     ),
@@ -115,7 +119,10 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
             or facts["warn"]
         ),
     ),
-    (r"run pre no cannot go on from a step that was pushing", lambda facts: facts["bad_start"]),
+    (
+        r"run pre no cannot go on from a step that was pushing",
+        lambda facts: facts["bad_start"] or facts["warn"],
+    ),
     (r"The tolerance is below the round-off of these forces", lambda facts: facts["spread"] > 4),
     # LAMMPS's own: all spheres together pass through a periodic box between two lists.
     (r"Lost atoms", lambda facts: facts["sweeps"]),
