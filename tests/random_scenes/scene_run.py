@@ -101,7 +101,7 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
     (r"the scene leaves no room for the spheres: they have a volume", lambda facts: False),
     (
         r"no velocities keep .* none for those at the end of the step",
-        lambda facts: facts["inertia"] or any(shape["inside"] for shape in facts["shapes"]),
+        lambda facts: not facts["shorten"],
     ),
     (
         r"no velocities keep the surfaces apart",
