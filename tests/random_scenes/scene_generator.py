@@ -478,6 +478,9 @@ class _Draw:
             ball["centre"] = list(middle + 0.2 * half * self.random.uniform(-1, 1, 3))
             other: Shape = {**ball, "centre": list(middle - 0.2 * half)}
             parts = [block, ball] if self.chance(0.5) else [ball, other]
+            if parts[0] is ball:
+                # LAMMPS's box holds both balls, which reach further than a flat box.
+                self.low, self.high = middle - 1.5 * half.max(), middle + 1.5 * half.max()
             if kind == "list":
                 for k, part in enumerate(parts):
                     self.single(f"part{k}", part, motion=False)
