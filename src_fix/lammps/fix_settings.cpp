@@ -1,0 +1,152 @@
+#include "fix_settings.h"
+
+#include "error.h"
+#include "group.h"
+#include "lammps.h"
+#include "utils.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+
+namespace {
+
+constexpr const char *KEYWORDS[] = {"region",  "rigid",  "solver", "maxiter",
+                                    "frozen", "record", "shorten"};
+
+bool is_keyword(const char *word)
+{
+  return std::any_of(std::begin(KEYWORDS), std::end(KEYWORDS), [word](const char *keyword) {
+    return strcmp(word, keyword) == 0;
+  });
+}
+
+// Reads the arguments one after the other. `at_` is the index of the next one.
+class Reader {
+ public:
+  Reader(LAMMPS *lmp, int narg, char **arg, Settings &settings) :
+      lmp_(lmp), error_(lmp->error), narg_(narg), arg_(arg), settings_(settings)
+  {
+  }
+
+  void read_keywords();
+
+ private:
+  void read_regions(const char *first);
+  void read_rigid(const char *fix_id);
+  void read_max_iterations(const char *value);
+  void read_frozen(const char *group_id);
+  void read_record(const char *file);
+
+  LAMMPS *lmp_;
+  Error *error_;
+  int narg_;
+  char **arg_;
+  int at_ = 4;
+  Settings &settings_;
+};
+
+void Reader::read_keywords()
+{
+  while (at_ < narg_) {
+    const std::string keyword = arg_[at_];
+    if (!is_keyword(arg_[at_]))
+      error_->all(FLERR, at_,
+                  "Unknown fix inelastic keyword {}: use region, rigid, solver, maxiter, frozen, "
+                  "record or shorten",
+                  keyword);
+    if (at_ + 2 > narg_) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error_);
+    const char *const value = arg_[at_ + 1];
+    at_ += 2;
+    if (keyword == "region")
+      read_regions(value);
+    else if (keyword == "rigid")
+      read_rigid(value);
+    else if (keyword == "solver")
+      settings_.solver = value;
+    else if (keyword == "maxiter")
+      read_max_iterations(value);
+    else if (keyword == "frozen")
+      read_frozen(value);
+    else if (keyword == "record")
+      read_record(value);
+    else
+      settings_.shorten = utils::logical(FLERR, value, false, lmp_) == 1;
+  }
+}
+
+void Reader::read_regions(const char *first)
+{
+  settings_.regions.emplace_back(first);
+  while (at_ < narg_ && !is_keyword(arg_[at_])) settings_.regions.emplace_back(arg_[at_++]);
+}
+
+void Reader::read_rigid(const char *fix_id)
+{
+  const std::string inertia = at_ < narg_ ? arg_[at_] : "nothing";
+  if (inertia != "point" && inertia != "solid")
+    error_->all(FLERR, at_ - 1,
+                "Fix inelastic needs rigid FIX-ID point or rigid FIX-ID solid (the mass of each "
+                "sphere in its centre, or a solid ball), not {}",
+                inertia);
+  ++at_;
+  settings_.rigid_fix = fix_id;
+  settings_.inertia = inertia == "point" ? Inertia::POINT : Inertia::SOLID;
+}
+
+void Reader::read_max_iterations(const char *value)
+{
+  settings_.max_iterations = utils::bnumeric(FLERR, value, false, lmp_);
+  if (settings_.max_iterations < 1)
+    error_->all(FLERR, at_ - 1, "Fix inelastic maxiter must be at least 1, not {}", value);
+  if (at_ < narg_ && strcmp(arg_[at_], "warn") == 0) {
+    settings_.warn_only = true;
+    ++at_;
+  }
+}
+
+void Reader::read_frozen(const char *group_id)
+{
+  const int frozen_group = lmp_->group->find(group_id);
+  if (frozen_group < 0)
+    error_->all(FLERR, at_ - 1, "Fix inelastic frozen group {} does not exist", group_id);
+  settings_.frozen_bit = lmp_->group->bitmask[frozen_group];
+}
+
+void Reader::read_record(const char *file)
+{
+  if (at_ + 2 > narg_ || strcmp(arg_[at_], "every") != 0)
+    error_->all(FLERR, at_ - 1, "Fix inelastic record needs: record FILE every N");
+  settings_.record_file = file;
+  settings_.record_every = utils::inumeric(FLERR, arg_[at_ + 1], false, lmp_);
+  if (settings_.record_every < 1)
+    error_->all(FLERR, at_ + 1, "Fix inelastic record every must be at least 1, not {}",
+                settings_.record_every);
+  if (settings_.record_file.find('*') == std::string::npos)
+    error_->all(FLERR, at_ - 1,
+                "Fix inelastic record file {} must contain a *, which becomes the step",
+                settings_.record_file);
+  at_ += 2;
+}
+
+}    // namespace
+
+double LAMMPS_NS::read_tolerance(LAMMPS *lmp, const char *text)
+{
+  const double tolerance = utils::numeric(FLERR, text, false, lmp);
+  if (!(tolerance > 0.0) || std::isinf(tolerance))
+    lmp->error->all(FLERR, "Fix inelastic tolerance must be a length greater than 0, not {}", text);
+  return tolerance;
+}
+
+Settings LAMMPS_NS::read_settings(LAMMPS *lmp, int narg, char **arg, int group_bit)
+{
+  if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", lmp->error);
+  Settings settings;
+  settings.group_bit = group_bit;
+  settings.tolerance = read_tolerance(lmp, arg[3]);
+  Reader(lmp, narg, arg, settings).read_keywords();
+  return settings;
+}

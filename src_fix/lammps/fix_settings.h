@@ -1,0 +1,51 @@
+// The keywords of fix inelastic, read once when the fix is defined.
+
+#ifndef INELASTIC_FIX_SETTINGS_H
+#define INELASTIC_FIX_SETTINGS_H
+
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class LAMMPS;
+
+// The mass of each sphere of a body: all of it in the centre, or that of a solid ball.
+enum class Inertia { POINT, SOLID };
+
+struct Settings {
+  // EPS, the largest overlap allowed [length]. Too small, it is below the round-off of positions; too
+  // large, slow contacts are not resolved.
+  double tolerance = 0.0;
+  // The name that make_solver() of the core knows.
+  std::string solver = "apgd";
+  // Iterations in one time step. Beyond, the run stops, or goes on with a warning.
+  long max_iterations = 100000;
+  bool warn_only = false;
+  // A step may be made shorter than `timestep` where the whole step leaves an overlap.
+  bool shorten = false;
+  // The group of the fix, and the group of spheres that nothing moves (0 = none).
+  int group_bit = 0;
+  int frozen_bit = 0;
+  // Regions whose surfaces are walls, in the order in which the walls are numbered.
+  std::vector<std::string> regions;
+  // The fix rigid/small whose bodies take part; empty in a scene of free spheres.
+  std::string rigid_fix;
+  Inertia inertia = Inertia::POINT;
+  // File name with a *, and the number of steps between two records (0 = no records).
+  std::string record_file;
+  int record_every = 0;
+
+  bool has_bodies() const { return !rigid_fix.empty(); }
+};
+
+// Reads `fix ID group inelastic EPS keyword value ...`. Errors: what LAMMPS cannot read, and values
+// that are not allowed.
+Settings read_settings(LAMMPS *lmp, int narg, char **arg, int group_bit);
+
+// Reads EPS [length]. Errors: anything but a finite number greater than 0.
+double read_tolerance(LAMMPS *lmp, const char *text);
+
+}    // namespace LAMMPS_NS
+
+#endif

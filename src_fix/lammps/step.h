@@ -1,0 +1,103 @@
+// One time step as all rooms of the fix know it: the contact problem, what stands on the other side of
+// each constraint, and where the step takes the particles.
+
+#ifndef INELASTIC_STEP_H
+#define INELASTIC_STEP_H
+
+#include "contact_problem.h"
+#include "fix_settings.h"
+#include "vector3.h"
+
+#include "atom.h"
+
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+// LAMMPS applies half a kick (the change of velocities by the forces) before the first move of a run,
+// and a whole one before every other move.
+enum class Kick { HALF, WHOLE };
+
+// A bad start, an overlap beyond the regular ones, counts as touching in the first phase, and is
+// pushed apart in a second one.
+enum class Phase { CONTACT, PUSH };
+
+// An overlap of up to this many tolerances is regular: a step may leave it behind. A larger one is a
+// bad start.
+constexpr double REGULAR_OVERLAP = 2.0;
+// The largest push out of a bad start in a step of regular length, as a part of the sum of radii.
+constexpr double PUSH_LIMIT = 0.05;
+// Two centres that are nearer to one another than this part of the sum of radii have no normal.
+constexpr double COINCIDENT = 1.0e-10;
+// This value is below (with a minus sign) or above every value that is compared with it.
+constexpr double EXTREME = 1.0e300;
+
+// The row beside each constraint of the problem.
+struct Side {
+  int wall;                 // the wall's number; 0 = the second side is a particle
+  double gap_now;           // [length] at the present positions
+  double size;              // [length] the sum of the two radii; the radius at a wall
+  double wall_motion;       // [length] by how much the wall closes the gap during the step
+  bool followed = false;    // the gap was set by where an earlier solution of the step ends
+};
+
+struct Step {
+  explicit Step(const Settings &of_fix) : settings(of_fix) {}
+
+  const Settings &settings;
+
+  // Whether some step of this run came before, whose motion is to be compared with what was predicted.
+  bool continues = false;
+  Kick kick = Kick::WHOLE;
+  // The time for which forces act before the next move, in units that turn a force into a momentum.
+  double impulse_per_force = 0.0;
+  double regular_timestep = 0.0;    // [time] as the deck sets it; problem.timestep may be shorter
+  double largest_radius = 0.0;      // [length] in the group, on all ranks
+
+  // The problem. Particles are the owned atoms, then the ghosts.
+  inelastic::ContactProblem problem;
+  std::vector<Side> sides;         // one per constraint
+  std::vector<double> velocity;    // 3 per particle, the projection
+  // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
+  std::vector<double> motion_of_bodies;
+
+  // What is known after constraints were collected.
+  Phase phase = Phase::CONTACT;
+  bool bad_start = false;          // some overlap at the start is beyond the regular ones
+  double largest_overlap = 0.0;    // [length] at the start
+  double excess = 0.0;             // [length] the overlap at the end beyond the regular ones
+  int relinearisations = 0;        // rounds that have looked at the end of the step
+  std::string problem_found;       // what went wrong on this rank while collecting; empty if nothing
+
+  bool in_group(const Atom *atom, int i) const { return atom->mask[i] & settings.group_bit; }
+  bool is_mobile(const Atom *atom, int i) const
+  { return in_group(atom, i) && !(atom->mask[i] & settings.frozen_bit); }
+
+  // Whether a particle belongs to a body.
+  bool is_member(int i) const { return settings.has_bodies() && problem.bodies.body[i] >= 0; }
+
+  const std::vector<double> &motion() const
+  { return settings.has_bodies() ? motion_of_bodies : velocity; }
+
+  // The vector from the centre of mass of its body to a particle; zero for a free one.
+  const double *arm(int i) const
+  {
+    static constexpr double NONE[3] = {};
+    return is_member(i) ? &problem.bodies.arm[3 * problem.bodies.place[i]] : NONE;
+  }
+};
+
+inline double mass_of(const Atom *atom, int i)
+{ return atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]]; }
+
+// a - b for two particles' vectors in an array of 3 per particle.
+struct Difference {
+  double values[3];
+  Difference(const double *a, const double *b) : values{a[0] - b[0], a[1] - b[1], a[2] - b[2]} {}
+  operator const double *() const { return values; }
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
