@@ -124,8 +124,7 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
         lambda facts: facts["bad_start"] or facts["warn"],
     ),
     (r"The tolerance is below the round-off of these forces", lambda facts: facts["spread"] > 4),
-    # LAMMPS's own: all spheres together pass through a periodic box between two lists.
-    (r"Lost atoms", lambda facts: facts["sweeps"]),
+    (r"spheres move further than LAMMPS can follow them", lambda facts: not facts["shorten"]),
 )
 
 
