@@ -973,6 +973,7 @@ class _Draw:
             "closing": self.closing,
             "spread": float(self.largest / self.smallest),
             "smallest": self.smallest,
+            "pull": self.gravity * self.timestep**2,
             "tightest": min(self.start_tolerance, self.tolerance),
             "largest": self.largest,
         }
