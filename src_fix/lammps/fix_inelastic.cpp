@@ -375,6 +375,7 @@ void FixInelastic::post_neighbor()
       own_width_[d] = part * domain->prd[d];
     }
   }
+  measure_farthest();
   list_reach_ = one_cutoff_ ? listed - 2.0 * largest_radius_ : neighbor->skin;
   if (rigid_)
     fail_together(rigid_->find_bodies(problem_, *this, groupbit, frozen_bit_, first_list_of_run_));
@@ -565,6 +566,14 @@ void FixInelastic::advance(int vflag, double kick_steps)
       }
       const double motion_found = spread(motion().data());
       shorten_step(room_in_list(motion_found, motion_found));
+    } else if (part_of_farthest() >= 1.0) {
+      if (!shorten_)
+        error->all(
+            FLERR,
+            "Fix inelastic: step {}: spheres move further than LAMMPS can follow them between "
+            "two neighbour lists, {:.3g} times as far: lower the timestep, or use shorten yes",
+            update->ntimestep, part_of_farthest());
+      shorten_step(0.5);
     } else if (shorten_ && output_[EXCESS] > 0.0) {
       shorten_step(0.5);
     } else {
@@ -1428,6 +1437,41 @@ double FixInelastic::spread(const double *values)
 // Pairs that are not listed were at least list_reach_ apart when the list was built.
 bool FixInelastic::list_reaches(const std::vector<double> &motion)
 { return spread_at_start_ + update->dt * spread(motion.data()) <= list_reach_; }
+
+// LAMMPS brings an atom back into a periodic box from the next image alone, and hands it to the next
+// rank alone (with two ranks in a direction, the other one is the next on both sides).
+void FixInelastic::measure_farthest()
+{
+  double narrowest[3];
+  for (int d = 0; d < 3; ++d)
+    narrowest[d] = domain->triclinic ? domain->sublo_lamda[d] - domain->subhi_lamda[d]
+                                     : (domain->sublo[d] - domain->subhi[d]) / domain->prd[d];
+  reduce(nullptr, 0, narrowest, 3);
+  for (int d = 0; d < 3; ++d) {
+    const bool tiled = comm->layout == Comm::LAYOUT_TILED;
+    const int ranks = tiled ? comm->nprocs : comm->procgrid[d];
+    farthest_[d] = domain->periodicity[d] ? 1.0 : EXTREME;
+    if (ranks > 2) farthest_[d] = std::min(farthest_[d], -narrowest[d]);
+  }
+}
+
+// Collective: how far some atom will have gone since the list was built, as a part of that.
+double FixInelastic::part_of_farthest()
+{
+  if (std::min({farthest_[0], farthest_[1], farthest_[2]}) == EXTREME) return 0.0;
+  const double *const inverse = domain->h_inv;
+  double part = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    double gone[3];
+    for (int d = 0; d < 3; ++d)
+      gone[d] = atom->x[i][d] - position_at_build_[3 * i + d] + update->dt * motion()[3 * i + d];
+    const double of_box[3] = {inverse[0] * gone[0] + inverse[5] * gone[1] + inverse[4] * gone[2],
+                              inverse[1] * gone[1] + inverse[3] * gone[2], inverse[2] * gone[2]};
+    for (int d = 0; d < 3; ++d) part = std::max(part, std::abs(of_box[d]) / farthest_[d]);
+  }
+  reduce(nullptr, 0, &part, 1);
+  return part;
+}
 
 // The part of the time step for which the list would reach, with some reserve, where velocities have
 // the spread `whole` in the whole step and `none` before its forces: in a part s, whose kick is

@@ -153,6 +153,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double growth_;             // of a radius since then
   double strayed_;            // largest displacement since then, of the width that a rank owns
   double own_width_[3];       // of the box, by this rank; no limit where nothing is beyond
+  // Of the box, in each direction: LAMMPS loses an atom that goes further between two lists.
+  double farthest_[3];
   std::vector<double> position_at_build_, radius_at_build_, displacement_, unhindered_;
 
   double regular_timestep_;    // as the deck sets it
@@ -272,6 +274,8 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   double spread_since_build(const double *motion);
   bool list_reaches(const std::vector<double> &motion);
   double room_in_list(double none, double whole) const;
+  void measure_farthest();
+  double part_of_farthest();
   double unhindered_spread(double kick_steps);
   void shorten_step(double factor);
   void set_timestep(double timestep);

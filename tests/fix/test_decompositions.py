@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bodies import body_scene, dimer, random_bodies
 from lammps_inelastic.analysis import iterate_contact_frames
 from lammps_run import Runner
 from scenes import (
@@ -27,7 +28,7 @@ RADIUS = 0.06
 EPS = 0.0005 * RADIUS
 SLACK = 1 + 1e-6  # round-off of positions
 # Summation orders differ between decompositions; contacts amplify that. At this tolerance 80 steps
-# agree within SAME (the design's equality).
+# agree within SAME .
 EXACT = 5e-9 * RADIUS
 SAME = 0.0005 * RADIUS
 
@@ -261,3 +262,29 @@ def test_atoms_that_come_and_go(ranks: int, tmp_path: Path, lmp: Runner) -> None
         assert depth <= EPS * SLACK
     assert max(sizes) > 20
     assert result.thermo["f_contact[5]"][-1] > 5
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("inertia", ["", "point"])
+def test_a_step_through_a_whole_periodic_box(
+    inertia: str, ranks: int, tmp_path: Path, lmp: Runner
+) -> None:
+    """LAMMPS brings an atom back from the next image only: further, it would lose the atom."""
+    options = {
+        "tolerance": EPS,
+        "box": ((0, 1),) * 3,
+        "boundary": "p p p",
+        "gravity": False,
+        "options": "shorten no",
+        "velocities": [0.0, 0.0, 1.6 / 0.005],  # box lengths in a time step
+    }
+    if inertia:
+        bodies = random_bodies([dimer(1.5)] * 3, RADIUS, ((0.1, 0.9),) * 3, seed=4)
+        text = body_scene(bodies, RADIUS, tmp_path, inertia=inertia, **options)
+    else:
+        text = scene([[0.2, 0.2, 0.2], [0.5, 0.5, 0.8]], RADIUS, tmp_path, **options)
+    refused = lmp(text + "run 20\n", ranks=ranks, must_pass=False)
+    said = "move further than LAMMPS can follow them between two neighbour lists, 1.6 times as far"
+    assert said in refused.screen
+    result = lmp(text.replace("shorten no", "shorten yes") + "run 20\n", ranks=ranks)
+    assert "21 shortened steps" in result.screen

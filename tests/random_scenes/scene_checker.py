@@ -333,8 +333,12 @@ class _Part:
                     factor * self.eps + slack,
                     shape,
                 )
-        # The fix looks at curved walls from a point that is 1e-12 off in each direction.
-        looks = 2e-12 * min(1.0, 10 * self.facts["largest"]) if self.curved else 0.0
+        # The fix looks at curved walls from a point that is off, in each direction, by 1e-12 of how
+        # far it looks, or by 1e-12: as far as the step without contacts takes a sphere, and more.
+        forced = self.to_v / frame.mass * np.linalg.norm(frame.before, axis=1)
+        goes = frame.h * (np.linalg.norm(frame.v, axis=1) + frame.h * forced)
+        far = 10 * self.facts["largest"] + 2 * float(goes.max(initial=0.0))
+        looks = 2e-12 * min(1.0, far) if self.curved else 0.0
         self.close("reported overlap", frame.thermo["f_contact[4]"], frame.deepest, slack + looks)
         self.report.seen["overlapping frames"] += int(frame.deepest > REGULAR * self.eps)
 

@@ -941,12 +941,6 @@ class _Draw:
         lines += [f"boundary {' '.join(self.flags)}", *self.setup]
         return "\n".join(lines)
 
-    def fastest(self) -> float:
-        """About the largest speed that there will be."""
-        start = float(np.linalg.norm(self.spheres.v, axis=1).max(initial=0.0))
-        pull = self.gravity * (10 if "random force" in self.words else 2)
-        return start + pull * 40 * self.timestep
-
     def finished(self) -> Scene:
         deck = "\n".join(
             [
@@ -977,15 +971,9 @@ class _Draw:
             "shorten": self.shorten,
             "bad_start": self.bad_start_possible(),
             "closing": self.closing,
-            # LAMMPS wraps positions only when it builds the list, and only once.
-            "sweeps": 12 * self.timestep * self.fastest()
-            > 0.5
-            * min(
-                (w for w, p in zip(self.high - self.low, self.periodic, strict=True) if p),
-                default=np.inf,
-            ),
             "spread": float(self.largest / self.smallest),
             "smallest": self.smallest,
+            "pull": self.gravity * self.timestep**2,
             "tightest": min(self.start_tolerance, self.tolerance),
             "largest": self.largest,
         }

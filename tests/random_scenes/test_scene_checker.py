@@ -360,7 +360,7 @@ def test_shapes(number: int, motion: dict[str, Any]) -> None:
 def test_answers() -> None:
     facts = {
         "shorten": True, "closing": False, "bad_start": False, "spread": 1.0, "warn": False,
-        "words": [], "tightest": 1e-3, "smallest": 1.0, "sweeps": False,
+        "words": [], "pull": 1.0, "tightest": 1e-3, "smallest": 1.0,
     }  # fmt: skip
     reach = "ERROR: Fix inelastic: step 3: spheres move ... further than the neighbour list reaches"
 
