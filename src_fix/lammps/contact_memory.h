@@ -13,6 +13,9 @@ namespace LAMMPS_NS {
 
 class ContactMemory {
  public:
+  // The most contacts that a ghost tells its owned atom; what is beyond loses only a first guess.
+  static constexpr int SHARED_PARTNERS = 16;
+
   void resize(int atoms) { remembered_.resize(atoms); }
 
   void forget(int atom) { remembered_[atom].clear(); }

@@ -1,6 +1,5 @@
 #include "fix_settings.h"
 
-#include "error.h"
 #include "group.h"
 #include "lammps.h"
 #include "utils.h"
@@ -133,11 +132,11 @@ void Reader::read_record(const char *file)
 
 }    // namespace
 
-double LAMMPS_NS::read_tolerance(LAMMPS *lmp, const char *text)
+double LAMMPS_NS::read_tolerance(LAMMPS *lmp, const char *text, int argument)
 {
   const double tolerance = utils::numeric(FLERR, text, false, lmp);
   if (!(tolerance > 0.0) || std::isinf(tolerance))
-    lmp->error->all(FLERR, "Fix inelastic tolerance must be a length greater than 0, not {}", text);
+    lmp->error->all(FLERR, argument, "Fix inelastic tolerance must be a length greater than 0, not {}", text);
   return tolerance;
 }
 
@@ -146,7 +145,7 @@ Settings LAMMPS_NS::read_settings(LAMMPS *lmp, int narg, char **arg, int group_b
   if (narg < 4) utils::missing_cmd_args(FLERR, "fix inelastic", lmp->error);
   Settings settings;
   settings.group_bit = group_bit;
-  settings.tolerance = read_tolerance(lmp, arg[3]);
+  settings.tolerance = read_tolerance(lmp, arg[3], 3);
   Reader(lmp, narg, arg, settings).read_keywords();
   return settings;
 }

@@ -3,6 +3,8 @@
 #ifndef INELASTIC_FIX_SETTINGS_H
 #define INELASTIC_FIX_SETTINGS_H
 
+#include "error.h"
+
 #include <string>
 #include <vector>
 
@@ -43,8 +45,9 @@ struct Settings {
 // that are not allowed.
 Settings read_settings(LAMMPS *lmp, int narg, char **arg, int group_bit);
 
-// Reads EPS [length]. Errors: anything but a finite number greater than 0.
-double read_tolerance(LAMMPS *lmp, const char *text);
+// Reads EPS [length]. Errors: anything but a finite number greater than 0, which the error points to if
+// it knows the argument's index.
+double read_tolerance(LAMMPS *lmp, const char *text, int argument = Error::NOPOINTER);
 
 }    // namespace LAMMPS_NS
 

@@ -74,7 +74,7 @@ void RegionWalls::init()
     const bool joined = strcmp(region->style, "union") == 0 ||
         strcmp(region->style, "intersect") == 0;
     const bool cone = joined || strcmp(region->style, "cone") == 0;
-    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, cone});
+    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, convex_obstacle, cone});
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
   }
@@ -93,16 +93,16 @@ void RegionWalls::warn() const
                      obstacle.region->id);
 }
 
-void RegionWalls::view(const std::vector<Look> &looks, bool inexact_only,
-                       const std::function<void(const Look &, const WallView &)> &found,
-                       const std::function<void(const Look &, const std::string &)> &outside)
+void RegionWalls::view(const std::vector<Viewpoint> &viewpoints, bool inexact_only,
+                       const std::function<void(const Viewpoint &, const WallView &)> &found,
+                       const std::function<void(const Viewpoint &, const std::string &)> &outside)
 {
   for (const Obstacle &obstacle : obstacles_) {
     if (inexact_only && obstacle.exact) continue;
     if (obstacle.moving)
-      view_moving(obstacle, looks, found, outside);
+      view_moving(obstacle, viewpoints, found, outside);
     else
-      view_static(obstacle, looks, found, outside);
+      view_static(obstacle, viewpoints, found, outside);
   }
 }
 
@@ -121,6 +121,7 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
   for (int k = 0; k < count; ++k) {
     if (!(region->contact[k].r > 0.0)) return false;
     views.push_back(make_view(region->contact[k], obstacle.first_wall));
+    views.back().convex = obstacle.convex;
   }
   if (obstacle.cone)
     for (WallView &view : views) correct_cap(obstacle, x, view);
@@ -164,16 +165,16 @@ void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallVie
   for (int d = 0; d < 3; ++d) view.normal[d] = gradient[d] / std::sqrt(length_squared);
 }
 
-void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Look> &looks,
-                              const std::function<void(const Look &, const WallView &)> &found,
-                              const std::function<void(const Look &, const std::string &)> &outside)
+void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
+                              const std::function<void(const Viewpoint &, const WallView &)> &found,
+                              const std::function<void(const Viewpoint &, const std::string &)> &outside)
 {
   std::vector<WallView> views;
-  for (const Look &look : looks) {
-    if (see(obstacle, look.where, look.reach, views))
-      for (const WallView &view : views) found(look, view);
+  for (const Viewpoint &from : viewpoints) {
+    if (see(obstacle, from.where, from.reach, views))
+      for (const WallView &view : views) found(from, view);
     else
-      outside(look, obstacle.region->id);
+      outside(from, obstacle.region->id);
   }
 }
 
@@ -188,9 +189,9 @@ void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)
   modify->addstep_compute(update->ntimestep + 1);
 }
 
-void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Look> &looks,
-                              const std::function<void(const Look &, const WallView &)> &found,
-                              const std::function<void(const Look &, const std::string &)> &outside)
+void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
+                              const std::function<void(const Viewpoint &, const WallView &)> &found,
+                              const std::function<void(const Viewpoint &, const std::string &)> &outside)
 {
   Region *region = obstacle.region;
 
@@ -202,39 +203,39 @@ void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Look> 
       std::sqrt(shift[0] * shift[0] + shift[1] * shift[1] + shift[2] * shift[2]);
 
   struct Seen {
-    const Look *look;
+    const Viewpoint *from;
     WallView view;
     bool passed_over;
   };
   std::vector<Seen> seen;
   std::vector<WallView> views;
-  for (const Look &look : looks) {
-    if (see(obstacle, look.where, look.reach, views))
-      for (const WallView &view : views) seen.push_back({&look, view, false});
+  for (const Viewpoint &from : viewpoints) {
+    if (see(obstacle, from.where, from.reach, views))
+      for (const WallView &view : views) seen.push_back({&from, view, false});
     else
-      seen.push_back({&look, WallView{}, true});
+      seen.push_back({&from, WallView{}, true});
   }
 
   set_clock(obstacle, 0);
   for (Seen &entry : seen) {
-    const double *x = entry.look->where;
+    const double *x = entry.from->where;
     if (entry.passed_over) {
       // The wall will have swept over the centre. LAMMPS then sees no wall, but for one that only
       // translates the distance it will have follows from the one it has now.
       const bool seen_now = !region->rotateflag && !region->varshape &&
-          see(obstacle, x, entry.look->reach + shift_length, views);
+          see(obstacle, x, entry.from->reach + shift_length, views);
       for (WallView &view : views) {
         if (!seen_now) break;
         for (int d = 0; d < 3; ++d) view.distance -= view.normal[d] * shift[d];
-        if (view.distance < entry.look->reach) found(*entry.look, view);
+        if (view.distance < entry.from->reach) found(*entry.from, view);
       }
-      if (!seen_now) outside(*entry.look, region->id);
+      if (!seen_now) outside(*entry.from, region->id);
       continue;
     }
     const int count = region->surface(x[0], x[1], x[2], EVERYTHING);
     for (int k = 0; k < count; ++k)
       if (obstacle.first_wall + region->contact[k].iwall == entry.view.wall)
         entry.view.distance_now = region->contact[k].r;
-    found(*entry.look, entry.view);
+    found(*entry.from, entry.view);
   }
 }

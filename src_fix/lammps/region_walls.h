@@ -22,6 +22,7 @@ struct WallView {
   double
       normal[3];    // unit vector from the wall to the centre, for the wall at the end of the step
   double distance_now;    // to the wall as it stands now; the difference is the wall's own motion
+  bool convex;            // the side of an obstacle that curves, or has edges, away from the sphere
 };
 
 class RegionWalls : protected Pointers {
@@ -44,18 +45,18 @@ class RegionWalls : protected Pointers {
 
   // A point from which to look at the walls: `where` is the centre of atom i, or the place where it
   // will be; walls whose distance is below `reach` are wanted.
-  struct Look {
+  struct Viewpoint {
     int atom;
     double where[3];
     double reach;
   };
 
-  // Calls found(look, view) for every wall within reach. outside(look) is called instead for a
+  // Calls found(viewpoint, view) for every wall within reach. outside(viewpoint, region) is called instead for a
   // centre that lies on the wrong side of a region, from where LAMMPS sees no wall. `inexact_only`
   // leaves out the regions whose constraints are exact. Collective (variables of moving regions).
-  void view(const std::vector<Look> &looks, bool inexact_only,
-            const std::function<void(const Look &, const WallView &)> &found,
-            const std::function<void(const Look &, const std::string &region)> &outside);
+  void view(const std::vector<Viewpoint> &viewpoints, bool inexact_only,
+            const std::function<void(const Viewpoint &, const WallView &)> &found,
+            const std::function<void(const Viewpoint &, const std::string &region)> &outside);
 
  private:
   struct Obstacle {
@@ -63,18 +64,19 @@ class RegionWalls : protected Pointers {
     int first_wall;
     bool moving;
     bool exact;
+    bool convex;
     bool cone;
   };
 
   bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &) const;
   void correct_cap(const Obstacle &, const double *x, WallView &) const;
 
-  void view_static(const Obstacle &, const std::vector<Look> &,
-                   const std::function<void(const Look &, const WallView &)> &,
-                   const std::function<void(const Look &, const std::string &)> &);
-  void view_moving(const Obstacle &, const std::vector<Look> &,
-                   const std::function<void(const Look &, const WallView &)> &,
-                   const std::function<void(const Look &, const std::string &)> &);
+  void view_static(const Obstacle &, const std::vector<Viewpoint> &,
+                   const std::function<void(const Viewpoint &, const WallView &)> &,
+                   const std::function<void(const Viewpoint &, const std::string &)> &);
+  void view_moving(const Obstacle &, const std::vector<Viewpoint> &,
+                   const std::function<void(const Viewpoint &, const WallView &)> &,
+                   const std::function<void(const Viewpoint &, const std::string &)> &);
   void set_clock(const Obstacle &, int steps_ahead);
 
   std::vector<std::string> ids_;

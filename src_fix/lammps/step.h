@@ -47,7 +47,8 @@ struct Step {
 
   const Settings &settings;
 
-  // Whether some step of this run came before, whose motion is to be compared with what was predicted.
+  // Whether a step of this run came before, so that momenta are carried along and its prediction can be
+  // compared with what moved.
   bool continues = false;
   Kick kick = Kick::WHOLE;
   // The time for which forces act before the next move, in units that turn a force into a momentum.
@@ -90,13 +91,6 @@ struct Step {
 
 inline double mass_of(const Atom *atom, int i)
 { return atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]]; }
-
-// a - b for two particles' vectors in an array of 3 per particle.
-struct Difference {
-  double values[3];
-  Difference(const double *a, const double *b) : values{a[0] - b[0], a[1] - b[1], a[2] - b[2]} {}
-  operator const double *() const { return values; }
-};
 
 }    // namespace LAMMPS_NS
 

@@ -1,0 +1,129 @@
+#include "atom_state.h"
+
+#include "ghost_exchange.h"
+
+#include "atom.h"
+#include "memory.h"
+
+#include <algorithm>
+
+using namespace LAMMPS_NS;
+
+AtomState::AtomState(LAMMPS *lmp, const Step &step) : Pointers(lmp), step_(step) {}
+
+AtomState::~AtomState()
+{ memory->destroy(state_); }
+
+void AtomState::take_out_pushes()
+{
+  for (int i = 0; i < atom->nlocal; ++i)
+    for (int d = 0; d < 3; ++d) {
+      atom->v[i][d] -= push_held(i)[d];
+      push_held(i)[d] = 0.0;
+    }
+}
+
+void AtomState::remember_contacts(GhostExchange &ranks)
+{
+  const inelastic::ContactProblem &problem = step_.problem;
+  const double force_per_impulse = 1.0 / step_.impulse_per_force;
+  for (int i = 0; i < problem.particles; ++i) memory_.forget(i);
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+    if (!(problem.contacts.impulse[c] > 0.0)) continue;
+    const int i = problem.contacts.first[c];
+    const int j = problem.contacts.second[c];
+    const int wall = step_.sides[c].wall;
+    const double strength = problem.contacts.impulse[c] * force_per_impulse;
+    memory_.remember(i, wall ? -wall : atom->tag[j], strength);
+    if (!wall) memory_.remember(j, atom->tag[i], strength);
+  }
+  ranks.gather_memory(memory_);
+  double most = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
+  ranks.reduce(nullptr, 0, &most, 1);
+  most_partners_ = static_cast<int>(most);
+}
+
+void AtomState::grow(int atoms)
+{
+  memory->grow(state_, atoms, STATE_SIZE, "inelastic:state");
+  memory_.resize(atoms);
+  if (step_.settings.has_bodies()) momenta_.resize(atoms);
+}
+
+void AtomState::copy(int from, int to)
+{
+  std::copy_n(state_[from], STATE_SIZE, state_[to]);
+  memory_.copy(from, to);
+  if (step_.settings.has_bodies()) momenta_.copy(from, to);
+}
+
+// An atom that is created during a run moves on from where it is.
+void AtomState::begin(int i)
+{
+  std::fill_n(state_[i], STATE_SIZE, 0.0);
+  memory_.forget(i);
+  if (step_.settings.has_bodies()) momenta_.forget(i);
+  std::copy_n(atom->x[i], 3, expected_position(i));
+  std::copy_n(atom->v[i], 3, expected_velocity(i));
+  expected_radius(i) = atom->radius[i];
+}
+
+int AtomState::pack_exchange(int i, double *buffer) const
+{
+  double *out = std::copy_n(state_[i], STATE_SIZE, buffer);
+  if (step_.settings.has_bodies()) out += momenta_.pack(i, out);
+  out += memory_.pack(i, out, memory_.number_of_partners(i));
+  return static_cast<int>(out - buffer);
+}
+
+int AtomState::unpack_exchange(int i, const double *buffer)
+{
+  std::copy_n(buffer, STATE_SIZE, state_[i]);
+  memory_.forget(i);
+  const double *in = buffer + STATE_SIZE;
+  if (step_.settings.has_bodies()) in += momenta_.unpack(i, in);
+  in += memory_.unpack(i, in);
+  return static_cast<int>(in - buffer);
+}
+
+int AtomState::restart_size(int i, bool writes) const
+{
+  if (!writes) return 0;
+  const double *const held = state_[i] + PUSH_HELD;
+  const bool pushed = held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
+  return pushed || (step_.settings.has_bodies() && momenta_.has_held(i)) ? largest_restart_size() : 1;
+}
+
+int AtomState::largest_restart_size() const
+{ return 7 + (step_.settings.has_bodies() ? CarriedMomenta::HELD_SIZE : 0); }
+
+int AtomState::pack_restart(int i, double *buffer, bool writes) const
+{
+  const int size = restart_size(i, writes);
+  if (size == 0) return size;
+  double *out = buffer;
+  *out++ = size;
+  if (size == 1) return size;
+  out = std::copy_n(atom->v[i], 3, out);
+  out = std::copy_n(state_[i] + PUSH_HELD, 3, out);
+  if (step_.settings.has_bodies()) momenta_.pack_held(i, out);
+  return size;
+}
+
+void AtomState::unpack_restart(int i, int nth)
+{
+  const double *in = atom->extra[i];
+  for (int k = 0; k < nth; ++k) in += static_cast<int>(*in);
+  const int size = static_cast<int>(*in++);
+  if (size == 1) return;
+  // A velocity that was set since is all momentum.
+  if (!std::equal(in, in + 3, atom->v[i])) return;
+  for (int d = 0; d < 3; ++d) atom->v[i][d] -= in[3 + d];
+  if (step_.settings.has_bodies() && size == largest_restart_size())
+    momenta_.unpack_held(i, in + 6);
+}
+
+double AtomState::memory_usage() const
+{ return STATE_SIZE; }

@@ -1,0 +1,84 @@
+// What the fix remembers of every atom from step to step, and what therefore follows the atoms when LAMMPS
+// sorts them, hands them to other ranks and writes them to restart files.
+
+#ifndef INELASTIC_ATOM_STATE_H
+#define INELASTIC_ATOM_STATE_H
+
+#include "carried_momenta.h"
+#include "contact_memory.h"
+#include "step.h"
+
+#include "pointers.h"
+
+namespace LAMMPS_NS {
+
+class GhostExchange;
+
+class AtomState : protected Pointers {
+ public:
+  AtomState(class LAMMPS *lmp, const Step &step);
+  ~AtomState() override;
+  AtomState(const AtomState &) = delete;
+  AtomState &operator=(const AtomState &) = delete;
+
+  // Where, how fast and how large the last step predicted an owned atom to be.
+  double *expected_position(int i) { return state_[i] + EXPECTED_X; }
+  double *expected_velocity(int i) { return state_[i] + EXPECTED_V; }
+  double &expected_radius(int i) { return state_[i][EXPECTED_RADIUS]; }
+  static constexpr double OUTSIDE = -1.0;    // in place of the radius of an atom outside of the group
+
+  // The part of a velocity that takes a bad overlap apart and is no momentum: after the last move, and at
+  // whole steps.
+  double *push_next(int i) { return state_[i] + PUSH_NEXT; }
+  double *push_held(int i) { return state_[i] + PUSH_HELD; }
+  // At the end of a run: velocities are momentum alone from here on.
+  void take_out_pushes();
+
+  ContactMemory &memory() { return memory_; }
+  CarriedMomenta &momenta() { return momenta_; }
+
+  // Both atoms of a contact remember it, those of other ranks included: the next neighbour list may show
+  // the pair from the other side, and atoms may migrate before it is built. Collective.
+  void remember_contacts(GhostExchange &ranks);
+
+  // LAMMPS's callbacks.
+  void grow(int atoms);
+  void copy(int from, int to);
+  void begin(int i);
+  int pack_exchange(int i, double *buffer) const;
+  int unpack_exchange(int i, const double *buffer);
+  // The largest message of an atom that is handed to another rank [numbers].
+  int exchange_size() const { return carried_size() + ContactMemory::packed_size(most_partners_); }
+
+  // Restart files that are written during a run hold velocities with the push in them: it goes along,
+  // with the velocity that it belongs to. Most atoms have none. Where none has (`writes` false), the file
+  // holds nothing of this fix: LAMMPS would refuse change_box after it.
+  int restart_size(int i, bool writes) const;
+  int largest_restart_size() const;
+  int pack_restart(int i, double *buffer, bool writes) const;
+  void unpack_restart(int i, int nth);
+
+  double memory_usage() const;    // [numbers] per atom
+
+ private:
+  enum Column {
+    EXPECTED_X = 0,
+    EXPECTED_V = 3,
+    PUSH_NEXT = 6,
+    PUSH_HELD = 9,
+    EXPECTED_RADIUS = 12,
+    STATE_SIZE = 13
+  };
+  int carried_size() const
+  { return STATE_SIZE + (step_.settings.has_bodies() ? CarriedMomenta::PACKED_SIZE : 0); }
+
+  const Step &step_;
+  double **state_ = nullptr;
+  ContactMemory memory_;
+  CarriedMomenta momenta_;    // empty in a scene of free spheres
+  int most_partners_ = 0;     // of an atom, on any rank
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,66 @@
+// Which spheres belong to which body of a fix rigid/small, ghosts included, and whether every rank sees
+// its bodies whole.
+
+#ifndef INELASTIC_BODY_MEMBERS_H
+#define INELASTIC_BODY_MEMBERS_H
+
+#include "contact_problem.h"
+#include "host.h"
+#include "molecule_sizes.h"
+#include "step.h"
+
+#include "pointers.h"
+
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class Fix;
+
+class BodyMembers : protected Pointers {
+ public:
+  BodyMembers(class LAMMPS *lmp, Step &step, inelastic::Host &host);
+
+  // Finds the fix. Errors: there is none, or another style than rigid/small.
+  void begin_run();
+  Fix *fix() const { return fix_; }
+
+  // Puts the bodies into the step's problem, all particles of the group: to be called when atoms or
+  // ghosts have changed. Collective. Returns what is wrong on this rank, empty if nothing is: a body of
+  // which it sees a part only. Errors: a body that is not all in the group, or holds frozen spheres.
+  // The first call of a run counts the bodies afresh.
+  std::string find();
+
+  // After the bodies were measured in the first call of a run. Errors: ghosts that do not reach far
+  // enough. Collective.
+  void check_reach() const;
+
+  bool is_first_of_run() const { return first_of_run_; }
+  void begin_steps() { first_of_run_ = false; }
+
+  bool is_incomplete(int i) const { return incomplete_[i]; }
+  const std::vector<int> &copy_of() const { return copy_of_; }
+
+ private:
+  void count_spheres();
+  void check_hidden_pairs() const;
+  std::vector<int> first_spheres(std::vector<int> &next, std::string &message);
+  std::string add_body(int first_sphere, const std::vector<int> &next);
+  std::string explained(const std::string &message) const;
+
+  Step &step_;
+  inelastic::Host &host_;
+  Fix *fix_ = nullptr;
+  bool first_of_run_ = false;
+  static constexpr int NONE = -1;
+  MoleculeSizes molecules_;
+  std::vector<int> last_sphere_;    // per molecule: room for find, NONE between its calls
+  std::vector<int> copy_of_;        // per member: which of the body's originals it is
+  std::vector<char> incomplete_;    // per particle: of a body of which this rank has only a part
+  std::vector<double> in_body_;     // 3 per particle, of which the first tells whether it is in a body
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,73 @@
+// The constraints of a step, from pairs and from walls: those that matter from the start, and those that
+// a solution shows to matter (the core's ConstraintSource).
+
+#ifndef INELASTIC_CONSTRAINTS_H
+#define INELASTIC_CONSTRAINTS_H
+
+#include "entangled_bodies.h"
+#include "gap_rules.h"
+#include "overlap_watch.h"
+#include "pair_constraints.h"
+#include "phase_clock.h"
+#include "projection.h"
+#include "region_walls.h"
+#include "wall_constraints.h"
+
+#include "pointers.h"
+
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class Constraints final : public inelastic::ConstraintSource, protected Pointers {
+ public:
+  // `bodies` is null in a scene of free spheres.
+  Constraints(class LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
+              const ContactMemory &memory, RigidMotion *bodies);
+
+  RegionWalls &walls() { return walls_; }
+  OverlapWatch &overlaps() { return overlaps_; }
+  const OverlapWatch &overlaps() const { return overlaps_; }
+  EntangledBodies &entangled() { return entangled_; }
+  const GapRules &rules() const { return rules_; }
+  void use(NeighList *list) { pairs_.use(list); }
+
+  // At the start of a run: the margin is a part of the smallest radius [length].
+  void begin_run(double smallest_radius);
+
+  // Takes the constraints that can matter with the predicted velocities. Collective. Errors: spheres
+  // that coincide, that meet their own image or that are beyond a wall, bodies that are not all seen.
+  void collect();
+
+  // Adds what the velocities of the step violate, and follows the end of the step where bodies turn or
+  // walls curve. Returns how many constraints this rank added or changed. Collective, same errors.
+  long refine(const std::vector<double> &velocity, inelastic::ContactProblem &problem) override;
+
+  // Whether gaps were set by the end of the step, and whether the last solve knew of such gaps.
+  bool relinearised() const { return relinearised_; }
+  bool solved_relinearised() const { return solved_relinearised_; }
+
+  // After a step: takes more pairs at once when the last projection had to come back for some, fewer
+  // otherwise. `reach` [length] is that of the neighbour list.
+  void adapt_margin(double reach);
+
+ private:
+  Step &step_;
+  GhostExchange &ranks_;
+  PhaseClock &clock_;
+  RigidMotion *bodies_;
+  RegionWalls walls_;
+  OverlapWatch overlaps_;
+  GapRules rules_;
+  EntangledBodies entangled_;
+  PairConstraints pairs_;
+  WallConstraints wall_constraints_;
+  double margin_ = -1.0;    // [length] what comes nearer than this is in the problem from the start
+  bool came_back_ = false;
+  bool relinearised_ = false;
+  bool solved_relinearised_ = false;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,47 @@
+// Which gap a constraint asks for: at the start of a step, in a bad start, and where the end of the step
+// differs from the linearised gap because bodies turn or walls curve.
+
+#ifndef INELASTIC_GAP_RULES_H
+#define INELASTIC_GAP_RULES_H
+
+#include "overlap_watch.h"
+#include "step.h"
+
+namespace LAMMPS_NS {
+
+class GapRules {
+ public:
+  GapRules(Step &step, OverlapWatch &overlaps) : step_(step), overlaps_(overlaps) {}
+
+  // Rounds of a step that may change the gaps of constraints. Each one squares the error where a body
+  // turns little; one that turns by a radian takes up to twenty.
+  static constexpr int MAX_RELINEARISATIONS = 40;
+
+  // The gap [length] that the constraint asks to be kept, the wall's motion left out. `size` is the sum
+  // of radii (the radius at a wall).
+  double effective_gap(double gap_now, double size) const;
+
+  // The gap [length] at the end of the step for which the constraint is just met.
+  double wanted_gap(double gap_now, double size) const;
+
+  // Whether the end of the step is so deep that the constraint must change. The excess is noted as well:
+  // what starts with a bad overlap may keep it, but not get deeper. It is asked for more, which costs no
+  // shorter step where it is not to be had.
+  bool ends_too_deep(double gap_now, double size, double gap_at_end);
+
+  // Sets the gap of constraint c to one that is exact for the present velocity, or to the linearised one
+  // if that is smaller. One that was set for an earlier velocity is set again, so that no force keeps
+  // apart what has moved on meanwhile, and the step does not depend on how it was found. Returns how many
+  // constraints changed.
+  long follow(std::size_t c, double exact_gap, bool too_deep);
+
+  OverlapWatch &overlaps() { return overlaps_; }
+
+ private:
+  Step &step_;
+  OverlapWatch &overlaps_;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

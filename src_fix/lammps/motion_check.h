@@ -1,0 +1,65 @@
+// Whether the scene is as the fix left it: LAMMPS moved what the last step predicted, nothing was added or
+// changed during the run, and forces and velocities are numbers.
+
+#ifndef INELASTIC_MOTION_CHECK_H
+#define INELASTIC_MOTION_CHECK_H
+
+#include "scene_check.h"
+#include "step.h"
+
+#include "pointers.h"
+
+#include <string>
+
+namespace LAMMPS_NS {
+
+class AtomState;
+class Fix;
+class GhostExchange;
+class RigidMotion;
+
+class MotionCheck : protected Pointers {
+ public:
+  // `bodies` is null in a scene of free spheres.
+  MotionCheck(class LAMMPS *lmp, const Fix *fix, Step &step, GhostExchange &ranks, AtomState &state,
+              RigidMotion *bodies);
+
+  // At the start of a run. Errors and warnings of scene_check.h.
+  void begin_run();
+  // At the start of a run, when its box is set up.
+  void set_up();
+  // `pushing`: the last step pushed spheres apart, and the run's end has taken that out of velocities.
+  void end_run(bool pushing);
+
+  // Before a step. Errors: velocities or forces that are no numbers, a box that has changed, atoms that
+  // did not move as predicted. Collective.
+  void before_step();
+
+  // After a step: notes which atoms are in the group, and how large, and that there is a prediction. The
+  // largest kick [velocity] is that which one of the contacts gave.
+  void after_step(double largest_kick);
+
+ private:
+  std::string break_in_run();
+  std::string not_finite() const;
+  std::string compare(int i) const;
+  std::string changed_before(int i) const;
+  std::string moved_otherwise(int i, double position_error, double velocity_error,
+                              double speed_error) const;
+  std::string other_fixes() const;
+  void compare_all();
+
+  const Fix *fix_;
+  Step &step_;
+  GhostExchange &ranks_;
+  AtomState &state_;
+  RigidMotion *bodies_;
+  SceneCheck scene_;
+  bool goes_on_ = false;          // between setup and the end of the run
+  bool ended_pushing_ = false;    // velocities lack the push that the last run's end took out of them
+  double largest_kick_ = 0.0;     // [velocity] on any rank
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

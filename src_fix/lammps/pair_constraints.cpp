@@ -1,0 +1,230 @@
+#include "pair_constraints.h"
+
+#include "contact_memory.h"
+#include "entangled_bodies.h"
+#include "gap_rules.h"
+#include "rigid_motion.h"
+
+#include "atom.h"
+#include "force.h"
+#include "neigh_list.h"
+
+#include "fmt/format.h"
+
+#include <algorithm>
+#include <cmath>
+
+using namespace LAMMPS_NS;
+using inelastic::dot;
+using inelastic::norm;
+
+namespace {
+
+// Of the largest radius: pairs whose gap is smaller are looked at in every round of a step.
+constexpr double NEAR = 0.2;
+
+// Whether the distance at the end of the step, linearised, |a| + h a.o / |a|, is more than `reach` > 0,
+// for a = `away` and o = `opening`, the relative velocity. It takes no root for pairs of the list.
+bool ends_beyond(double reach, const double *away, double h, const double *opening)
+{
+  const double square = dot(away, away);
+  const double end = square + h * dot(away, opening);
+  return end > 0.0 && end * end > reach * reach * square;
+}
+
+}    // namespace
+
+PairConstraints::PairConstraints(LAMMPS *lmp, Step &step, GapRules &rules,
+                                 const EntangledBodies &entangled, const ContactMemory &memory,
+                                 const RigidMotion *bodies) :
+    Pointers(lmp), step_(step), rules_(rules), entangled_(entangled), memory_(memory),
+    bodies_(bodies)
+{
+}
+
+template <typename Visitor> void PairConstraints::for_each_listed(Visitor &&visit) const
+{
+  const int *const mask = atom->mask;
+  const tagint *const tag = atom->tag;
+  const int nlocal = atom->nlocal;
+  const int group_bit = step_.settings.group_bit;
+  const std::vector<int> &body = step_.problem.bodies.body;
+  std::size_t slot = 0;
+  for (int ii = 0; ii < list_->inum; ++ii) {
+    const int i = list_->ilist[ii];
+    const int *const neighbours = list_->firstneigh[i];
+    const int count = list_->numneigh[i];
+    if (!(mask[i] & group_bit)) {
+      slot += count;
+      continue;
+    }
+    for (int jj = 0; jj < count; ++jj, ++slot) {
+      const int j = neighbours[jj] & NEIGHMASK;
+      if (!(mask[j] & group_bit)) continue;
+      // Without newton a pair across ranks is on both lists: one of them takes it.
+      if (j >= nlocal && !force->newton_pair && tag[i] > tag[j]) continue;
+      if (bodies_ && body[i] >= 0 && body[i] == body[j]) continue;
+      visit(slot, i, j);
+    }
+  }
+}
+
+void PairConstraints::collect(double margin)
+{
+  const double *const *const x = atom->x;
+  const double *const radius = atom->radius;
+  const double h = step_.problem.timestep;
+  const double *const velocity = step_.problem.predicted_velocity.data();
+
+  scanned_ = false;
+  std::size_t slots = 0;
+  for (int ii = 0; ii < list_->inum; ++ii) slots += list_->numneigh[list_->ilist[ii]];
+  taken_.assign(slots, 0);
+
+  for_each_listed([&](std::size_t slot, int i, int j) {
+    const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
+    const double opening[3] = {velocity[3 * i] - velocity[3 * j],
+                               velocity[3 * i + 1] - velocity[3 * j + 1],
+                               velocity[3 * i + 2] - velocity[3 * j + 2]};
+    const double reach = radius[i] + radius[j] + margin;
+    if (dot(away, away) > reach * reach && ends_beyond(reach, away, h, opening)) return;
+    take(slot, i, j);
+  });
+}
+
+void PairConstraints::take(std::size_t slot, int i, int j)
+{
+  inelastic::ContactProblem &problem = step_.problem;
+  const double *const xi = atom->x[i];
+  const double *const xj = atom->x[j];
+  taken_[slot] = 1;
+  if (problem.inverse_mass[i] + problem.inverse_mass[j] == 0.0) return;
+  const double away[3] = {xi[0] - xj[0], xi[1] - xj[1], xi[2] - xj[2]};
+  const double distance = norm(away);
+  const double size = atom->radius[i] + atom->radius[j];
+  if (!(distance > COINCIDENT * size)) {
+    step_.problem_found = fmt::format("the centres of atoms {} and {} coincide: move one of them",
+                                      atom->tag[i], atom->tag[j]);
+    return;
+  }
+  const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
+  const double gap = distance - size;
+  rules_.overlaps().note(gap, i, atom->tag[j]);
+  if (bodies_ && (bodies_->is_incomplete(i) || bodies_->is_incomplete(j))) {
+    step_.problem_found =
+        fmt::format("atoms {} and {} meet where a rank does not see all of their bodies: "
+                    "raise comm_modify cutoff",
+                    atom->tag[i], atom->tag[j]);
+    return;
+  }
+  if (atom->tag[i] == atom->tag[j]) {
+    if (rules_.overlaps().is_bad(gap))
+      step_.problem_found = fmt::format(
+          "atom {} overlaps its own periodic image: the box is too small", atom->tag[i]);
+    return;
+  }
+  problem.contacts.add(i, j, normal, rules_.effective_gap(gap, size),
+                       step_.impulse_per_force * memory_.force(i, atom->tag[j]));
+  step_.sides.push_back({0, gap, size, 0.0});
+}
+
+double PairConstraints::gap_at_end(int i, int j, double *away) const
+{
+  const double h = step_.problem.timestep;
+  const std::vector<double> &moved = step_.motion();
+  for (int d = 0; d < 3; ++d)
+    away[d] = atom->x[i][d] - atom->x[j][d] + h * (moved[3 * i + d] - moved[3 * j + d]);
+  return norm(away) - atom->radius[i] - atom->radius[j];
+}
+
+long PairConstraints::add_violated()
+{
+  const double *const *const x = atom->x;
+  const double *const radius = atom->radius;
+  const double h = step_.problem.timestep;
+  const std::vector<double> &velocity = step_.velocity;
+  const double *const moved = step_.motion().data();
+  auto square_at_end = [&](int i, int j) {
+    double away[3];
+    for (int d = 0; d < 3; ++d)
+      away[d] = x[i][d] - x[j][d] + h * (moved[3 * i + d] - moved[3 * j + d]);
+    return dot(away, away);
+  };
+  auto stays_apart = [&](int i, int j, double distance) {
+    const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
+    const double opening[3] = {velocity[3 * i] - velocity[3 * j],
+                               velocity[3 * i + 1] - velocity[3 * j + 1],
+                               velocity[3 * i + 2] - velocity[3 * j + 2]};
+    return ends_beyond(distance, away, h, opening) &&
+        !(bodies_ && square_at_end(i, j) < distance * distance);
+  };
+  const std::size_t before = step_.problem.contacts.size();
+  auto look_at = [&](std::size_t slot, int i, int j) {
+    const double touching = radius[i] + radius[j] - step_.settings.tolerance;
+    if (!stays_apart(i, j, touching) && !entangled_.contains(i, j)) take(slot, i, j);
+  };
+  const double near = NEAR * step_.largest_radius;
+  if (scanned_ && 2.0 * h * change_since_scan() < near) {
+    for (const NearPair &pair : near_pairs_)
+      if (!taken_[pair.slot]) look_at(pair.slot, pair.first, pair.second);
+  } else {
+    near_pairs_.clear();
+    for_each_listed([&](std::size_t slot, int i, int j) {
+      if (taken_[slot] || stays_apart(i, j, radius[i] + radius[j] + near)) return;
+      near_pairs_.push_back({slot, i, j});
+      look_at(slot, i, j);
+    });
+    scanned_ = true;
+    velocity_at_scan_ = velocity;
+    if (bodies_) motion_at_scan_ = step_.motion();
+  }
+  return static_cast<long>(step_.problem.contacts.size() - before);
+}
+
+// The largest change of a velocity, or of the motion of a turning body, since all pairs were scanned.
+double PairConstraints::change_since_scan() const
+{
+  auto largest = [](const std::vector<double> &a, const std::vector<double> &b) {
+    double most = 0.0;
+    for (std::size_t k = 0; k < a.size(); k += 3) {
+      const double change[3] = {a[k] - b[k], a[k + 1] - b[k + 1], a[k + 2] - b[k + 2]};
+      most = std::max(most, dot(change, change));
+    }
+    return std::sqrt(most);
+  };
+  const double change = largest(step_.velocity, velocity_at_scan_);
+  return bodies_ ? std::max(change, largest(step_.motion(), motion_at_scan_)) : change;
+}
+
+long PairConstraints::relinearise()
+{
+  constexpr double LEAST_ALONG = 0.5;    // the line between the spheres turns by 60 degrees
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const std::vector<double> &velocity = step_.velocity;
+  double away[3];
+  auto relinearised_gap = [&](std::size_t c, double gap) {
+    const double *const n = &contacts.normal[3 * c];
+    double opening = 0.0;
+    for (int d = 0; d < 3; ++d)
+      opening +=
+          n[d] * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
+    const double along = std::max(LEAST_ALONG, dot(n, away) / norm(away));
+    const Side &side = step_.sides[c];
+    const double lacking = gap - rules_.wanted_gap(side.gap_now, side.size);
+    return (lacking < 0.0 ? lacking / along : lacking) - step_.problem.timestep * opening;
+  };
+
+  const bool may_change = step_.relinearisations <= GapRules::MAX_RELINEARISATIONS;
+  long changed = 0;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const Side &side = step_.sides[c];
+    const int i = contacts.first[c], j = contacts.second[c];
+    if (side.wall != 0 || !(step_.is_member(i) || step_.is_member(j))) continue;
+    if (entangled_.contains(i, j)) continue;
+    const double gap = gap_at_end(i, j, away);
+    const bool too_deep = rules_.ends_too_deep(side.gap_now, side.size, gap);
+    if ((too_deep || side.followed) && may_change)
+      changed += rules_.follow(c, relinearised_gap(c, gap), too_deep);
+  }
+  return changed;
+}

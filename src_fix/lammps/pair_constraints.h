@@ -1,0 +1,71 @@
+// The constraints between pairs of spheres: which pairs of the neighbour list are in the problem, from
+// the start or because a solution would let them overlap, and how turning bodies change their gaps.
+
+#ifndef INELASTIC_PAIR_CONSTRAINTS_H
+#define INELASTIC_PAIR_CONSTRAINTS_H
+
+#include "step.h"
+
+#include "pointers.h"
+
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class ContactMemory;
+class EntangledBodies;
+class GapRules;
+class NeighList;
+class RigidMotion;
+
+class PairConstraints : protected Pointers {
+ public:
+  // `bodies` is null in a scene of free spheres.
+  PairConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, const EntangledBodies &entangled,
+                  const ContactMemory &memory, const RigidMotion *bodies);
+
+  void use(NeighList *list) { list_ = list; }
+
+  // Takes the pairs that come nearer than `margin` [length] with the predicted velocities.
+  void collect(double margin);
+
+  // Takes more pairs, those that overlap by more than the tolerance at the end of the step. Returns how
+  // many.
+  long add_violated();
+
+  // Makes the gaps of bodies exact for the present solution. The distance between turning bodies is not
+  // convex. The length that the end of the step lacks beside the linearised gap is put into the gap of the
+  // constraint; where the end has more, nothing changes. The normal stays that of the positions from
+  // which the force acts: along any other, two opposite forces would be a couple, and angular momentum
+  // would not be kept. The lacking length is made up along the normal, hence the division by a cosine.
+  // Returns how many constraints changed.
+  long relinearise();
+
+ private:
+  struct NearPair {
+    std::size_t slot;    // in taken_
+    int first, second;
+  };
+
+  template <typename Visitor> void for_each_listed(Visitor &&visit) const;
+  void take(std::size_t slot, int i, int j);
+  double gap_at_end(int i, int j, double *away) const;
+  double change_since_scan() const;
+
+  Step &step_;
+  GapRules &rules_;
+  const EntangledBodies &entangled_;
+  const ContactMemory &memory_;
+  const RigidMotion *bodies_;
+  NeighList *list_ = nullptr;
+  std::vector<char> taken_;    // per pair of the neighbour list: whether it is in the problem
+  // After the first scan of all pairs in a step only those that were near each other need another look,
+  // as long as no velocity has changed much since.
+  bool scanned_ = false;
+  std::vector<NearPair> near_pairs_;
+  std::vector<double> velocity_at_scan_, motion_at_scan_;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

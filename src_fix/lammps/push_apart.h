@@ -1,0 +1,41 @@
+// The way out of a bad start, overlaps beyond the regular ones: the smallest motion, added to the step's
+// but not kept as momentum, that takes the spheres apart at a bounded speed.
+
+#ifndef INELASTIC_PUSH_APART_H
+#define INELASTIC_PUSH_APART_H
+
+#include "projection.h"
+
+#include <functional>
+
+namespace LAMMPS_NS {
+
+class Atom;
+class Constraints;
+class RigidMotion;
+struct Step;
+
+class PushApart {
+ public:
+  // Projects the step's predicted velocities with at most so many iterations.
+  using Project = std::function<inelastic::ProjectionResult(long max_iterations)>;
+
+  // `bodies` is null in a scene of free spheres.
+  PushApart(Step &step, Constraints &constraints, RigidMotion *bodies) :
+      step_(step), constraints_(constraints), bodies_(bodies)
+  {
+  }
+
+  // Changes the velocities of the step, which were projected with bad overlaps counted as touching. The
+  // predicted velocities become those without the push. Adds the second projection to the result.
+  void run(const Atom *atom, inelastic::ProjectionResult &result, const Project &project);
+
+ private:
+  Step &step_;
+  Constraints &constraints_;
+  RigidMotion *bodies_;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,87 @@
+// How long a step may be. Pairs that the neighbour list lacks must not meet during it, LAMMPS must be able
+// to follow every atom, and, with the keyword shorten, no overlap may be left at its end.
+
+#ifndef INELASTIC_STEP_LENGTH_H
+#define INELASTIC_STEP_LENGTH_H
+
+#include "step.h"
+
+#include "pointers.h"
+
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class GhostExchange;
+
+class StepLength : protected Pointers {
+ public:
+  StepLength(class LAMMPS *lmp, Step &step, GhostExchange &ranks);
+
+  // At the start of a run. `one_cutoff`: the neighbour list is by one cutoff for all pairs, not by their
+  // radii.
+  void begin_run(bool one_cutoff);
+
+  // The neighbour list is new: takes the positions, and how far the list reaches. Errors: a tolerance
+  // below the round-off of positions, and a list that is too short for the spheres.
+  void list_built();
+
+  // At the start of a step: a time step that was shortened is the regular one again. Collective.
+  void begin_step();
+
+  // Shortens the step where the list cannot reach as far as atoms would move without contacts: there is
+  // no use in solving first. Collective.
+  void fit_to_list(Kick kick);
+
+  // Whether the step, solved, may be made. Otherwise it is shorter now, or there is an error. `named`
+  // tells of the constraint that is farthest from being met, if any. Collective.
+  bool accepts(const std::string &named);
+
+  // Makes the time step shorter. Errors: it is so short already that something else is wrong.
+  void shorten(double factor, const std::string &named);
+
+  // Whether the keyword allows a shorter step for one that could not be solved.
+  bool may_shorten_unsolved() const;
+
+  // Whether the list must be built before the next step, which may be half as fast again. Collective.
+  bool needs_new_list();
+
+  void restore();
+  // The timestep command, also where no run is set up after it (run pre no).
+  void timestep_was_set();
+  bool is_shortened() const;
+  void set_timestep(double timestep);
+
+  double reach() const { return list_reach_; }    // [length]
+  long shortened_steps() const { return shortened_steps_; }
+
+ private:
+  void measure_farthest();
+  double part_of_farthest();
+  double spread(const double *values);
+  double spread_since_build(const double *motion);
+  double unhindered_spread(double kicks);
+  double room_in_list(double none, double whole) const;
+
+  Step &step_;
+  GhostExchange &ranks_;
+  bool one_cutoff_ = true;
+  double list_reach_ = 0.0;         // [length] the gap beyond which a pair may lack in a new list
+  double spread_at_start_ = 0.0;    // [length] largest relative displacement since the list was built
+  double growth_ = 0.0;             // [length] of a radius since then
+  double strayed_ = 0.0;            // largest displacement since then, of the width that a rank owns
+  // [length] The part of the box that this rank owns; no limit where nothing is beyond.
+  double own_width_[3] = {EXTREME, EXTREME, EXTREME};
+  // Of the box, in each direction: LAMMPS loses an atom that goes further between two lists.
+  double farthest_[3] = {EXTREME, EXTREME, EXTREME};
+  std::vector<double> position_at_build_, radius_at_build_;
+  std::vector<double> displacement_, unhindered_;    // room
+  bool shortened_ = false;                           // restore() must undo it
+  bool setting_timestep_ = false;                    // the fix itself is changing it
+  long shortened_steps_ = 0;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

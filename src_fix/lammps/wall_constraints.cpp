@@ -1,0 +1,273 @@
+#include "wall_constraints.h"
+
+#include "contact_memory.h"
+#include "gap_rules.h"
+#include "ghost_exchange.h"
+#include "rigid_motion.h"
+
+#include "atom.h"
+
+#include "fmt/format.h"
+
+#include <algorithm>
+#include <cmath>
+
+using namespace LAMMPS_NS;
+using inelastic::dot;
+using inelastic::norm;
+
+namespace {
+
+// [radians] The end of a body that turns further says little about the wall that it has met.
+constexpr double HALF_A_TURN = 3.14;
+
+}    // namespace
+
+WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, RegionWalls &walls,
+                                 GhostExchange &ranks, const ContactMemory &memory,
+                                 const RigidMotion *bodies) :
+    Pointers(lmp), step_(step), rules_(rules), walls_(walls), ranks_(ranks), memory_(memory),
+    bodies_(bodies)
+{
+}
+
+// Points from which to look at the walls from where atoms are, as far as the step takes them.
+const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *velocity,
+                                                               double beyond)
+{
+  viewpoints_.clear();
+  const double h = step_.problem.timestep;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (step_.problem.inverse_mass[i] == 0.0) continue;
+    const double *const x = atom->x[i];
+    const double reach = atom->radius[i] + beyond + h * norm(velocity + 3 * i);
+    if (reach >= clear_of_walls_[i]) viewpoints_.push_back({i, {x[0], x[1], x[2]}, reach});
+  }
+  return viewpoints_;
+}
+
+// Points where the step takes those atoms for which the constraint of a wall may be inexact. A
+// constraint that was set by an earlier look is set again wherever its wall is now.
+const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double margin)
+{
+  const std::vector<double> &moved = step_.motion();
+  viewpoints_.clear();
+  const double h = step_.problem.timestep;
+  std::unordered_set<int> followed;
+  for (std::size_t c = 0; c < step_.sides.size(); ++c) {
+    const int i = step_.problem.contacts.first[c];
+    if (step_.sides[c].wall != 0 && step_.sides[c].followed &&
+        bodies_->angle_turned(step_.problem, i) < HALF_A_TURN)
+      followed.insert(i);
+  }
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (step_.problem.inverse_mass[i] == 0.0 || (walls_.exact() && !step_.is_member(i))) continue;
+    const double *const x = atom->x[i];
+    const double *const v = &moved[3 * i];
+    const double reach = followed.count(i) ? EXTREME : atom->radius[i] + (bodies_ ? margin : 0.0);
+    if (reach + h * norm(v) < clear_of_walls_[i]) continue;
+    viewpoints_.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
+  }
+  return viewpoints_;
+}
+
+void WallConstraints::collect(double margin)
+{
+  constraint_.clear();
+  if (walls_.empty()) return;
+  const double *const velocity = step_.problem.predicted_velocity.data();
+  // A look further than needed tells for most atoms that no other is, in this step. (Not where parts
+  // of a region hide others.)
+  const double further = walls_.exact() ? 2.0 * step_.largest_radius : 0.0;
+  clear_of_walls_.assign(atom->nlocal, 0.0);
+  const Viewpoints &far = viewpoints(velocity, margin + further);
+  if (walls_.exact())
+    for (const RegionWalls::Viewpoint &from : far) clear_of_walls_[from.atom] = from.reach;
+  walls_.view(
+      far, false,
+      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+        clear_of_walls_[from.atom] = 0.0;
+        const double gap = view.distance - atom->radius[from.atom];
+        rules_.overlaps().note(view.distance_now - atom->radius[from.atom], from.atom, -view.wall);
+        const double opening =
+            step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
+        if (gap + std::min(0.0, opening) <= margin) take(from, view);
+      },
+      [&](const RegionWalls::Viewpoint &from, const std::string &region) {
+        step_.problem_found = fmt::format("the centre of atom {} is on the wrong side of region {}",
+                                          atom->tag[from.atom], region);
+      });
+}
+
+void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &view)
+{
+  inelastic::ContactProblem &problem = step_.problem;
+  const int i = from.atom;
+  const double size = atom->radius[i];
+  const double gap_now = view.distance_now - size;
+  const double motion = view.distance_now - view.distance;
+  constraint_[key(i, view.wall)] = problem.contacts.size();
+  problem.contacts.add(i, problem.particles, view.normal,
+                       rules_.effective_gap(gap_now, size) - motion,
+                       step_.impulse_per_force * memory_.force(i, -view.wall));
+  step_.sides.push_back({view.wall, gap_now, size, motion});
+}
+
+long WallConstraints::add_violated()
+{
+  if (walls_.empty()) return 0;
+  const double *const velocity = step_.velocity.data();
+  const std::size_t before = step_.problem.contacts.size();
+  walls_.view(
+      viewpoints(velocity, 0.0), false,
+      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+        const double gap = view.distance - atom->radius[from.atom];
+        const double opening =
+            step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
+        if (gap + opening < -step_.settings.tolerance &&
+            !constraint_.count(key(from.atom, view.wall)))
+          take(from, view);
+      },
+      [](const RegionWalls::Viewpoint &, const std::string &) {
+      });
+  return static_cast<long>(step_.problem.contacts.size() - before);
+}
+
+bool WallConstraints::is_same_plane(std::size_t c, const double *normal) const
+{
+  constexpr double SAME = 1.0e-12;    // of 1 - cos of the angle between two unit vectors
+  return dot(&step_.problem.contacts.normal[3 * c], normal) > 1.0 - SAME;
+}
+
+long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallView &view,
+                                bool too_deep)
+{
+  if (step_.relinearisations > GapRules::MAX_RELINEARISATIONS) return 0;
+  const int i = from.atom;
+  const double h = step_.problem.timestep;
+  const auto existing = constraint_.find(key(i, view.wall));
+  const bool known = existing != constraint_.end();
+  const double *const n = view.normal;
+  const double *const x = atom->x[i];
+  const double from_here[3] = {from.where[0] - x[0], from.where[1] - x[1], from.where[2] - x[2]};
+  const double gap_there = view.distance - atom->radius[i];
+  const double gap_here = gap_there - dot(n, from_here);
+  const double wall_motion = view.distance_now - view.distance;
+  // A region can show a wall late: from inside one part of a union the others are not seen. An obstacle
+  // that is overlapped is seen; its plane at the end of the step may lie beyond where the sphere is now.
+  const double to_plane = gap_here + wall_motion;
+  const double gap_now = known ? step_.sides[existing->second].gap_now
+      : view.convex            ? std::max(0.0, to_plane)
+                               : to_plane;
+  rules_.overlaps().note(gap_now, i, -view.wall);
+  // This makes it exact for this motion, also where a body turns.
+  const double turning = step_.is_member(i)
+      ? h * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]))
+      : 0.0;
+  const double gap = gap_here + turning - rules_.wanted_gap(gap_now, atom->radius[i]);
+  if (known && is_same_plane(existing->second, n))
+    return rules_.follow(existing->second, gap, too_deep);
+  if (!too_deep) return 0;
+  inelastic::ContactProblem &problem = step_.problem;
+  constraint_[key(i, view.wall)] = problem.contacts.size();
+  problem.contacts.add(i, problem.particles, view.normal, gap, 0.0);
+  step_.sides.push_back({view.wall, gap_now, atom->radius[i], wall_motion, step_.is_member(i)});
+  return 1;
+}
+
+long WallConstraints::relinearise(double margin)
+{
+  long changed = 0;
+  Viewpoints beyond;
+  std::unordered_set<std::size_t> seen;
+  walls_.view(
+      viewpoints_at_end(margin), !bodies_,
+      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+        const auto existing = constraint_.find(key(from.atom, view.wall));
+        const bool known = existing != constraint_.end();
+        if (known) seen.insert(existing->second);
+        const double gap_now = known ? step_.sides[existing->second].gap_now : 0.0;
+        const double gap = view.distance - atom->radius[from.atom];
+        const bool too_deep = rules_.ends_too_deep(gap_now, atom->radius[from.atom], gap);
+        if (too_deep || (known && step_.sides[existing->second].followed))
+          changed += add_plane(from, view, too_deep);
+      },
+      [&](const RegionWalls::Viewpoint &from, const std::string &) {
+        beyond.push_back(from);
+      });
+  if (bodies_) changed += follow_unseen(seen, beyond);
+  return changed + add_planes_within(beyond);
+}
+
+// From where a body ends, a part of an intersection of regions may not show the wall that a constraint
+// was set for: the plane tells how far it is.
+long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
+                                    const Viewpoints &beyond)
+{
+  std::unordered_set<int> skipped;
+  for (const RegionWalls::Viewpoint &from : beyond) skipped.insert(from.atom);
+  long changed = 0;
+  for (const auto &[atom_and_wall, c] : constraint_) {
+    const Side &side = step_.sides[c];
+    const int i = step_.problem.contacts.first[c];
+    if (!side.followed || seen.count(c) || skipped.count(i) ||
+        bodies_->angle_turned(step_.problem, i) >= HALF_A_TURN)
+      continue;
+    const double *const n = &step_.problem.contacts.normal[3 * c];
+    const double turning = step_.problem.timestep *
+        (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]));
+    const double linear_gap = rules_.effective_gap(side.gap_now, side.size) - side.wall_motion;
+    changed += rules_.follow(c, linear_gap + turning, false);
+  }
+  return changed;
+}
+
+// From beyond a wall nothing is seen: planes are added for the last place from which the wall is.
+// Collective.
+long WallConstraints::add_planes_within(const Viewpoints &beyond)
+{
+  double number_beyond = static_cast<double>(beyond.size());
+  ranks_.reduce(&number_beyond, 1, nullptr, 0);
+  if (!(number_beyond > 0.0)) return 0;
+  for (const RegionWalls::Viewpoint &from : beyond)
+    step_.excess = std::max(step_.excess, atom->radius[from.atom]);
+  long changed = 0;
+  walls_.view(
+      last_inside(beyond), !bodies_,
+      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+        changed += add_plane(from, view, true);
+      },
+      [](const RegionWalls::Viewpoint &, const std::string &) {
+      });
+  return changed;
+}
+
+// How far along the step each of these centres is still inside, by bisection. Collective.
+WallConstraints::Viewpoints WallConstraints::last_inside(const Viewpoints &beyond)
+{
+  constexpr int BISECTIONS = 12;
+  // Parts of the step.
+  std::vector<double> inside(beyond.size(), 0.0), outside(beyond.size(), 1.0);
+  auto viewpoints_at = [&](const std::vector<double> &part) {
+    Viewpoints points = beyond;
+    for (std::size_t k = 0; k < beyond.size(); ++k)
+      for (int d = 0; d < 3; ++d)
+        points[k].where[d] += (part[k] - 1.0) * (beyond[k].where[d] - atom->x[beyond[k].atom][d]);
+    return points;
+  };
+  for (int bisection = 0; bisection < BISECTIONS; ++bisection) {
+    std::vector<double> middle(beyond.size());
+    for (std::size_t k = 0; k < beyond.size(); ++k) middle[k] = 0.5 * (inside[k] + outside[k]);
+    const Viewpoints points = viewpoints_at(middle);
+    std::vector<char> out(beyond.size(), 0);
+    walls_.view(
+        points, !bodies_,
+        [](const RegionWalls::Viewpoint &, const WallView &) {
+        },
+        [&](const RegionWalls::Viewpoint &from, const std::string &) {
+          out[&from - points.data()] = 1;
+        });
+    for (std::size_t k = 0; k < beyond.size(); ++k) (out[k] ? outside : inside)[k] = middle[k];
+  }
+  return viewpoints_at(inside);
+}

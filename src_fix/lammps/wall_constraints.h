@@ -1,0 +1,74 @@
+// The constraints between spheres and walls: which walls are in the problem, from the start or because a
+// solution would let a sphere overlap them, and how curved walls and turning bodies change their gaps.
+
+#ifndef INELASTIC_WALL_CONSTRAINTS_H
+#define INELASTIC_WALL_CONSTRAINTS_H
+
+#include "region_walls.h"
+#include "step.h"
+
+#include "pointers.h"
+
+#include <cstdint>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class ContactMemory;
+class GapRules;
+class GhostExchange;
+class RigidMotion;
+
+class WallConstraints : protected Pointers {
+ public:
+  // `bodies` is null in a scene of free spheres.
+  WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, RegionWalls &walls,
+                  GhostExchange &ranks, const ContactMemory &memory, const RigidMotion *bodies);
+
+  // Whether the end of a step must be looked at: bodies turn, or walls curve.
+  bool need_relinearising() const { return !walls_.empty() && (bodies_ || !walls_.exact()); }
+
+  // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
+  void collect(double margin);
+
+  // Takes more walls, those that are overlapped by more than the tolerance at the end of the step.
+  // Returns how many.
+  long add_violated();
+
+  // Adds tangent planes, or moves them. Inside a concave wall the distance is not convex: where a sphere
+  // ends up overlapping, the wall's tangent plane at that end is added. The planes from before stay: all
+  // of them bound the container from outside, and at the tip of a cone a sphere rests on several.
+  // Returns how many constraints were added or changed. Collective.
+  long relinearise(double margin);
+
+ private:
+  using Viewpoints = std::vector<RegionWalls::Viewpoint>;
+
+  std::uint64_t key(int i, int wall) const
+  { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
+
+  void take(const RegionWalls::Viewpoint &, const WallView &);
+  const Viewpoints &viewpoints(const double *velocity, double beyond);
+  const Viewpoints &viewpoints_at_end(double margin);
+  Viewpoints last_inside(const Viewpoints &beyond);
+  long add_plane(const RegionWalls::Viewpoint &, const WallView &, bool too_deep);
+  long add_planes_within(const Viewpoints &beyond);
+  long follow_unseen(const std::unordered_set<std::size_t> &seen, const Viewpoints &beyond);
+  bool is_same_plane(std::size_t c, const double *normal) const;
+
+  Step &step_;
+  GapRules &rules_;
+  RegionWalls &walls_;
+  GhostExchange &ranks_;
+  const ContactMemory &memory_;
+  const RigidMotion *bodies_;
+  std::unordered_map<std::uint64_t, std::size_t> constraint_;    // atom and wall -> the latest one
+  Viewpoints viewpoints_;                                        // room for them
+  std::vector<double> clear_of_walls_;    // per owned atom: no wall of this step is as near as this
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
