@@ -1087,6 +1087,30 @@ bool FixInelastic::same_plane(std::size_t c, const double *normal) const
   return dot(&problem_.contacts.normal[3 * c], normal) > 1.0 - SAME;
 }
 
+// From where a body ends, a part of an intersection of regions may not show the wall that a constraint was
+// set for: the plane tells how far it is.
+long FixInelastic::follow_unseen(const std::vector<double> &velocity,
+                                 const std::unordered_set<std::size_t> &seen,
+                                 const std::vector<RegionWalls::Look> &beyond)
+{
+  std::unordered_set<int> skipped;
+  for (const RegionWalls::Look &look : beyond) skipped.insert(look.atom);
+  long changed = 0;
+  for (const auto &[key, c] : wall_constraint_) {
+    const Origin &origin = origin_[c];
+    const int i = problem_.contacts.first[c];
+    if (!origin.followed || seen.count(c) || skipped.count(i) ||
+        rigid_->angle_turned(problem_, i) >= HALF_A_TURN)
+      continue;
+    const double *const n = &problem_.contacts.normal[3 * c];
+    const double turning =
+        problem_.timestep * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]));
+    const double linear_gap = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
+    changed += follow(c, linear_gap + turning, false);
+  }
+  return changed;
+}
+
 // Inside a concave wall the distance is not convex: where a sphere ends up overlapping, the wall's
 // tangent plane at that end is added. The planes seen before stay: all of them bound the container
 // from outside, and at the tip of a cone a sphere rests on several.
@@ -1126,11 +1150,13 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
   const std::vector<RegionWalls::Look> &ends = looks_at_end(velocity);
   const bool inexact_only = !rigid_;
   std::vector<RegionWalls::Look> beyond;
+  std::unordered_set<std::size_t> seen;
   walls_->view(
       ends, inexact_only,
       [&](const RegionWalls::Look &look, const WallView &view) {
         const auto existing = wall_constraint_.find(wall_key(look.atom, view.wall));
         const bool known = existing != wall_constraint_.end();
+        if (known) seen.insert(existing->second);
         const double gap_now = known ? origin_[existing->second].gap_now : 0.0;
         const double gap = view.distance - atom->radius[look.atom];
         const bool too_deep = ends_too_deep(gap_now, atom->radius[look.atom], gap);
@@ -1140,6 +1166,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
       [&](const RegionWalls::Look &look, const std::string &) {
         beyond.push_back(look);
       });
+  if (rigid_) changed += follow_unseen(velocity, seen, beyond);
 
   double number_beyond = static_cast<double>(beyond.size());
   reduce(&number_beyond, 1, nullptr, 0);
