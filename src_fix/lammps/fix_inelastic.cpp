@@ -1129,8 +1129,12 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     const double gap_there = view.distance - atom->radius[i];
     const double gap_here = gap_there - dot(n, from_here);
     const double wall_motion = view.distance_now - view.distance;
-    const double gap_now = known ? origin_[existing->second].gap_now : gap_here + wall_motion;
-    // A region can show a wall late: from inside one part of a union the others are not seen.
+    // A region can show a wall late: from inside one part of a union the others are not seen. An obstacle
+    // that is overlapped is seen; its plane at the end of the step may lie beyond where the sphere is now.
+    const double to_plane = gap_here + wall_motion;
+    const double gap_now = known ? origin_[existing->second].gap_now
+        : view.convex            ? std::max(0.0, to_plane)
+                                 : to_plane;
     note_overlap(gap_now, i, -view.wall);
     // Exact for this motion, also where a body turns.
     const double turning = is_member(i) ? h * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]))

@@ -74,7 +74,7 @@ void RegionWalls::init()
     const bool joined = strcmp(region->style, "union") == 0 ||
         strcmp(region->style, "intersect") == 0;
     const bool cone = joined || strcmp(region->style, "cone") == 0;
-    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, cone});
+    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, convex_obstacle, cone});
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
   }
@@ -121,6 +121,7 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
   for (int k = 0; k < count; ++k) {
     if (!(region->contact[k].r > 0.0)) return false;
     views.push_back(make_view(region->contact[k], obstacle.first_wall));
+    views.back().convex = obstacle.convex;
   }
   if (obstacle.cone)
     for (WallView &view : views) correct_cap(obstacle, x, view);

@@ -22,6 +22,7 @@ struct WallView {
   double
       normal[3];    // unit vector from the wall to the centre, for the wall at the end of the step
   double distance_now;    // to the wall as it stands now; the difference is the wall's own motion
+  bool convex;            // the side of an obstacle that curves, or has edges, away from the sphere
 };
 
 class RegionWalls : protected Pointers {
@@ -63,6 +64,7 @@ class RegionWalls : protected Pointers {
     int first_wall;
     bool moving;
     bool exact;
+    bool convex;
     bool cone;
   };
 
