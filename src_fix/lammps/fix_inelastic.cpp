@@ -1087,6 +1087,30 @@ bool FixInelastic::same_plane(std::size_t c, const double *normal) const
   return dot(&problem_.contacts.normal[3 * c], normal) > 1.0 - SAME;
 }
 
+// From where a body ends, a part of an intersection of regions may not show the wall that a constraint was
+// set for: the plane tells how far it is.
+long FixInelastic::follow_unseen(const std::vector<double> &velocity,
+                                 const std::unordered_set<std::size_t> &seen,
+                                 const std::vector<RegionWalls::Look> &beyond)
+{
+  std::unordered_set<int> skipped;
+  for (const RegionWalls::Look &look : beyond) skipped.insert(look.atom);
+  long changed = 0;
+  for (const auto &[key, c] : wall_constraint_) {
+    const Origin &origin = origin_[c];
+    const int i = problem_.contacts.first[c];
+    if (!origin.followed || seen.count(c) || skipped.count(i) ||
+        rigid_->angle_turned(problem_, i) >= HALF_A_TURN)
+      continue;
+    const double *const n = &problem_.contacts.normal[3 * c];
+    const double turning =
+        problem_.timestep * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]));
+    const double linear_gap = effective_gap(origin.gap_now, origin.size) - origin.wall_motion;
+    changed += follow(c, linear_gap + turning, false);
+  }
+  return changed;
+}
+
 // Inside a concave wall the distance is not convex: where a sphere ends up overlapping, the wall's
 // tangent plane at that end is added. The planes seen before stay: all of them bound the container
 // from outside, and at the tip of a cone a sphere rests on several.
@@ -1105,8 +1129,12 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
     const double gap_there = view.distance - atom->radius[i];
     const double gap_here = gap_there - dot(n, from_here);
     const double wall_motion = view.distance_now - view.distance;
-    const double gap_now = known ? origin_[existing->second].gap_now : gap_here + wall_motion;
-    // A region can show a wall late: from inside one part of a union the others are not seen.
+    // A region can show a wall late: from inside one part of a union the others are not seen. An obstacle
+    // that is overlapped is seen; its plane at the end of the step may lie beyond where the sphere is now.
+    const double to_plane = gap_here + wall_motion;
+    const double gap_now = known ? origin_[existing->second].gap_now
+        : view.convex            ? std::max(0.0, to_plane)
+                                 : to_plane;
     note_overlap(gap_now, i, -view.wall);
     // Exact for this motion, also where a body turns.
     const double turning = is_member(i) ? h * (dot(n, &motion()[3 * i]) - dot(n, &velocity[3 * i]))
@@ -1126,11 +1154,13 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
   const std::vector<RegionWalls::Look> &ends = looks_at_end(velocity);
   const bool inexact_only = !rigid_;
   std::vector<RegionWalls::Look> beyond;
+  std::unordered_set<std::size_t> seen;
   walls_->view(
       ends, inexact_only,
       [&](const RegionWalls::Look &look, const WallView &view) {
         const auto existing = wall_constraint_.find(wall_key(look.atom, view.wall));
         const bool known = existing != wall_constraint_.end();
+        if (known) seen.insert(existing->second);
         const double gap_now = known ? origin_[existing->second].gap_now : 0.0;
         const double gap = view.distance - atom->radius[look.atom];
         const bool too_deep = ends_too_deep(gap_now, atom->radius[look.atom], gap);
@@ -1140,6 +1170,7 @@ long FixInelastic::relinearise_walls(const std::vector<double> &velocity)
       [&](const RegionWalls::Look &look, const std::string &) {
         beyond.push_back(look);
       });
+  if (rigid_) changed += follow_unseen(velocity, seen, beyond);
 
   double number_beyond = static_cast<double>(beyond.size());
   reduce(&number_beyond, 1, nullptr, 0);

@@ -257,6 +257,9 @@ class FixInelastic : public Fix, private inelastic::Host, private inelastic::Con
   std::vector<RegionWalls::Look> last_inside(const std::vector<RegionWalls::Look> &beyond);
   const std::vector<RegionWalls::Look> &looks(const double *velocity, double beyond);
   const std::vector<RegionWalls::Look> &looks_at_end(const std::vector<double> &velocity);
+  long follow_unseen(const std::vector<double> &velocity,
+                     const std::unordered_set<std::size_t> &seen,
+                     const std::vector<RegionWalls::Look> &beyond);
   bool same_plane(std::size_t c, const double *normal) const;
   double effective_gap(double gap_now, double size) const;
   double wanted_gap(double gap_now, double size) const;
