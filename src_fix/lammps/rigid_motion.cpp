@@ -307,6 +307,23 @@ void RigidMotion::keep(int i, const Push &push, const double *contact_force)
       (std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end)) +
        step_.impulse_per_force * moments * (inverse[0] + inverse[1] + inverse[2]));
   // The angular momentum is carried along, and with it what an earlier step's moments have rounded.
-  of_body.angle = whole ? std::max(of_body.angle, angle) : angle;
+  of_body.angle = std::max(angle, whole ? of_body.angle : angle_of_first_momentum(b));
   std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
+}
+
+// At the start of a run LAMMPS takes the angular momentum of a body from velocities that hold the common
+// one, and its centre of mass is rounded as coordinates are: to about M |dx| |v|. This is the angle whose
+// square magnifies the round-off of positions as much as that does.
+double RigidMotion::angle_of_first_momentum(int b) const
+{
+  // Ten times the machine epsilon, of the part of coordinates that is allowed for round-off.
+  constexpr double ROUNDED = 2.2e-3;
+  const inelastic::RigidBodies &bodies = step_.problem.bodies;
+  double longest = 0.0;
+  for (int k = bodies.start[b]; k < bodies.start[b] + bodies.originals[b]; ++k)
+    longest = std::max(longest, norm(&bodies.arm[3 * k]));
+  const double *const inverse = &bodies.inverse_inertia[6 * b];
+  const double turned = step_.problem.timestep * inertias_[b].mass *
+      norm(bodies_[b].velocity_end) * (inverse[0] + inverse[1] + inverse[2]) * longest;
+  return std::sqrt(ROUNDED * turned);
 }

@@ -85,6 +85,7 @@ class RigidMotion final : public Mover, protected Pointers {
   void predict_body(std::size_t b);
   Push replace_push(int i, double *force);
   void keep(int i, const Push &push, const double *contact_force);
+  double angle_of_first_momentum(int b) const;
   void velocity_after(int i, double *velocity) const;
   Push difference(const inelastic::RigidBodies &bodies, std::size_t b, const double *velocity,
                   const double *reference) const;
