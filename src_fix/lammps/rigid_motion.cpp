@@ -598,8 +598,25 @@ void RigidMotion::finish(const inelastic::ContactProblem &problem, int i, const 
       (std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end)) +
        kick.strength * moments * trace(&bodies.inverse_inertia[6 * b]));
   // The angular momentum is carried along, and with it what an earlier step's moments have rounded.
-  of_body.angle = kick.whole ? std::max(of_body.angle, angle) : angle;
+  of_body.angle = kick.whole ? std::max(of_body.angle, angle)
+                             : std::max(angle, angle_of_first_momentum(problem, b));
   std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
+}
+
+// At the start of a run LAMMPS takes the angular momentum of a body from velocities that hold the common
+// one, and its centre of mass is rounded as coordinates are: to about M |dx| |v|. The angle whose square
+// magnifies the round-off of positions as much as that does.
+double RigidMotion::angle_of_first_momentum(const inelastic::ContactProblem &problem, int b) const
+{
+  // Ten times the machine epsilon, of the part of coordinates that is allowed for round-off.
+  constexpr double ROUNDED = 2.2e-3;
+  const inelastic::RigidBodies &bodies = problem.bodies;
+  double longest = 0.0;
+  for (int k = bodies.start[b]; k < bodies.start[b] + bodies.originals[b]; ++k)
+    longest = std::max(longest, norm(&bodies.arm[3 * k]));
+  const double turned = problem.timestep * bodies_[b].mass * norm(bodies_[b].velocity_end) *
+      trace(&bodies.inverse_inertia[6 * b]) * longest;
+  return std::sqrt(ROUNDED * turned);
 }
 
 int RigidMotion::pack(int i, double *buffer) const

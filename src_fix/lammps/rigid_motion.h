@@ -165,6 +165,7 @@ class RigidMotion : protected Pointers {
   bool pushing_;
 
   double mass(int i) const;
+  double angle_of_first_momentum(const inelastic::ContactProblem &problem, int b) const;
   void count_spheres(int groupbit, int frozen_bit);
   void check_reach(double extent) const;
   std::string explained(const std::string &message, inelastic::Host &host) const;
