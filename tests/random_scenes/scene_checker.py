@@ -794,7 +794,8 @@ class _Part:
             arms = ROUND_OFF * self.lengths(new) / self.facts["smallest"]
             turning = (100 * ROUND_OFF + 10 * arms) * (
                 np.linalg.norm(new.body_l, axis=1) + mass * lengths * (speed + strong)
-            ) + 1e-300
+            )
+            turning += ROUND_OFF * mass * lengths * self.fastest + 1e-300
             names = new.bodies["mol"]
             in_line = np.zeros(len(names), dtype=bool)
             if was_pushed:
