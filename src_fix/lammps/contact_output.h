@@ -1,0 +1,102 @@
+// What the fix gives to LAMMPS's output: the global vector, contacts and forces per atom, the local list
+// of contacts, the forces on walls and the virial. Nothing here steers the fix.
+
+#ifndef INELASTIC_CONTACT_OUTPUT_H
+#define INELASTIC_CONTACT_OUTPUT_H
+
+#include "projection.h"
+#include "step.h"
+
+#include "pointers.h"
+
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class GhostExchange;
+
+class ContactOutput : protected Pointers {
+ public:
+  ContactOutput(class LAMMPS *lmp, const Step &step, GhostExchange &ranks);
+  ~ContactOutput() override;
+  ContactOutput(const ContactOutput &) = delete;
+  ContactOutput &operator=(const ContactOutput &) = delete;
+
+  // The columns of the arrays, in the order in which the page of the fix lists them.
+  static constexpr int PER_ATOM_COLUMNS = 5;
+  static constexpr int LOCAL_COLUMNS = 10;
+  enum Vector {
+    ITERATIONS,
+    FEASIBILITY,
+    COMPLEMENTARITY,
+    OVERLAP,
+    PARTICLE_CONTACTS,
+    WALL_CONTACTS,
+    CONSTRAINTS,
+    ROUNDS,
+    TOTAL_ITERATIONS,
+    SHORTENED_STEPS,
+    EXCESS,
+    VECTOR_SIZE
+  };
+
+  void begin_run(int number_of_walls);
+
+  // Which virial LAMMPS wants in this step, and where it is added.
+  struct VirialTarget {
+    bool global;
+    bool per_atom;
+    double *total;      // 6 numbers
+    double **atoms;     // 6 per atom
+  };
+
+  // After a step. Collective.
+  void update(const inelastic::ProjectionResult &result, long shortened_steps,
+              const VirialTarget &virial);
+
+  // 3 per particle: the force of all contacts, on ghosts that of their owned atom.
+  const double *contact_force() const { return contact_force_.data(); }
+  // The largest change of a velocity that one of the contacts made, on any rank.
+  double largest_kick() const { return largest_kick_; }
+
+  double vector(int n) const { return vector_[n]; }
+  // One component of the force on a wall (0 = the first one), on all ranks. Collective.
+  double wall_force(int wall, int direction);
+  double **per_atom() { return per_atom_; }
+  double **local() { return local_; }
+  int local_rows() const { return local_rows_; }
+
+  // LAMMPS's callbacks for what is per atom.
+  void grow(int atoms);
+  void copy(int from, int to);
+  void clear(int i);
+
+  // [numbers] of one constraint.
+  static constexpr double PER_CONTACT = 20.0 + LOCAL_COLUMNS;
+
+ private:
+  void clear_sums(bool virial_per_atom);
+  void add_contact(std::size_t c, double strength, const VirialTarget &virial);
+  void list_contact(std::size_t c, double strength, double to_point);
+  void add_virial(std::size_t c, double weight, const VirialTarget &virial);
+  void share(const VirialTarget &virial);
+
+  const Step &step_;
+  GhostExchange &ranks_;
+  double vector_[VECTOR_SIZE] = {};
+  double **per_atom_ = nullptr;
+  double **local_ = nullptr;
+  int local_rows_ = 0;
+  int local_room_ = 0;
+  double counts_[2] = {0.0, 0.0};                        // contacts of spheres, with walls
+  std::vector<double> contact_force_, contact_count_;    // 3 per particle, and for the dummy
+  std::vector<double> virial_diagonal_, virial_off_diagonal_;
+  std::vector<double> wall_force_;    // 3 per wall, this rank's share
+  std::vector<double> wall_force_total_;
+  bigint wall_force_step_ = -1;
+  double largest_kick_ = 0.0;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

@@ -1,0 +1,45 @@
+// What the log says about a run when it has ended.
+
+#ifndef INELASTIC_RUN_SUMMARY_H
+#define INELASTIC_RUN_SUMMARY_H
+
+#include "phase_clock.h"
+#include "projection.h"
+#include "step.h"
+
+#include "pointers.h"
+
+namespace LAMMPS_NS {
+
+class RunSummary : protected Pointers {
+ public:
+  RunSummary(class LAMMPS *lmp, const Step &step, PhaseClock &clock);
+
+  // `shortened_steps` counts from the definition of the fix on.
+  void begin(long shortened_steps);
+
+  // A solve took so many iterations with the constraints of the step.
+  void add_solve(long iterations);
+  void add_step(const inelastic::ProjectionResult &result);
+  void add_unconverged() { ++unconverged_; }
+
+  // Collective.
+  void log(long shortened_steps, long unexpected_steps) const;
+
+ private:
+  void log_overlaps(long unexpected_steps) const;
+  void log_times() const;
+
+  const Step &step_;
+  PhaseClock &clock_;
+  long steps_ = 0, pushed_ = 0, unconverged_ = 0, shortened_before_ = 0;
+  double iterations_ = 0.0;
+  double constraint_iterations_ = 0.0;    // constraints of this rank, once for each iteration
+  double largest_overlap_ = 0.0;          // [length]
+  double largest_excess_ = 0.0;           // [length]
+  double deepest_start_ = 0.0;            // [length] of the overlaps that were pushed apart
+};
+
+}    // namespace LAMMPS_NS
+
+#endif

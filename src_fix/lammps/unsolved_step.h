@@ -1,0 +1,56 @@
+// A step that could not be solved: which constraint is farthest from being met, what is the cause, and
+// what the user can do.
+
+#ifndef INELASTIC_UNSOLVED_STEP_H
+#define INELASTIC_UNSOLVED_STEP_H
+
+#include "projection.h"
+#include "step.h"
+
+#include "pointers.h"
+
+#include <string>
+
+namespace LAMMPS_NS {
+
+class Constraints;
+class GhostExchange;
+class RigidMotion;
+
+class UnsolvedStep : protected Pointers {
+ public:
+  // `bodies` is null in a scene of free spheres.
+  UnsolvedStep(class LAMMPS *lmp, const Step &step, const Constraints &constraints,
+               GhostExchange &ranks, const RigidMotion *bodies);
+
+  // At the start of a step, and of every trial of it with another time step.
+  void begin_step() { no_room_ = false; }
+  void begin_trial() { named_.clear(); }
+
+  // Notes the constraint of all ranks that is farthest from being met. Collective.
+  void note_worst(const inelastic::ProjectionResult &result);
+  const std::string &named() const { return named_; }
+
+  // Notes that it is certain that there are no velocities for the step as long as it was.
+  void note_no_room() { no_room_ = true; }
+
+  // Stops the run, or warns where the keyword maxiter allows it. Collective.
+  void report(const inelastic::ProjectionResult &result);
+
+ private:
+  std::string no_room(const inelastic::ProjectionResult &result, std::string &cause) const;
+  std::string out_of_iterations(const inelastic::ProjectionResult &result,
+                                std::string &cause) const;
+  double largest_angle() const;
+
+  const Step &step_;
+  const Constraints &constraints_;
+  GhostExchange &ranks_;
+  const RigidMotion *bodies_;
+  std::string named_;
+  bool no_room_ = false;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
