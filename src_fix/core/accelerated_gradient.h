@@ -1,46 +1,65 @@
-// Accelerated projected gradient on the dual (Nesterov 1983; restarts after O'Donoghue and Candes,
-// Found. Comput. Math. 15 (2015) 715), in impulses scaled so that A has a unit diagonal. The step
-// 1/L follows the curvature met on the way, which costs no extra product with A; L is remembered
-// from one call to the next.
+// This solver is accelerated projected gradient (Nesterov, Soviet Math. Dokl. 27 (1983) 372) with
+// adaptive restart (O'Donoghue and Candes, Found. Comput. Math. 15 (2015) 715) on the dual problem
+// of contact_problem.h. Iteration k makes the impulses lambda_(k+1) of m constraints [mass length /
+// time] from the two before:
 //
-// An iteration reads every constraint once, in single precision where its round-off is far below
-// the tolerance. Whether a solution is one is always judged in double precision, by the operator
-// of contact_problem.h.
+//   ahead        = lambda_k + beta_k (lambda_k - lambda_(k-1))
+//   lambda_(k+1) = max(0, ahead - w(ahead) / (L D))
+//
+// D is the diagonal of A: in impulses scaled by its root A has a unit diagonal. The momentum beta_k
+// follows Nesterov's sequence and starts again at 0 when it points uphill. L is an estimate of the
+// largest eigenvalue of the scaled A. It follows the curvature met on the way, which costs no extra
+// product with A, and is remembered from one call to the next.
+//
+// An iteration reads every constraint once, in single precision if its round-off is far below the
+// tolerance, and otherwise in double precision (packed_iterations.h). The verdict whether impulses
+// are a solution is always in double precision, by gap_operator.h.
 
 #pragma once
 
+#include "packed_iterations.h"
 #include "solver.h"
 
-#include <memory>
+#include <optional>
+#include <vector>
 
 namespace inelastic {
 
 class AcceleratedProjectedGradient final : public Solver {
  public:
-  AcceleratedProjectedGradient();
-  ~AcceleratedProjectedGradient() override;
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
 
  private:
-  template <typename Real> class Iterations;
-  struct Scales;
+  struct FirstGuess;
 
-  // Iterates until the residual, judged in double precision, is within the limits. Gives up where
-  // the precision of `Real` does not suffice.
+  void set_diagonal(const ContactProblem &problem);
+  FirstGuess judge_first_guess(const ContactProblem &problem, Host &host);
+
+  // Iterates until the residual, judged in double precision, is within the limits, or more
+  // iterations in this precision are of no use. Returns OUT_OF_ITERATIONS also if iterations are
+  // left and single precision does not suffice.
   template <typename Real>
-  void iterate(Iterations<Real> &iterations, ContactProblem &problem, const SolverLimits &limits,
-               const Scales &scales, Host &host, SolverResult &result);
+  Status iterate(PackedIterations<Real> &iterations, ContactProblem &problem,
+                 const SolverLimits &limits, const Scales &scales, Host &host,
+                 SolverResult &result);
 
-  // Residual of the impulses in `problem`, over all ranks, and whether it is within the limits.
-  void judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
+  // Sets the residual of the impulses in `problem`. Returns whether it is within the limits.
+  bool judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
              SolverResult &result);
 
-  // L, an estimate of the largest eigenvalue of the scaled A; 0 = unknown
-  double curvature_ = 0.0;
-  std::vector<double> diagonal_;    // of A
-  std::vector<double> gap_;
-  std::unique_ptr<Iterations<float>> single_;
-  std::unique_ptr<Iterations<double>> double_;
+  // Returns how the search ends if more iterations from the impulses in `problem` are of no use.
+  std::optional<Status> judge_prospects(const ContactProblem &problem, const SolverLimits &limits,
+                                        Host &host, SolverResult &result);
+
+  // Raises L if a change of the impulses shows it too small: change^T A change is `curved`, and
+  // change^T D change is `change_squared`.
+  void raise_curvature(double curved, double change_squared);
+
+  double curvature_ = 0.0;          // L; 0 = not yet known
+  std::vector<double> diagonal_;    // D [time / mass]
+  std::vector<double> gap_;         // [length] at the end of the step, one per constraint
+  PackedIterations<float> single_;
+  PackedIterations<double> double_;
 };
 
 }    // namespace inelastic

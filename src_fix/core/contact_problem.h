@@ -1,21 +1,26 @@
-// One step's projection problem.
+// The projection problem of one time step (Maury, Numer. Math. 102 (2006) 649).
+//
+// The problem asks for the velocities V that are nearest to the predicted velocities V* in the norm
+// of the kinetic energy and keep every constraint of contact_set.h:
 //
 //   minimise over V:   1/2 (V - V*)^T M (V - V*)
-//   subject to         gap_c + h G_c . V >= 0      for all c
+//   subject to         gap_c + h G_c . V >= 0      for every constraint c
 //
-// V* predicted velocities, M the mass matrix, G_c V = n_c . (v_first - v_second). Its dual has one
-// impulse per constraint:
+// M is the mass matrix, h the time step, and G_c . V = n_c . (v_first - v_second). The dual problem
+// has one impulse lambda_c per constraint; the optimality conditions are
 //
-//   V = V* + M^-1 G^T lambda,   w(lambda) = gap + h G V,   lambda >= 0,  w >= 0,  lambda w = 0
+//   V = V* + M^-1 G^T lambda,   w(lambda) = gap + h G V,   lambda >= 0,  w >= 0,  lambda . w = 0
 //
-// and w is the gradient of the dual function 1/2 lambda^T A lambda + (gap + h G V*)^T lambda with
-// A = h G M^-1 G^T. w_c is a length: the gap at the end of the step as the linearised constraint
-// sees it.
+// w_c is a length: the gap at the end of the step as the linearised constraint sees it. The vector
+// w is the gradient of the dual function 1/2 lambda^T A lambda + (gap + h G V*)^T lambda, where A =
+// h G M^-1 G^T [time / mass].
+//
+// Every array per particle has one more entry than there are particles: a dummy particle that never
+// moves stands for all walls.
 
 #pragma once
 
 #include "contact_set.h"
-#include "host.h"
 #include "rigid_bodies.h"
 
 #include <vector>
@@ -23,59 +28,28 @@
 namespace inelastic {
 
 struct ContactProblem {
-  double timestep = 0.0;
-  int particles = 0;                         // owned particles and copies of other ranks' particles
-  std::vector<double> predicted_velocity;    // 3 per particle, then 3 zeros for the dummy particle
-  std::vector<double> inverse_mass;          // per particle, then a zero; zero = frozen; not read
-                                             // for particles in bodies
-  RigidBodies bodies;                        // empty in a scene of free particles
+  double timestep = 0.0;    // h [time]
+  // Counts the particles that this rank owns and its copies of particles (host.h), owned ones
+  // first.
+  int particles = 0;
+  std::vector<double> predicted_velocity;    // 3 per particle and 3 zeros [length / time]
+  // One number per particle and a zero [1 / mass]. Zero freezes a particle; the numbers of
+  // particles in bodies are not read.
+  std::vector<double> inverse_mass;
+  RigidBodies bodies;    // empty in a scene of free particles
   ContactSet contacts;
 
-  // Sets the number of particles and the dummy particle that stands for every wall.
-  // Bodies are as `bodies.clear` and `bodies.add` leave them.
+  // Sets the number of particles and the zeros of the dummy particle. The bodies stay as they are.
   void resize(int number_of_particles);
 
-  // n . M^-1 n: velocity along a unit vector that a unit impulse along it gives. Zero = frozen.
+  // Returns n . M^-1 n [1 / mass]: the velocity along a unit vector n that a unit impulse along n
+  // gives to a particle. It is zero for frozen particles and for the dummy particle.
   double mobility(int particle, const double *direction) const
   {
     return bodies.empty() || particle == particles || bodies.body[particle] < 0
         ? inverse_mass[particle]
         : bodies.mobility(particle, direction);
   }
-};
-
-// End-of-step gaps w of the linearised constraints for given impulses: the only place where the
-// operator h G M^-1 G^T is applied.
-class GapOperator {
- public:
-  // Fixes the problem: w for zero impulses (`free_gap`) is computed here, once.
-  void prepare(const ContactProblem &problem);
-
-  // gap_at_end[c] = free_gap[c] + h (G M^-1 G^T impulse)[c]
-  void apply(const ContactProblem &problem, const double *impulse, double *gap_at_end, Host &host);
-
-  // Velocities V* + M^-1 G^T lambda of all particles, copies included.
-  void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
-
-  // The same for the impulses of the last apply().
-  void velocity_applied(const ContactProblem &problem, double *velocity) const;
-
-  // |G^T lambda|^2 in the norm of M^-1, this rank's share: twice the kinetic energy that the impulses
-  // give to what is at rest. And the mass that they act on. Copies count as often as they are there.
-  struct Kick {
-    double squared;
-    double mass;
-  };
-  Kick kick(const ContactProblem &problem, const double *impulse, Host &host);
-
-  const std::vector<double> &free_gap() const { return free_gap_; }
-
- private:
-  void velocity_change(const ContactProblem &problem, const double *impulse, Host &host);
-
-  std::vector<double> free_gap_;
-  std::vector<int> free_particles_;    // in no body, the dummy too; only where there are bodies
-  std::vector<double> change_;    // impulse, then velocity change, of each particle and the dummy
 };
 
 }    // namespace inelastic

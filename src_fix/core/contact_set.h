@@ -1,16 +1,18 @@
-// The constraints of one contact problem, as a structure of arrays.
+// The constraints of one time step, as a structure of arrays.
 //
-// Constraint c keeps two particles (or a particle and a wall) apart during one time step:
+// Constraint c keeps two particles, or a particle and a wall, apart during one time step:
 //
 //   gap_c + h n_c . (v_first - v_second) >= 0                                            [length]
 //
-//   n_c    unit normal, from the second side to the first (from the wall to the particle)
-//   gap_c  distance between the two surfaces, negative when they overlap. For a moving wall the
-//          wall's own motion during the step is already in it, so that a wall has no velocity here.
-//   h      time step
+//   n_c    is a unit normal. It points from the second side to the first (from the wall to the
+//          particle).
+//   gap_c  is the distance between the two surfaces; it is negative when they overlap. If the wall
+//          moves, its motion during the step is already in the gap, so that a wall has no velocity
+//          here.
+//   h      is the time step.
 //
-// Each constraint carries one impulse lambda_c >= 0 [mass length / time]: +lambda n acts on the
-// first particle, -lambda n on the second.
+// Each constraint carries one impulse lambda_c >= 0 [mass length / time]: +lambda_c n_c acts on the
+// first particle and -lambda_c n_c on the second.
 
 #pragma once
 
@@ -20,11 +22,11 @@
 namespace inelastic {
 
 struct ContactSet {
-  std::vector<int> first;     // particle index
-  std::vector<int> second;    // particle index; number of particles (the dummy particle) = a wall
-  std::vector<double> normal;    // 3 per constraint
-  std::vector<double> gap;
-  std::vector<double> impulse;
+  std::vector<int> first;         // index of a particle
+  std::vector<int> second;        // index of a particle; the number of particles stands for a wall
+  std::vector<double> normal;     // 3 per constraint
+  std::vector<double> gap;        // [length]
+  std::vector<double> impulse;    // [mass length / time]
 
   std::size_t size() const { return gap.size(); }
   void clear();

@@ -1,5 +1,10 @@
-// What the solvers need from whatever runs them: the exchange between ranks and global reductions.
-// A host with one rank and no periodic images has nothing to do (SerialHost).
+// The communication that the solvers need from the program that runs them: the exchange of values
+// between ranks and global reductions.
+//
+// A rank holds the particles that it owns and, behind them, copies of particles (LAMMPS calls them
+// ghosts): of particles that other ranks own, and periodic images of its own. Every function is
+// collective: all ranks call it together. A host with one rank and without periodic images has
+// nothing to do (SerialHost).
 
 #pragma once
 
@@ -9,25 +14,29 @@ namespace inelastic {
 
 class Host {
  public:
-  // Per-particle vectors (3 doubles each; owned particles first, then copies of particles that other
-  // ranks own): add the copies' values to their owners, then give every copy its owner's sum.
+  // Adds the values of all copies of a particle to its owner's, then gives the sum to every copy.
+  // There are 3 numbers per particle.
   virtual void sum_over_copies(double *per_particle) = 0;
 
-  // Whether there are copies at all, on any rank: where not, none need be chosen.
+  // Returns whether any rank has copies. If none has, choose_copies need not be called.
   virtual bool has_copies() const = 0;
 
-  // The same for those copies alone that their rank has chosen, in the last call of choose_copies;
-  // the values of the others are neither added nor replaced. Particles have 4 numbers each here, of
-  // which the last has no meaning. `chosen` is per particle; what it says of owned ones has none.
+  // Chooses the copies for sum_over_chosen_copies. `chosen` has one entry per particle; the entries
+  // of owned particles are not read.
   virtual void choose_copies(const std::vector<char> &chosen) = 0;
+
+  // Does the same as sum_over_copies, but for the chosen copies alone: the values of all other
+  // copies are neither added nor replaced. There are 4 numbers per particle, and the fourth has no
+  // meaning.
   virtual void sum_over_chosen_copies(double *per_particle) = 0;
   virtual void sum_over_chosen_copies(float *per_particle) = 0;
 
-  // Per-particle vectors (3 doubles each): give every copy its owner's value. For those who set up
-  // a problem: the copies need predicted velocities too.
+  // Gives every copy the value of its owner, 3 numbers per particle. Programs that set up a problem
+  // need it: the copies must have predicted velocities too.
   virtual void share_with_copies(double *per_particle) = 0;
 
-  // Global sums and global maxima of a few numbers, in one communication.
+  // Replaces a few numbers by their sums over all ranks and others by their maxima, in one
+  // communication.
   virtual void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) = 0;
 
  protected:

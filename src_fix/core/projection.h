@@ -1,25 +1,28 @@
-// The projection of one step onto ALL constraints, with only those that matter in the problem.
+// The projection of one step's velocities onto ALL constraints, with only those in the problem that
+// matter.
 //
-// The set is generated (for the theory see Palmer, Aktulga and Gao, arXiv 2506.14097): solve with
-// the constraints at hand, let the source look at everything that can touch, add what the solution
-// violates, solve again from the impulses reached, until nothing is added. A source may also
-// replace the linearisation of a constraint whose gap is not convex (a concave wall) by one about
-// the new end-of-step position.
+// The set of constraints is generated (for the theory see Palmer, Aktulga and Gao, arXiv
+// 2506.14097). One round solves the problem with the constraints at hand; then the source of
+// constraints looks at everything that can touch and adds what the solution violates. The next
+// round starts from the impulses reached, until nothing is added. A source may also replace the
+// linearisation of a constraint whose gap is not convex (a concave wall) by one about the new
+// position at the end of the step.
 
 #pragma once
 
 #include "contact_problem.h"
 #include "solver.h"
 
+#include <algorithm>
 #include <vector>
 
 namespace inelastic {
 
 class ConstraintSource {
  public:
-  // Given the velocities (3 per particle) that solve the problem as it stands, adds the constraints
-  // that they violate by more than the tolerance and re-linearises where needed. Returns how many
-  // constraints this rank added or changed.
+  // Takes the velocities (3 per particle) that solve the problem as it stands, adds the constraints
+  // that they violate by more than the tolerance, and linearises constraints again where needed.
+  // Returns the number of constraints that this rank added or changed.
   virtual long refine(const std::vector<double> &velocity, ContactProblem &problem) = 0;
 
  protected:
@@ -27,25 +30,32 @@ class ConstraintSource {
 };
 
 struct ProjectionResult {
-  bool converged = false;     // the solver met the tolerance in every round
-  bool complete = false;      // the last round left nothing to add or change
-  bool infeasible = false;    // it is certain that no sensible velocities are admissible
-  long iterations = 0;        // over all rounds
+  // CONVERGED if the last round converged and left nothing to add or change; OUT_OF_ROUNDS if it
+  // converged and left something; otherwise the reason why the last round did not converge.
+  Status status = Status::OUT_OF_ITERATIONS;
+  long iterations = 0;    // over all rounds
   int rounds = 0;
-  Residual residual;         // over all constraints that came to light
+  Residual residual;         // over all constraints that came to light, on all ranks
   double round_off = 0.0;    // [length] of the last solve: see SolverResult
-  ResidualTrend trend;       // likewise
+  ResidualTrend trend;       // of the last solve
 
-  // Unless converged and complete, and where this rank has any: the constraint that is farthest
-  // from being met, and the gap [length] that it leaves at the end of the step.
+  // The constraint of this rank that is farthest from being met, and the gap [length] that it
+  // leaves at the end of the step. NONE if the status is CONVERGED or this rank has no such
+  // constraint.
   static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
   std::size_t worst = NONE;
   double worst_gap = 0.0;
 };
 
-// Solves at least once. On return `velocity` (3 per particle, copies included) holds the projection
-// of problem.predicted_velocity and problem.contacts.impulse the impulses. When the result is not
-// complete, `velocity` knows nothing of the constraints that were added last, and their impulses are 0.
+// Returns the status of two projections together: CONVERGED if both have converged, INFEASIBLE if
+// either is, and otherwise the later of the two in the order of the enumeration.
+inline Status worse(Status a, Status b)
+{ return std::max(a, b); }
+
+// Projects problem.predicted_velocity in one to `max_rounds` rounds. On return `velocity` (3 per
+// particle, copies included) holds the projection and problem.contacts.impulse the impulses. If the
+// last round added constraints, `velocity` knows nothing of them and their impulses are 0.
+// Collective.
 ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,
                          const SolverLimits &limits, int max_rounds, Host &host,
                          std::vector<double> &velocity);

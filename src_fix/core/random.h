@@ -1,5 +1,5 @@
-// Random numbers that depend on nothing but a key and a counter: the same for any number of ranks,
-// any order of particles and after a restart.
+// Random numbers that depend on nothing but a key and a counter: they are the same for any number
+// of ranks, any order of particles and after a restart.
 
 #pragma once
 
@@ -8,8 +8,8 @@
 
 namespace inelastic {
 
-// Philox 4x32 with 10 rounds: Salmon, Moraes, Dror and Shaw, "Parallel random numbers: as easy as
-// 1, 2, 3", SC'11 (the constants and the round are theirs).
+// Philox 4x32 with 10 rounds. The constants and the round are those of Salmon, Moraes, Dror and
+// Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC'11.
 inline std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter,
                                            std::array<std::uint32_t, 2> key)
 {
@@ -26,7 +26,7 @@ inline std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter,
   return counter;
 }
 
-// Three numbers, uniform in [-1, 1], for one particle (its id) at one step.
+// Returns three numbers, uniform in [-1, 1], for one particle (its ID) at one step.
 inline std::array<double, 3> uniform_vector(std::uint32_t seed, std::uint64_t particle,
                                             std::uint64_t step)
 {

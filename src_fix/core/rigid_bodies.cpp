@@ -1,5 +1,6 @@
 #include "rigid_bodies.h"
 
+#include "vector3.h"
 #include "vectorise.h"
 
 #include <algorithm>
@@ -47,15 +48,17 @@ INELASTIC_CLONES void RigidBodies::velocity_change(double *per_particle) const
       sum[0] += s[0];
       sum[1] += s[1];
       sum[2] += s[2];
-      moment[0] += r[1] * s[2] - r[2] * s[1];
-      moment[1] += r[2] * s[0] - r[0] * s[2];
-      moment[2] += r[0] * s[1] - r[1] * s[0];
+      double moment_of_one[3];
+      cross(r, s, moment_of_one);
+      for (int d = 0; d < 3; ++d) moment[d] += moment_of_one[d];
     }
     const double w = inverse_mass[b];
     double turn[3];
     multiply(&inverse_inertia[6 * b], moment, turn);
     for (int k = first; k < end; ++k) {
       const double *const r = arms + 3 * static_cast<std::size_t>(k);
+      // dv and dw x r are not added by cross(): another order of the sums would change the last
+      // bits.
       double *const dv = per_particle + 3 * static_cast<std::size_t>(particle[k]);
       dv[0] = w * sum[0] + turn[1] * r[2] - turn[2] * r[1];
       dv[1] = w * sum[1] + turn[2] * r[0] - turn[0] * r[2];
@@ -68,10 +71,10 @@ double RigidBodies::mobility(int particle, const double *n) const
 {
   const std::size_t b = static_cast<std::size_t>(body[particle]);
   const double *const r = &arm[3 * static_cast<std::size_t>(place[particle])];
-  const double moment[3] = {r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2],
-                            r[0] * n[1] - r[1] * n[0]};
-  double turn[3];
+  double moment[3], turn[3];
+  cross(r, n, moment);
   multiply(&inverse_inertia[6 * b], moment, turn);
+  // The sum is not written with dot(): another order of the sums would change the last bits.
   return inverse_mass[b] + moment[0] * turn[0] + moment[1] * turn[1] + moment[2] * turn[2];
 }
 

@@ -1,5 +1,5 @@
-// Vectors of three doubles, as pointers to the first: particles' vectors stand one after the other in
-// arrays, here as in LAMMPS.
+// Products of vectors of three doubles. A vector is passed as a pointer to its first number,
+// because the vectors of particles stand one after the other in arrays, here as in LAMMPS.
 
 #pragma once
 
@@ -13,6 +13,7 @@ inline double dot(const double *a, const double *b)
 inline double norm(const double *a)
 { return std::sqrt(dot(a, a)); }
 
+// `result` must be neither `a` nor `b`.
 inline void cross(const double *a, const double *b, double *result)
 {
   result[0] = a[1] * b[2] - a[2] * b[1];

@@ -1,5 +1,6 @@
-// Hot loops are compiled for several instruction sets, and the one that fits is chosen when the
-// library is loaded: one binary is fast on a laptop and on every node of a mixed cluster.
+// Hot loops are compiled for several instruction sets, and the version that fits the processor is
+// chosen when the library is loaded: one binary is fast on a laptop and on every node of a mixed
+// cluster. The macro stands before the definition of a function.
 
 #pragma once
 

@@ -1,5 +1,6 @@
 #include "fix_inelastic.h"
 
+#include "make_solver.h"
 #include "npz.h"
 
 #include "atom.h"
@@ -544,10 +545,11 @@ void FixInelastic::advance(int vflag, double kick_steps)
     if (record_every_ > 0 && kick_steps == 1.0 && update->ntimestep % record_every_ == 0)
       record_problem(result);
     if (bad_overlap_) push_apart(result);
-    if (!result.converged || !result.complete) {
-      no_room = no_room || result.infeasible;
+    if (result.status != inelastic::Status::CONVERGED) {
+      const bool infeasible = result.status == inelastic::Status::INFEASIBLE;
+      no_room = no_room || infeasible;
       // Where the gaps at the end of the step were not to be had, those of a shorter one may be.
-      if (shorten_ && (relinearised_ || result.infeasible) &&
+      if (shorten_ && (relinearised_ || infeasible) &&
           update->dt > SHORTEST_UNSOLVED * regular_timestep_) {
         shorten_step(0.5);
         continue;
@@ -587,7 +589,7 @@ void FixInelastic::advance(int vflag, double kick_steps)
   // A whole-step velocity holds half of the push before and half of the one after it.
   restart_peratom = bad_overlap_ || pushed_before_;
   pushed_before_ = bad_overlap_;
-  const bool certain = result.converged && result.complete && entangled_.empty();
+  const bool certain = result.status == inelastic::Status::CONVERGED && entangled_.empty();
   left_overlap_ = certain
       ? REGULAR_OVERLAP * tolerance_ + (bad_overlap_ ? output_[OVERLAP] : 0.0) + output_[EXCESS]
       : EXTREME;
@@ -614,7 +616,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   const double reach = (shorten_ ? 1.0 : BEYOND_REACH) * list_reach_;
   const inelastic::ProjectionResult result = inelastic::project(
       problem_, *this, *solver_, {tolerance_, max_iterations, reach}, MAX_ROUNDS, *this, velocity_);
-  if (!result.converged || !result.complete) note_worst(result);
+  if (result.status != inelastic::Status::CONVERGED) note_worst(result);
   run_constraint_iterations_ +=
       static_cast<double>(result.iterations) * static_cast<double>(problem_.contacts.size());
   return result;
@@ -1240,10 +1242,8 @@ void FixInelastic::push_apart(inelastic::ProjectionResult &result)
   const inelastic::ProjectionResult pushed =
       project(std::max(0L, max_iterations_ - result.iterations));
   result.iterations += pushed.iterations;
-  result.converged = result.converged && pushed.converged;
-  result.infeasible = result.infeasible || pushed.infeasible;
+  result.status = inelastic::worse(result.status, pushed.status);
   result.round_off = std::max(result.round_off, pushed.round_off);
-  result.complete = result.complete && pushed.complete;
   result.residual.feasibility = std::max(result.residual.feasibility, pushed.residual.feasibility);
   result.residual.complementarity =
       std::max(result.residual.complementarity, pushed.residual.complementarity);
@@ -2066,7 +2066,7 @@ void FixInelastic::unconverged(const inelastic::ProjectionResult &result, bool n
   const std::string named = worst_.empty() ? "" : ": " + worst_;    // numbers may not be finite
   std::string message, cause;
   if (no_room) {
-    const std::string shorter = result.infeasible
+    const std::string shorter = result.status == inelastic::Status::INFEASIBLE
         ? ""
         : fmt::format(", and {} iterations found none for a time step of only {:.3g}",
                       result.iterations, update->dt);

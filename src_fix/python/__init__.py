@@ -1,7 +1,8 @@
 """The contact solver of ``fix inelastic`` as a Python module.
 
-Projects predicted velocities onto those that keep every contact apart, without LAMMPS: what the
-tests judge the solvers with, and usable on its own. See ``_core.pyi`` for shapes and units.
+The module projects predicted velocities onto those that keep every contact apart, without LAMMPS.
+The tests judge the solvers with it, and it can be used on its own. ``_core.pyi`` documents shapes
+and units.
 """
 
 from lammps_inelastic.core._core import (
@@ -10,7 +11,6 @@ from lammps_inelastic.core._core import (
     project,
     residual,
     uniform_vector,
-    write_npz,
 )
 
 __all__ = [
@@ -19,5 +19,4 @@ __all__ = [
     "project",
     "residual",
     "uniform_vector",
-    "write_npz",
 ]

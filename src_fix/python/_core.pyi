@@ -1,19 +1,21 @@
 """The projection problem: see src_fix/core/contact_problem.h for the equations.
 
-n particles, m contacts. ``first`` and ``second`` are int64 arrays (m,) of particle indices, second
-= -1 for a wall; ``normal`` (m, 3) are unit vectors from second to first; ``gap`` (m,) [length] is
-negative for an overlap. ``inverse_mass`` (n,) [1 / mass], zero for a frozen particle. Arrays are
-float64 and C-contiguous. TypeError for arrays of another dimension; ValueError for wrong lengths,
-indices out of range, numbers that are not finite, negative masses, normals that have not length 1,
-a contact of a particle with itself and contacts between two particles that cannot move.
+There are n particles and m contacts. ``first`` and ``second`` (m,) int64 are indices of particles;
+``second`` is -1 for a wall. ``normal`` (m, 3) are unit vectors that point from the second side to
+the first. ``gap`` (m,) [length] is negative for an overlap. ``inverse_mass`` (n,) [1 / mass] is
+zero for a frozen particle. All arrays but those of indices are float64, and all are C-contiguous.
+The functions raise TypeError for arrays of another dimension. They raise ValueError for wrong
+lengths, indices out of range, numbers that are not finite, negative masses, normals that have not
+length 1, a contact of a particle with itself, and contacts between two sides that cannot move.
 
-Particles may be in b rigid bodies, by four more arguments, all of them or none. ``body`` (n,) int64
-names each particle's body, 0 ... b - 1, or -1 for a free particle; a body has at least one
-particle. ``arm`` (n, 3) [length] points from the body's centre of mass to the particle and is not
-read for free particles. ``body_inverse_mass`` (b,) [1 / mass]; ``body_inverse_inertia`` (b, 3, 3)
-[1 / (mass length^2)] is symmetric and positive semi-definite: the pseudo-inverse of the inertia for
-point masses on a line. The ``inverse_mass`` of particles in bodies is not read. ValueError also for
-a contact between two particles of one body.
+Particles may be in b rigid bodies. Four more arguments describe the bodies; either all are given
+or none. ``body`` (n,) int64 names each particle's body, 0 ... b - 1, or is -1 for a free particle;
+a body has at least one particle. ``arm`` (n, 3) [length] points from the body's centre of mass to
+the particle and is not read for free particles. ``body_inverse_mass`` (b,) has the unit [1 /
+mass]. ``body_inverse_inertia`` (b, 3, 3) [1 / (mass length^2)] is symmetric and positive semi-
+definite; for point masses on a line it is the pseudo-inverse of the inertia. The ``inverse_mass``
+of particles in bodies is not read. A contact between two particles of one body is a ValueError
+too.
 """
 
 import numpy as np
@@ -21,17 +23,28 @@ from numpy.typing import NDArray
 
 class Projection:
     @property
-    def velocity(self) -> NDArray[np.float64]: ...  # (n, 3) [length / time]
+    def velocity(self) -> NDArray[np.float64]:
+        """The projected velocities (n, 3) [length / time]."""
+
     @property
-    def impulse(self) -> NDArray[np.float64]: ...  # (m,) [mass length / time], >= 0
+    def impulse(self) -> NDArray[np.float64]:
+        """The impulses (m,) [mass length / time]; none is negative."""
+
     @property
-    def iterations(self) -> int: ...
+    def iterations(self) -> int:
+        """The number of iterations that the solver made."""
+
     @property
-    def converged(self) -> bool: ...
+    def converged(self) -> bool:
+        """Whether the residuals that the solver looks at are within the tolerance."""
+
     @property
-    def feasibility(self) -> float: ...  # largest overlap left at the end of the step [length]
+    def feasibility(self) -> float:
+        """The largest overlap that is left at the end of the step [length]."""
+
     @property
-    def complementarity(self) -> float: ...  # largest gap where an impulse acts [length]
+    def complementarity(self) -> float:
+        """The largest gap that is left where an impulse acts [length]."""
 
 def project(
     predicted_velocity: NDArray[np.float64],
@@ -53,8 +66,9 @@ def project(
 ) -> Projection:
     """Project ``predicted_velocity`` (n, 3) onto the velocities that keep every contact apart.
 
-    Both residuals come down to ``tolerance`` [length] (with "uzawa" only the feasibility), or
-    ``converged`` is False after ``max_iterations``. ``impulse`` (m,) is a first guess for "apgd".
+    The solver stops when both residuals, or with "uzawa" the feasibility alone, are within
+    ``tolerance`` [length]. It gives up after ``max_iterations``, or earlier if the tolerance is out
+    of reach; ``converged`` is then False. ``impulse`` (m,) is a first guess for "apgd".
     """
 
 def residual(
@@ -72,7 +86,7 @@ def residual(
     body_inverse_mass: NDArray[np.float64] | None = None,
     body_inverse_inertia: NDArray[np.float64] | None = None,
 ) -> tuple[float, float]:
-    """Feasibility and complementarity [length] of given impulses."""
+    """Return the feasibility and the complementarity [length] of given impulses."""
 
 def largest_eigenvalue(
     inverse_mass: NDArray[np.float64],
@@ -86,10 +100,10 @@ def largest_eigenvalue(
     body_inverse_mass: NDArray[np.float64] | None = None,
     body_inverse_inertia: NDArray[np.float64] | None = None,
 ) -> float:
-    """Largest eigenvalue of h G M^-1 G^T [time / mass], from below and mostly to 1e-3."""
+    """Return the largest eigenvalue of h G M^-1 G^T [time / mass].
+
+    The estimate comes from below and is mostly within a relative 1e-3.
+    """
 
 def uniform_vector(seed: int, particle: int, step: int) -> tuple[float, float, float]:
-    """The three numbers, uniform in [-1, 1], that ``fix random/force`` gives one particle."""
-
-def write_npz(path: str, arrays: dict[str, NDArray[np.float64]]) -> None:
-    """Write (n, 3) arrays with the core's own .npz writer. RuntimeError when it cannot."""
+    """Return the three numbers, uniform in [-1, 1], of one particle in ``fix random/force``."""

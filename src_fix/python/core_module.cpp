@@ -1,9 +1,11 @@
-// The core as a Python module. Shapes, units and errors are documented in _core.pyi.
+// The core as a Python module; _core.pyi documents shapes, units and errors.
 
 #include "contact_problem.h"
-#include "npz.h"
+#include "gap_operator.h"
+#include "make_solver.h"
 #include "random.h"
 #include "solver.h"
+#include "vector3.h"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -12,11 +14,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -30,7 +29,7 @@ using Scalars = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device:
 using Matrices = nb::ndarray<const double, nb::shape<-1, 3, 3>, nb::c_contig, nb::device::cpu>;
 using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-// The arguments that put particles into rigid bodies: all of them or none.
+// The arguments that put particles into rigid bodies; either all are given or none.
 struct Bodies {
   std::optional<Indices> body;
   std::optional<Vectors> arm;
@@ -38,6 +37,8 @@ struct Bodies {
   std::optional<Matrices> inverse_inertia;
 };
 
+// Copies the values into an array of shape (n,) if `columns` is 0, and (n / columns, columns)
+// otherwise.
 nb::ndarray<nb::numpy, double> to_numpy(const std::vector<double> &values, std::size_t columns)
 {
   auto *data = new double[std::max<std::size_t>(values.size(), 1)];
@@ -78,16 +79,18 @@ void require_inverse_mass(double value, const char *name)
   if (value < 0.0) throw nb::value_error((std::string(name) + " must not be negative").c_str());
 }
 
-constexpr double FLAW = 1.0e-6;    // of a matrix, and of a squared length: far above round-off
+// A relative error of a matrix, or of a squared length, that is far above round-off.
+constexpr double FLAW = 1.0e-6;
 
-// In the order of RigidBodies::inverse_inertia.
+// Returns a symmetric matrix in the order of RigidBodies::inverse_inertia.
 std::array<double, 6> symmetric(const double *a, std::size_t body)
 {
   double flaw = 0.0;
   for (int k = 0; k < 9; ++k) flaw = std::max(flaw, FLAW * std::abs(a[k]));
   const double xx = a[0], yy = a[4], zz = a[8];
   const double xy = 0.5 * (a[1] + a[3]), xz = 0.5 * (a[2] + a[6]), yz = 0.5 * (a[5] + a[7]);
-  // Elimination leaves positive pivots, after the allowance for round-off.
+  // A matrix is positive definite if Gaussian elimination leaves positive pivots. The flaw is added
+  // to the diagonal as an allowance for round-off.
   const double x = xx + flaw, y = yy + flaw - xy * (xy / x), off = yz - xy * (xz / x);
   const bool positive = x > 0.0 && y > 0.0 && zz + flaw - xz * (xz / x) - off * (off / y) > 0.0;
   const double skew =
@@ -137,25 +140,73 @@ void add_bodies(inelastic::ContactProblem &problem, const Bodies &given)
   }
 }
 
+// The arguments that describe constraints.
+struct Contacts {
+  Indices first;
+  Indices second;
+  Vectors normal;
+  Scalars gap;
+  std::optional<Scalars> impulse;    // the first guess, or none
+};
+
+void require_contacts(const Contacts &given)
+{
+  const std::size_t count = given.gap.shape(0);
+  require_length(given.first, count, "first");
+  require_length(given.second, count, "second");
+  require_length(given.normal, count, "normal");
+  if (given.impulse) require_length(*given.impulse, count, "impulse");
+}
+
+// Refuses constraint c between particles i and j (-1 = a wall) if it makes no sense for the
+// problem.
+void require_contact(const inelastic::ContactProblem &problem, std::size_t c, std::int64_t i,
+                     std::int64_t j, const double *normal)
+{
+  const auto refuse = [c](const char *before, const std::string &after) {
+    throw nb::value_error((before + ("contact " + std::to_string(c)) + after).c_str());
+  };
+  const auto limit = static_cast<std::int64_t>(problem.particles);
+  auto body_of = [&](std::int64_t k) {
+    return problem.bodies.empty() ? -1 : problem.bodies.body[static_cast<std::size_t>(k)];
+  };
+  if (i < 0 || i >= limit || j < -1 || j >= limit)
+    refuse("", " names a particle outside 0 ... " + std::to_string(limit - 1));
+  if (i == j) refuse("", " is of a particle with itself");
+  if (j >= 0 && body_of(i) >= 0 && body_of(i) == body_of(j))
+    refuse("", " is between two particles of one body");
+  if (std::abs(inelastic::dot(normal, normal) - 1.0) > FLAW)
+    refuse("the normal of ", " has not length 1");
+  const int second = j < 0 ? problem.particles : static_cast<int>(j);
+  const double w = problem.mobility(static_cast<int>(i), normal) + problem.mobility(second, normal);
+  if (!(w > 0.0)) refuse("", " is between particles that cannot move");
+}
+
+void add_contacts(inelastic::ContactProblem &problem, const Contacts &given)
+{
+  for (std::size_t c = 0; c < given.gap.shape(0); ++c) {
+    const std::int64_t i = given.first.data()[c];
+    const std::int64_t j = given.second.data()[c];
+    const double *const n = given.normal.data() + 3 * c;
+    require_contact(problem, c, i, j, n);
+    problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j), n,
+                         given.gap.data()[c], given.impulse ? given.impulse->data()[c] : 0.0);
+  }
+}
+
 inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
-                                       const Scalars &inverse_mass, const Indices &first,
-                                       const Indices &second, const Vectors &normal,
-                                       const Scalars &gap, double timestep,
-                                       const std::optional<Scalars> &impulse, const Bodies &bodies)
+                                       const Scalars &inverse_mass, const Contacts &contacts,
+                                       double timestep, const Bodies &bodies)
 {
   const std::size_t particles = predicted_velocity.shape(0);
-  const std::size_t count = gap.shape(0);
   require_length(inverse_mass, particles, "inverse_mass");
-  require_length(first, count, "first");
-  require_length(second, count, "second");
-  require_length(normal, count, "normal");
-  if (impulse) require_length(*impulse, count, "impulse");
+  require_contacts(contacts);
   if (!(timestep > 0.0) || std::isinf(timestep))
     throw nb::value_error("timestep must be finite and greater than 0");
   require_finite(predicted_velocity, "predicted_velocity");
-  require_finite(normal, "normal");
-  require_finite(gap, "gap");
-  if (impulse) require_finite(*impulse, "impulse");
+  require_finite(contacts.normal, "normal");
+  require_finite(contacts.gap, "gap");
+  if (contacts.impulse) require_finite(*contacts.impulse, "impulse");
 
   inelastic::ContactProblem problem;
   problem.timestep = timestep;
@@ -163,37 +214,10 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
   std::copy_n(predicted_velocity.data(), 3 * particles, problem.predicted_velocity.begin());
   std::copy_n(inverse_mass.data(), particles, problem.inverse_mass.begin());
   add_bodies(problem, bodies);
-  auto body_of = [&](std::size_t i) {
-    return problem.bodies.empty() ? -1 : problem.bodies.body[i];
-  };
   for (std::size_t i = 0; i < particles; ++i)
-    if (body_of(i) < 0) require_inverse_mass(inverse_mass.data()[i], "inverse_mass");
-  const auto limit = static_cast<std::int64_t>(particles);
-  for (std::size_t c = 0; c < count; ++c) {
-    const std::int64_t i = first.data()[c];
-    const std::int64_t j = second.data()[c];
-    if (i < 0 || i >= limit || j < -1 || j >= limit)
-      throw nb::value_error(("contact " + std::to_string(c) + " names a particle outside 0 ... " +
-                             std::to_string(limit - 1))
-                                .c_str());
-    if (i == j)
-      throw nb::value_error(
-          ("contact " + std::to_string(c) + " is of a particle with itself").c_str());
-    if (j >= 0 && body_of(i) >= 0 && body_of(i) == body_of(j))
-      throw nb::value_error(
-          ("contact " + std::to_string(c) + " is between two particles of one body").c_str());
-    const double *const n = normal.data() + 3 * c;
-    if (std::abs(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0) > FLAW)
-      throw nb::value_error(
-          ("the normal of contact " + std::to_string(c) + " has not length 1").c_str());
-    const int second_or_wall = j < 0 ? problem.particles : static_cast<int>(j);
-    const double w = problem.mobility(static_cast<int>(i), n) + problem.mobility(second_or_wall, n);
-    if (!(w > 0.0))
-      throw nb::value_error(
-          ("contact " + std::to_string(c) + " is between particles that cannot move").c_str());
-    problem.contacts.add(static_cast<int>(i), second_or_wall, n, gap.data()[c],
-                         impulse ? impulse->data()[c] : 0.0);
-  }
+    if (problem.bodies.empty() || problem.bodies.body[i] < 0)
+      require_inverse_mass(inverse_mass.data()[i], "inverse_mass");
+  add_contacts(problem, contacts);
   return problem;
 }
 
@@ -230,13 +254,13 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
   inelastic::ContactProblem problem =
-      make_problem(predicted_velocity, inverse_mass, first, second, normal, gap, timestep, impulse,
-                   {body, arm, body_inverse_mass, body_inverse_inertia});
+      make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse},
+                   timestep, {body, arm, body_inverse_mass, body_inverse_inertia});
   inelastic::SerialHost host;
   Projection projection;
   const inelastic::SolverResult result = solver->solve(problem, {tolerance, max_iterations}, host);
   projection.iterations = result.iterations;
-  projection.converged = result.converged;
+  projection.converged = result.status == inelastic::Status::CONVERGED;
   projection.residual = residual_of(problem);
   projection.impulse = problem.contacts.impulse;
   projection.velocity.resize(3 * static_cast<std::size_t>(problem.particles));
@@ -287,8 +311,8 @@ NB_MODULE(_core, module)
          const std::optional<Scalars> &body_inverse_mass,
          const std::optional<Matrices> &body_inverse_inertia) {
         const inelastic::Residual worst = residual_of(
-            make_problem(predicted_velocity, inverse_mass, first, second, normal, gap, timestep,
-                         impulse, {body, arm, body_inverse_mass, body_inverse_inertia}));
+            make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse},
+                         timestep, {body, arm, body_inverse_mass, body_inverse_inertia}));
         return nb::make_tuple(worst.feasibility, worst.complementarity);
       },
       "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, "gap"_a,
@@ -308,8 +332,8 @@ NB_MODULE(_core, module)
         const Scalars gap(zeros.data(), 1, gap_shape);
         inelastic::SerialHost host;
         return inelastic::largest_eigenvalue(
-            make_problem(velocity, inverse_mass, first, second, normal, gap, timestep, {},
-                         {body, arm, body_inverse_mass, body_inverse_inertia}),
+            make_problem(velocity, inverse_mass, {first, second, normal, gap, std::nullopt},
+                         timestep, {body, arm, body_inverse_mass, body_inverse_inertia}),
             host);
       },
       "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, nb::kw_only(), "timestep"_a,
@@ -323,18 +347,4 @@ NB_MODULE(_core, module)
         return nb::make_tuple(vector[0], vector[1], vector[2]);
       },
       "seed"_a, "particle"_a, "step"_a);
-
-  module.def(
-      "write_npz",
-      [](const std::string &path, nb::dict arrays) {
-        inelastic::NpzWriter writer;
-        for (const auto &[name, values] : arrays) {
-          const auto array = nb::cast<Vectors>(values);
-          writer.add(nb::cast<std::string>(name),
-                     std::vector<double>(array.data(), array.data() + array.size()), 3);
-        }
-        if (!writer.write(path))
-          throw std::runtime_error("cannot write " + path + ": " + std::strerror(errno));
-      },
-      "path"_a, "arrays"_a);
 }

@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 REPEATS = 9
 
 FIX_HEADER, FIX = "src_fix/lammps/fix_inelastic.h", "src_fix/lammps/fix_inelastic.cpp"
-CORE = "src_fix/core/accelerated_gradient.cpp"
+PACKED = "src_fix/core/packed_iterations.cpp"
 # File, what is there, and what takes its place.
 Cut = tuple[str, str, str]
 
@@ -36,7 +36,7 @@ BODIES: list[Cut] = [
     ),
     (FIX, "rigid_ = std::make_unique<RigidMotion>(", "(void) std::make_unique<RigidMotion>("),
     ("src_fix/core/rigid_bodies.h", "return inverse_mass.empty();", "return true;"),
-    (CORE, "if (!rods_.empty() || !bodies_.empty()) turn_all(", "if (false) turn_all("),
+    (PACKED, "if (!rods_.empty() || !bodies_.empty())", "if (false)"),
 ]
 WALLS: list[Cut] = [("src_fix/lammps/region_walls.h", "return ids_.empty();", "return true;")]
 OUTPUT: list[Cut] = [

@@ -1,4 +1,4 @@
-"""The C++ tests of the core, built and run under the address and undefined-behaviour sanitizers."""
+"""The C++ test programs, built and run under the address and undefined-behaviour sanitizers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from building import REPOSITORY, cmake, generator, run
 
 
-def test_core_is_clean_under_the_sanitizers(tmp_path: Path) -> None:
+def test_core_and_npz_are_clean_under_the_sanitizers(tmp_path: Path) -> None:
     build = str(tmp_path)
     run(
         *cmake(),

@@ -9,6 +9,7 @@ namespace inelastic {
 
 namespace {
 
+  // Returns the checksum of zip archives (ISO 3309): polynomial 0x04C11DB7 with reflected bits.
   std::uint32_t crc32(const std::string &bytes)
   {
     static const std::array<std::uint32_t, 256> table = [] {
@@ -27,6 +28,7 @@ namespace {
     return crc ^ 0xFFFFFFFFU;
   }
 
+  // Appends so many bytes of a number, the least first.
   void append(std::string &out, std::uint32_t value, int bytes)
   {
     for (int k = 0; k < bytes; ++k) out.push_back(static_cast<char>(value >> (8 * k) & 0xFF));
@@ -39,8 +41,8 @@ void NpzWriter::add_member(const std::string &name, const std::string &type,
 {
   std::string header =
       "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + shape + ", }";
-  constexpr std::size_t PREFIX =
-      10;    // magic, version and header length; the sum is a multiple of 64
+  // Magic, version, length of the header, and the header fill a multiple of 64 bytes.
+  constexpr std::size_t PREFIX = 10;
   header.append(63 - (PREFIX + header.size()) % 64, ' ');
   header.push_back('\n');
   std::string member("\x93NUMPY\x01\x00", 8);
@@ -67,51 +69,57 @@ void NpzWriter::add(const std::string &name, const std::vector<std::int64_t> &va
 void NpzWriter::add(const std::string &name, double value)
 { add_member(name, "<f8", "()", &value, sizeof(double)); }
 
-bool NpzWriter::write(const std::string &path) const
+// Returns the zip archive of all members: each with its local header, then the directory.
+std::string NpzWriter::archive() const
 {
-  std::string archive, directory;
+  std::string bytes, directory;
   for (const Member &member : members_) {
     const auto size = static_cast<std::uint32_t>(member.bytes.size());
-    const auto offset = static_cast<std::uint32_t>(archive.size());
+    const auto offset = static_cast<std::uint32_t>(bytes.size());
     std::string common;         // the fields that the local and the central header share
-    append(common, 20, 2);      // zip 2.0
+    append(common, 20, 2);      // version of the format: 2.0
     append(common, 0, 2);       // flags
-    append(common, 0, 2);       // stored
-    append(common, 0, 2);       // time and
+    append(common, 0, 2);       // method: stored
+    append(common, 0, 2);       // time
     append(common, 0x21, 2);    // date: 1 January 1980, so that equal arrays give equal files
     append(common, crc32(member.bytes), 4);
-    append(common, size, 4);
-    append(common, size, 4);
+    append(common, size, 4);    // compressed
+    append(common, size, 4);    // uncompressed
     append(common, static_cast<std::uint32_t>(member.name.size()), 2);
     append(common, 0, 2);    // no extra field
 
-    append(archive, 0x04034b50, 4);
-    archive += common + member.name + member.bytes;
+    append(bytes, 0x04034b50, 4);
+    bytes += common + member.name + member.bytes;
 
     append(directory, 0x02014b50, 4);
-    append(directory, 20, 2);
+    append(directory, 20, 2);    // version that wrote it: 2.0
     directory += common;
     append(directory, 0, 2);    // no comment
     append(directory, 0, 2);    // first disk
     append(directory, 0, 2);    // binary
-    append(directory, 0, 4);
+    append(directory, 0, 4);    // external attributes
     append(directory, offset, 4);
     directory += member.name;
   }
-  const auto directory_offset = static_cast<std::uint32_t>(archive.size());
-  archive += directory;
-  append(archive, 0x06054b50, 4);
-  append(archive, 0, 4);
-  append(archive, static_cast<std::uint32_t>(members_.size()), 2);
-  append(archive, static_cast<std::uint32_t>(members_.size()), 2);
-  append(archive, static_cast<std::uint32_t>(directory.size()), 4);
-  append(archive, directory_offset, 4);
-  append(archive, 0, 2);
+  const auto directory_offset = static_cast<std::uint32_t>(bytes.size());
+  bytes += directory;
+  append(bytes, 0x06054b50, 4);
+  append(bytes, 0, 4);    // this disk, and that of the directory
+  append(bytes, static_cast<std::uint32_t>(members_.size()), 2);    // on this disk
+  append(bytes, static_cast<std::uint32_t>(members_.size()), 2);    // in all
+  append(bytes, static_cast<std::uint32_t>(directory.size()), 4);
+  append(bytes, directory_offset, 4);
+  append(bytes, 0, 2);    // no comment
+  return bytes;
+}
 
+bool NpzWriter::write(const std::string &path) const
+{
+  const std::string bytes = archive();
   const std::string temporary = path + ".part";
   FILE *file = std::fopen(temporary.c_str(), "wb");
   if (!file) return false;
-  const bool written = std::fwrite(archive.data(), 1, archive.size(), file) == archive.size();
+  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
   const bool closed = std::fclose(file) == 0;
   if (written && closed && std::rename(temporary.c_str(), path.c_str()) == 0) return true;
   const int cause = errno;

@@ -1,4 +1,5 @@
-// Writes arrays as NumPy's .npz: a zip archive of .npy members, uncompressed, little-endian.
+// A writer of NumPy's .npz files: zip archives (PKWARE's APPNOTE.TXT) of uncompressed,
+// little-endian .npy members (numpy.lib.format, version 1.0). An archive must stay below 4 GB.
 
 #pragma once
 
@@ -11,13 +12,14 @@ namespace inelastic {
 
 class NpzWriter {
  public:
-  // `columns` = 0 gives shape (n,), otherwise (n / columns, columns). Below 4 GB in all.
+  // Adds an array of shape (n,) if `columns` is 0, and of shape (n / columns, columns) otherwise.
   void add(const std::string &name, const std::vector<double> &values, std::size_t columns = 0);
   void add(const std::string &name, const std::vector<std::int64_t> &values);
-  void add(const std::string &name, double value);    // shape ()
+  // Adds an array of shape ().
+  void add(const std::string &name, double value);
 
-  // Writes under a temporary name and renames, so that a file that exists is whole. False when the
-  // file cannot be written (errno tells why).
+  // Writes the archive under a temporary name and renames it, so that a file that exists is whole.
+  // Returns false if the file cannot be written; errno then tells the cause.
   bool write(const std::string &path) const;
 
  private:
@@ -25,8 +27,11 @@ class NpzWriter {
     std::string name;
     std::string bytes;
   };
+
   void add_member(const std::string &name, const std::string &type, const std::string &shape,
                   const void *data, std::size_t bytes);
+  std::string archive() const;
+
   std::vector<Member> members_;
 };
 

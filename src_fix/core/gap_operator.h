@@ -1,0 +1,61 @@
+// The operator that gives the gaps at the end of the step for given impulses:
+//
+//   w(lambda) = gap + h G V* + A lambda,   A = h G M^-1 G^T
+//
+// in the notation of contact_problem.h. Every verdict on impulses applies A through this class, in
+// double precision. (The iterations of accelerated_gradient.h have a fast form of their own.)
+
+#pragma once
+
+#include "contact_problem.h"
+#include "host.h"
+
+#include <vector>
+
+namespace inelastic {
+
+class GapOperator {
+ public:
+  // Computes free_gap(). Call it whenever the problem has changed; impulses may change without it.
+  void prepare(const ContactProblem &problem);
+
+  // w(0) = gap + h G V* [length], one per constraint: the gaps at the end of a step without
+  // impulses.
+  const std::vector<double> &free_gap() const { return free_gap_; }
+
+  // Writes w(impulse) [length], one per constraint.
+  void apply(const ContactProblem &problem, const double *impulse, double *gap_at_end, Host &host);
+
+  // Writes V* + M^-1 G^T impulse, 3 per particle [length / time], copies included.
+  void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
+
+  // Writes the same for the impulses of the last call of apply(), without communication.
+  void velocity_applied(const ContactProblem &problem, double *velocity) const;
+
+  struct ImpulseNorm {
+    // |G^T lambda|^2 in the norm of M^-1 [mass length^2 / time^2]: twice the kinetic energy that
+    // the impulses give to particles and bodies at rest.
+    double squared;
+    // The mass of the particles and bodies that impulses act on.
+    double mass;
+  };
+
+  // Returns this rank's share. Every copy of a particle counts like the particle itself.
+  ImpulseNorm impulse_norm(const ContactProblem &problem, const double *impulse, Host &host);
+
+ private:
+  void velocity_change(const ContactProblem &problem, const double *impulse, Host &host);
+
+  std::vector<double> free_gap_;
+  // The particles in no body and the dummy particle; filled only if there are bodies.
+  std::vector<int> free_particles_;
+  // 3 per particle, the dummy particle included: the sums of impulses, then the changes of
+  // velocity.
+  std::vector<double> change_;
+};
+
+// Returns the largest eigenvalue of A [time / mass] by power iteration. The estimate comes from
+// below and is mostly within a relative 1e-3.
+double largest_eigenvalue(const ContactProblem &problem, Host &host);
+
+}    // namespace inelastic

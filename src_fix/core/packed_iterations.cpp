@@ -1,0 +1,252 @@
+#include "packed_iterations.h"
+
+#include "vector3.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace inelastic {
+
+namespace {
+
+  // Within a block constraints are worked on in so many streams in turn: neighbours in the list
+  // have a particle in common, and a sum that was just written is slow to read again.
+  constexpr std::size_t STREAMS = 8;
+
+  struct RodShape {
+    double axis[3];    // unit vector
+    double arm[2];     // of the two members along the axis [length]
+    double across;     // inverse inertia across the axis [1 / (mass length^2)]
+  };
+
+  // Returns whether body b is a rod (packed::Rod) as far as `Real` can tell, and its shape if so.
+  template <typename Real> bool is_rod(const RigidBodies &bodies, std::size_t b, RodShape &shape)
+  {
+    constexpr double SAME = 8.0 * std::numeric_limits<Real>::epsilon();
+    if (bodies.start[b + 1] - bodies.start[b] != 2 || bodies.originals[b] != 2) return false;
+    const double *const first = &bodies.arm[3 * static_cast<std::size_t>(bodies.start[b])];
+    const double *const second = first + 3;
+    const double from[3] = {first[0] - second[0], first[1] - second[1], first[2] - second[2]};
+    const double length = norm(from);
+    if (!(length > 0.0)) return false;
+    double *const axis = shape.axis;
+    for (int d = 0; d < 3; ++d) axis[d] = from[d] / length;
+    for (int k = 0; k < 2; ++k) {
+      const double *const r = first + 3 * k;
+      shape.arm[k] = dot(r, axis);
+      for (int d = 0; d < 3; ++d)
+        if (!(std::abs(r[d] - shape.arm[k] * axis[d]) <= SAME * length)) return false;
+    }
+    const double *const a = &bodies.inverse_inertia[6 * b];
+    double turned[3];
+    multiply(a, axis, turned);
+    const double along = dot(turned, axis);
+    const double across = 0.5 * (a[0] + a[1] + a[2] - along);
+    const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int k = 0; k < 6; ++k) {
+      const double symmetric =
+          (along - across) * axis[row[k]] * axis[column[k]] + (row[k] == column[k] ? across : 0.0);
+      if (!(std::abs(a[k] - symmetric) <= SAME * std::max(along, across))) return false;
+    }
+    shape.across = across;
+    return across >= 0.0;
+  }
+
+  // Chooses the copies that are in constraints of this rank, and all members of a body of which one
+  // is. Most copies are in none.
+  void choose_copies(const ContactProblem &problem, Host &host)
+  {
+    if (!host.has_copies()) return;
+    std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
+    for (const int i : problem.contacts.first) chosen[i] = 1;
+    for (const int i : problem.contacts.second) chosen[i] = 1;
+    const RigidBodies &bodies = problem.bodies;
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      char any = 0;
+      for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) any |= chosen[bodies.member[k]];
+      for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) chosen[bodies.member[k]] = any;
+    }
+    host.choose_copies(chosen);
+  }
+
+  template <typename Real>
+  void set_lanes(packed::Vector<Real> &vector, double x, double y, double z, double fourth)
+  {
+    vector.lanes =
+        typename packed::Vector<Real>::Lanes{static_cast<Real>(x), static_cast<Real>(y),
+                                             static_cast<Real>(z), static_cast<Real>(fourth)};
+  }
+
+  // Returns the place of a particle's vector, in bytes.
+  template <typename Real> std::uint32_t place(int particle)
+  { return static_cast<std::uint32_t>(particle * sizeof(packed::Vector<Real>)); }
+
+}    // namespace
+
+template <typename Real>
+void PackedIterations<Real>::prepare(const ContactProblem &problem,
+                                     const std::vector<double> &free_gap,
+                                     const std::vector<double> &diagonal, const Scales &scales,
+                                     Host &host)
+{
+  pack_constraints(problem.contacts, free_gap, diagonal, scales);
+
+  const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
+  const double mobility_unit = problem.timestep * (scales.impulse / scales.length);
+  inverse_mass_.resize(particles);
+  for (std::size_t i = 0; i < particles; ++i)
+    inverse_mass_[i] = static_cast<Real>(problem.inverse_mass[i] * mobility_unit);
+  pack_bodies(problem.bodies, mobility_unit);
+  sum_.assign(particles, Vector{});
+  velocity_.assign(particles, Vector{});
+  ahead_.assign(particles, Vector{});
+  choose_copies(problem, host);
+  packed::add_impulses(pass(0.0, 0.0));
+  finish(host, 0.0);
+}
+
+template <typename Real>
+packed::Passed PackedIterations<Real>::advance(double momentum, double step)
+{
+  const packed::Passed passed = packed::advance_impulses(pass(momentum, step));
+  impulse_.swap(impulse_before_);
+  return passed;
+}
+
+template <typename Real> void PackedIterations<Real>::finish(Host &host, double momentum)
+{
+  host.sum_over_chosen_copies(reinterpret_cast<Real *>(sum_.data()));
+  if (!rods_.empty() || !bodies_.empty())
+    packed::turn_bodies(rods_, bodies_, members_.data(), sum_.data());
+  packed::move_particles(packed::Move<Real>{velocity_.size(), inverse_mass_.data(), sum_.data(),
+                                            velocity_.data(), ahead_.data(),
+                                            static_cast<Real>(momentum)});
+}
+
+// Sets an order in which neighbours in the problem's list come into different streams.
+template <typename Real> void PackedIterations<Real>::set_order(std::size_t count)
+{
+  source_.clear();
+  for (std::size_t begin = 0; begin < count; begin += packed::BLOCK) {
+    const std::size_t size = std::min(packed::BLOCK, count - begin);
+    const std::size_t length = (size + STREAMS - 1) / STREAMS;
+    for (std::size_t k = 0; k < length; ++k)
+      for (std::size_t place = k; place < size; place += length) source_.push_back(begin + place);
+  }
+}
+
+template <typename Real>
+void PackedIterations<Real>::pack_constraints(const ContactSet &contacts,
+                                              const std::vector<double> &free_gap,
+                                              const std::vector<double> &diagonal,
+                                              const Scales &scales)
+{
+  const std::size_t count = contacts.size();
+  set_order(count);
+  ends_.resize(count);
+  normal_.resize(count);
+  diagonal_.resize(count);
+  impulse_.resize(count);
+  const double per_length = 1.0 / scales.length;
+  const double per_impulse = 1.0 / scales.impulse;
+  const double diagonal_unit = scales.impulse / scales.length;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t c = source_[k];
+    const double *const n = &contacts.normal[3 * c];
+    ends_[k] = {place<Real>(contacts.first[c]), place<Real>(contacts.second[c])};
+    set_lanes(normal_[k], n[0], n[1], n[2], free_gap[c] * per_length);
+    diagonal_[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
+    impulse_[k] = static_cast<Real>(contacts.impulse[c] * per_impulse);
+  }
+  impulse_before_ = impulse_;
+  gap_before_.assign(count, 0);
+}
+
+template <typename Real>
+void PackedIterations<Real>::pack_bodies(const RigidBodies &bodies, double mobility_unit)
+{
+  rods_.clear();
+  bodies_.clear();
+  members_.resize(bodies.member.size());
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    if (!pack_rod(bodies, b, mobility_unit)) pack_body(bodies, b, mobility_unit);
+  for (const int particle : bodies.member) inverse_mass_[particle] = 1;
+}
+
+// Returns false if the body is no rod.
+template <typename Real>
+bool PackedIterations<Real>::pack_rod(const RigidBodies &bodies, std::size_t b,
+                                      double mobility_unit)
+{
+  RodShape shape;
+  if (!is_rod<Real>(bodies, b, shape)) return false;
+  packed::Rod<Real> rod;
+  const double root = std::sqrt(shape.across * mobility_unit);
+  set_lanes(rod.axis, shape.axis[0], shape.axis[1], shape.axis[2],
+            bodies.inverse_mass[b] * mobility_unit);
+  for (int k = 0; k < 2; ++k) {
+    rod.arm[k] = static_cast<Real>(shape.arm[k] * root);
+    rod.particle[k] = place<Real>(bodies.member[bodies.start[b] + k]);
+  }
+  rods_.push_back(rod);
+  return true;
+}
+
+// The arms of a body are in units of their own, a power of two near the largest of them.
+template <typename Real>
+void PackedIterations<Real>::pack_body(const RigidBodies &bodies, std::size_t b,
+                                       double mobility_unit)
+{
+  packed::Body<Real> body;
+  body.first = bodies.start[b];
+  body.last_original = bodies.start[b] + bodies.originals[b];
+  body.end = bodies.start[b + 1];
+  body.inverse_mass = static_cast<Real>(bodies.inverse_mass[b] * mobility_unit);
+  double reach = 0.0;
+  for (int k = 3 * body.first; k < 3 * body.end; ++k)
+    reach = std::max(reach, std::abs(bodies.arm[k]));
+  const double unit = reach > 0.0 ? std::exp2(std::ilogb(reach)) : 1.0;
+  const double *const a = &bodies.inverse_inertia[6 * b];
+  const double inertia_unit = mobility_unit * unit * unit;
+  const int columns[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
+  for (int d = 0; d < 3; ++d)
+    set_lanes(body.inverse_inertia[d], a[columns[d][0]] * inertia_unit,
+              a[columns[d][1]] * inertia_unit, a[columns[d][2]] * inertia_unit, 0.0);
+  for (int k = body.first; k < body.end; ++k) {
+    packed::Member<Real> &member = members_[k];
+    const double *const arm = &bodies.arm[3 * k];
+    set_lanes(member.arm, arm[0] / unit, arm[1] / unit, arm[2] / unit, 0.0);
+    member.particle = bodies.member[k];
+  }
+  bodies_.push_back(body);
+}
+
+template <typename Real>
+packed::Pass<Real> PackedIterations<Real>::pass(double momentum, double step)
+{
+  return {ends_.size(),
+          ends_.data(),
+          normal_.data(),
+          diagonal_.data(),
+          impulse_.data(),
+          impulse_before_.data(),
+          gap_before_.data(),
+          ahead_.data(),
+          sum_.data(),
+          static_cast<Real>(momentum),
+          static_cast<Real>(step)};
+}
+
+template <typename Real>
+void PackedIterations<Real>::unpack(const std::vector<Real> &packed, const Scales &scales,
+                                    std::vector<double> &impulse) const
+{
+  for (std::size_t k = 0; k < packed.size(); ++k)
+    impulse[source_[k]] = scales.impulse * static_cast<double>(packed[k]);
+}
+
+template class PackedIterations<float>;
+template class PackedIterations<double>;
+
+}    // namespace inelastic

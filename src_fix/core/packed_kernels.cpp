@@ -1,0 +1,223 @@
+#include "packed_kernels.h"
+
+#include "vectorise.h"
+
+#include <algorithm>
+
+namespace inelastic::packed {
+
+namespace {
+
+  template <typename Real>
+  inline __attribute__((always_inline)) auto &at(Vector<Real> *vectors, std::uint32_t offset)
+  { return reinterpret_cast<Vector<Real> *>(reinterpret_cast<char *>(vectors) + offset)->lanes; }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) const auto &at(const Vector<Real> *vectors,
+                                                       std::uint32_t offset)
+  {
+    return reinterpret_cast<const Vector<Real> *>(reinterpret_cast<const char *>(vectors) + offset)
+        ->lanes;
+  }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) void scatter(const Pass<Real> &pass, std::size_t begin,
+                                                     std::size_t end, const Real *impulse)
+  {
+    for (std::size_t c = begin; c < end; ++c) {
+      const auto push = pass.normal[c].lanes * impulse[c];
+      auto &first = at(pass.sum, pass.ends[c].first);
+      auto &second = at(pass.sum, pass.ends[c].second);
+      const auto first_sum = first + push, second_sum = second - push;
+      first = first_sum;
+      second = second_sum;
+    }
+  }
+
+  // Writes the four terms that a gap at the end of the step consists of: n_d dv_d of the three
+  // directions, and the gap without impulses.
+  template <typename Real>
+  inline __attribute__((always_inline)) void split_gap(const Pass<Real> &pass, std::size_t c,
+                                                       Vector<Real> &terms)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    const Ends &ends = pass.ends[c];
+    const Lanes opening = at(pass.velocity, ends.first) - at(pass.velocity, ends.second);
+    terms.lanes = pass.normal[c].lanes * (opening + Lanes{0, 0, 0, 1});
+  }
+
+  // Writes the sums over the lanes of each of four vectors.
+  template <typename Real>
+  inline __attribute__((always_inline)) void add_up(const Vector<Real> *terms, Vector<Real> &sums)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    const Lanes &a = terms[0].lanes, &b = terms[1].lanes, &c = terms[2].lanes, &d = terms[3].lanes;
+    const Lanes ab = Lanes{a[0], b[0], a[1], b[1]} + Lanes{a[2], b[2], a[3], b[3]};
+    const Lanes cd = Lanes{c[0], d[0], c[1], d[1]} + Lanes{c[2], d[2], c[3], d[3]};
+    sums.lanes = Lanes{ab[0], ab[1], cd[0], cd[1]} + Lanes{ab[2], ab[3], cd[2], cd[3]};
+  }
+
+  // Writes the gaps of a block, four at a time: up to three more are written than there are.
+  template <typename Real>
+  inline __attribute__((always_inline)) void gather(const Pass<Real> &pass, std::size_t begin,
+                                                    std::size_t end, Vector<Real> *gap)
+  {
+    Vector<Real> terms[4];
+    std::size_t c = begin;
+    for (; c + 4 <= end; c += 4, ++gap) {
+      for (std::size_t k = 0; k < 4; ++k) split_gap(pass, c + k, terms[k]);
+      add_up(terms, *gap);
+    }
+    if (c == end) return;
+    for (std::size_t k = 0; k < 4; ++k) split_gap(pass, std::min(c + k, end - 1), terms[k]);
+    add_up(terms, *gap);
+  }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) Passed advance(const Pass<Real> &pass)
+  {
+    Passed passed;
+    Vector<Real> gaps[(BLOCK + 3) / 4];
+    const Real *const gap = reinterpret_cast<const Real *>(gaps);
+    for (std::size_t begin = 0; begin < pass.count; begin += BLOCK) {
+      const std::size_t end = std::min(begin + BLOCK, pass.count);
+      gather(pass, begin, end, gaps);
+      Real uphill = 0, change_squared = 0, curved = 0, least = 0, most = 0, heaviest = 0;
+      const Real *const impulse = pass.impulse + begin;
+      Real *const next = pass.impulse_before + begin;
+      const Real *const diagonal = pass.diagonal + begin;
+      Real *const gap_before = pass.gap_before + begin;
+      const Real momentum = pass.momentum, step = pass.step;
+      const Real share = 1 / (1 + momentum);
+      const std::size_t size = end - begin;
+#pragma omp simd simdlen(16) reduction(+ : uphill, change_squared, curved) reduction(min : least) \
+    reduction(max : most, heaviest)
+      for (std::size_t k = 0; k < size; ++k) {
+        const Real last_change = impulse[k] - next[k];
+        const Real ahead = impulse[k] + momentum * last_change;
+        const Real free = ahead - step * gap[k] / diagonal[k];
+        const Real value = free > 0 ? free : 0;
+        const Real change = value - impulse[k];
+        uphill += (ahead - value) * change * diagonal[k];
+        change_squared += change * change * diagonal[k];
+        // gap[k] is the gap of the impulses ahead. Gaps are affine in the impulses, so that
+        // gap = here + momentum * (here - gap_before), solved for the gap of the present impulses:
+        const Real here = (gap[k] + momentum * gap_before[k]) * share;
+        const Real under_force = impulse[k] > 0 ? here : 0;
+        least = here < least ? here : least;
+        most = under_force > most ? under_force : most;
+        curved += last_change * (here - gap_before[k]);
+        gap_before[k] = here;
+        next[k] = value;
+        const Real load = value * diagonal[k];
+        heaviest = load > heaviest ? load : heaviest;
+      }
+      passed.uphill += uphill;
+      passed.change_squared += change_squared;
+      passed.curved += curved;
+      passed.least_gap = std::min(passed.least_gap, static_cast<double>(least));
+      passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
+      passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
+      scatter(pass, begin, end, pass.impulse_before);
+    }
+    return passed;
+  }
+
+  template <typename Real> inline __attribute__((always_inline)) void move(const Move<Real> &m)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    for (std::size_t i = 0; i < m.count; ++i) {
+      Lanes next = m.sum[i].lanes * m.inverse_mass[i];
+      next[3] = 0;
+      m.ahead[i].lanes = next + (next - m.velocity[i].lanes) * m.momentum;
+      m.velocity[i].lanes = next;
+      m.sum[i].lanes = Lanes{0, 0, 0, 0};
+    }
+  }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) void turn_rods(const std::vector<Rod<Real>> &rods,
+                                                       Vector<Real> *sum)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    for (const Rod<Real> &rod : rods) {
+      Lanes &first = at(sum, rod.particle[0]);
+      Lanes &second = at(sum, rod.particle[1]);
+      const Lanes axis = rod.axis.lanes;
+      const Lanes moment = first * rod.arm[0] + second * rod.arm[1];
+      const Lanes terms = axis * moment;
+      const Lanes spin = moment - axis * (terms[0] + terms[1] + terms[2]);
+      const Lanes slide = (first + second) * axis[3];
+      first = slide + spin * rod.arm[0];
+      second = slide + spin * rod.arm[1];
+    }
+  }
+
+  // Changes the order to y, z, x, by one instruction.
+  template <typename Lanes> inline __attribute__((always_inline)) void rotate(Lanes &a)
+  { a = Lanes{a[1], a[2], a[0], a[3]}; }
+
+  template <typename Lanes>
+  inline __attribute__((always_inline)) void add_cross(const Lanes &a, const Lanes &b, Lanes &sum)
+  {
+    Lanes a_rotated = a, b_rotated = b;
+    rotate(a_rotated);
+    rotate(b_rotated);
+    Lanes cross = a * b_rotated - a_rotated * b;
+    rotate(cross);
+    sum += cross;
+  }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) void turn(const std::vector<Rod<Real>> &rods,
+                                                  const std::vector<Body<Real>> &bodies,
+                                                  const Member<Real> *members, Vector<Real> *sum)
+  {
+    using Lanes = typename Vector<Real>::Lanes;
+    turn_rods(rods, sum);
+    for (const Body<Real> &body : bodies) {
+      Lanes total = {0, 0, 0, 0}, moment = {0, 0, 0, 0};
+      for (int k = body.first; k < body.last_original; ++k) {
+        const Lanes push = sum[members[k].particle].lanes;
+        total += push;
+        add_cross(members[k].arm.lanes, push, moment);
+      }
+      const Lanes spin = body.inverse_inertia[0].lanes * moment[0] +
+          body.inverse_inertia[1].lanes * moment[1] + body.inverse_inertia[2].lanes * moment[2];
+      const Lanes slide = total * body.inverse_mass;
+      for (int k = body.first; k < body.end; ++k) {
+        Lanes next = slide;
+        add_cross(spin, members[k].arm.lanes, next);
+        sum[members[k].particle].lanes = next;
+      }
+    }
+  }
+
+}    // namespace
+
+INELASTIC_CLONES Passed advance_impulses(const Pass<float> &pass)
+{ return advance(pass); }
+INELASTIC_CLONES Passed advance_impulses(const Pass<double> &pass)
+{ return advance(pass); }
+
+// These run once per solve and are compiled for one instruction set only.
+void add_impulses(const Pass<float> &pass)
+{ scatter(pass, 0, pass.count, pass.impulse); }
+void add_impulses(const Pass<double> &pass)
+{ scatter(pass, 0, pass.count, pass.impulse); }
+
+INELASTIC_CLONES void turn_bodies(const std::vector<Rod<float>> &rods,
+                                  const std::vector<Body<float>> &bodies,
+                                  const Member<float> *members, Vector<float> *sum)
+{ turn(rods, bodies, members, sum); }
+INELASTIC_CLONES void turn_bodies(const std::vector<Rod<double>> &rods,
+                                  const std::vector<Body<double>> &bodies,
+                                  const Member<double> *members, Vector<double> *sum)
+{ turn(rods, bodies, members, sum); }
+
+INELASTIC_CLONES void move_particles(const Move<float> &arrays)
+{ move(arrays); }
+INELASTIC_CLONES void move_particles(const Move<double> &arrays)
+{ move(arrays); }
+
+}    // namespace inelastic::packed

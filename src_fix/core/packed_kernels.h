@@ -1,0 +1,113 @@
+// The vector passes of one iteration of accelerated_gradient.h, over packed arrays.
+//
+// Packed arrays hold the problem in the order and in the units in which the passes are fast, in
+// single (Real = float) or double precision. Vectors have four numbers, so that one instruction
+// works on all of them. Lengths are in units of Scales::length, velocities in units of that length
+// over the time step, impulses in units of Scales::impulse (packed_iterations.h).
+//
+// An iteration consists of advance_impulses, which reads every constraint once, then, for particles
+// in bodies, turn_bodies, and move_particles. Each is compiled for several instruction sets.
+
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace inelastic::packed {
+
+// Constraints are worked on in blocks, which stay in the fastest cache.
+constexpr std::size_t BLOCK = 256;
+
+// A vector holds x, y, z and a fourth number.
+template <typename Real> struct alignas(4 * sizeof(Real)) Vector {
+  typedef Real Lanes __attribute__((vector_size(4 * sizeof(Real))));
+  Lanes lanes;
+};
+
+// The vectors of a constraint's two particles are at these places, in bytes from the start of an
+// array, as addresses take them.
+struct Ends {
+  std::uint32_t first, second;
+};
+
+// advance_impulses works on these arrays; those of constraints have `count` entries.
+template <typename Real> struct Pass {
+  std::size_t count;
+  const Ends *ends;
+  const Vector<Real> *normal;      // the fourth number is the gap at the end without impulses
+  const Real *diagonal;            // of A
+  const Real *impulse;             // the present impulses
+  Real *impulse_before;            // the impulses before; replaced by the next ones
+  Real *gap_before;                // the gaps of the impulses before; replaced by the present ones
+  const Vector<Real> *velocity;    // per particle: change of velocity of the impulses ahead
+  Vector<Real> *sum;               // per particle: sum of the next impulses; zero before
+  Real momentum;                   // impulses ahead = present + momentum * (present - before)
+  Real step;                       // 1 / L
+};
+
+// A pass returns these sums and maxima over the constraints. D is the diagonal of A: the algorithm
+// works in impulses scaled by the root of D.
+struct Passed {
+  double uphill = 0.0;            // > 0: the momentum points uphill on the dual function
+  double heaviest = 0.0;          // largest of the next impulses, times D: a length
+  double change_squared = 0.0;    // change^T D change, with change = next - present impulses
+  // The others are of the present impulses.
+  double curved = 0.0;              // change^T A change, with change = present impulses - before
+  double least_gap = 0.0;           // least gap at the end of the step, at most 0
+  double most_under_force = 0.0;    // largest gap where an impulse acts, at least 0
+};
+
+// Makes a projected gradient step from the impulses ahead. `sum` gets the impulses' sums.
+Passed advance_impulses(const Pass<float> &pass);
+Passed advance_impulses(const Pass<double> &pass);
+
+// Adds the present impulses to `sum`.
+void add_impulses(const Pass<float> &pass);
+void add_impulses(const Pass<double> &pass);
+
+// The members of a rigid body (rigid_bodies.h) are those from `first` to before `end` of an array.
+template <typename Real> struct Body {
+  int first, last_original, end;
+  Real inverse_mass;
+  Vector<Real> inverse_inertia[3];    // its columns, in units that fit those of the arms
+};
+
+template <typename Real> struct Member {
+  Vector<Real> arm;
+  int particle;
+};
+
+// A rod is a body of two members without copies whose arms lie on an axis of symmetry of its
+// inertia, such as a dimer. With M the mass and s_k the impulses on its particles,
+//
+//   dv_k = (1/M) sum_l s_l + b_k w,   w = the part of sum_l b_l s_l across the axis
+//
+// where b_k is the arm along the axis over the root of the inertia across it. Most bodies are rods,
+// and the general way takes three times as long.
+template <typename Real> struct Rod {
+  Vector<Real> axis;            // the fourth number is the inverse mass
+  Real arm[2];                  // b
+  std::uint32_t particle[2];    // places of the particles' vectors, in bytes
+};
+
+// Replaces, for particles in bodies, sums of impulses by changes of velocity.
+void turn_bodies(const std::vector<Rod<float>> &rods, const std::vector<Body<float>> &bodies,
+                 const Member<float> *members, Vector<float> *sum);
+void turn_bodies(const std::vector<Rod<double>> &rods, const std::vector<Body<double>> &bodies,
+                 const Member<double> *members, Vector<double> *sum);
+
+// move_particles works on these arrays, which are per particle.
+template <typename Real> struct Move {
+  std::size_t count;
+  const Real *inverse_mass;    // 1 for particles in bodies, whose sums are changes of velocity
+  Vector<Real> *sum;           // sums of the next impulses; left at zero
+  Vector<Real> *velocity;      // change of velocity of the present impulses; replaced by the next
+  Vector<Real> *ahead;         // set to next + momentum * (next - present); the fourth number is 0
+  Real momentum;
+};
+
+void move_particles(const Move<float> &arrays);
+void move_particles(const Move<double> &arrays);
+
+}    // namespace inelastic::packed

@@ -1,0 +1,25 @@
+// Uzawa's algorithm, the solver of the paper (Faure, Lefebvre-Lepot and Semin, ESAIM: Proceedings
+// 28 (2009) 13): projected gradient on the dual problem of contact_problem.h with a fixed step,
+//
+//   lambda <- max(0, lambda - w(lambda) / L)
+//
+// from lambda = 0. L is the largest eigenvalue of A, from a power iteration whose products with A
+// are not counted among the iterations. The solver stops on feasibility alone.
+
+#pragma once
+
+#include "solver.h"
+
+#include <vector>
+
+namespace inelastic {
+
+class Uzawa final : public Solver {
+ public:
+  SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
+
+ private:
+  std::vector<double> gap_;    // [length] at the end of the step, one per constraint
+};
+
+}    // namespace inelastic
