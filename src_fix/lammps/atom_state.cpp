@@ -93,7 +93,8 @@ int AtomState::restart_size(int i, bool writes) const
   if (!writes) return 0;
   const double *const held = state_[i] + PUSH_HELD;
   const bool pushed = held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
-  return pushed || (step_.settings.has_bodies() && momenta_.has_held(i)) ? largest_restart_size() : 1;
+  return pushed || (step_.settings.has_bodies() && momenta_.has_held(i)) ? largest_restart_size()
+                                                                         : 1;
 }
 
 int AtomState::largest_restart_size() const

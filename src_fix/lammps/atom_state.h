@@ -25,7 +25,8 @@ class AtomState : protected Pointers {
   double *expected_position(int i) { return state_[i] + EXPECTED_X; }
   double *expected_velocity(int i) { return state_[i] + EXPECTED_V; }
   double &expected_radius(int i) { return state_[i][EXPECTED_RADIUS]; }
-  static constexpr double OUTSIDE = -1.0;    // in place of the radius of an atom outside of the group
+  static constexpr double OUTSIDE =
+      -1.0;    // in place of the radius of an atom outside of the group
 
   // The part of a velocity that takes a bad overlap apart and is no momentum: after the last move, and at
   // whole steps.
@@ -34,7 +35,7 @@ class AtomState : protected Pointers {
   // At the end of a run: velocities are momentum alone from here on.
   void take_out_pushes();
 
-  ContactMemory &memory() { return memory_; }
+  ContactMemory &contact_memory() { return memory_; }
   CarriedMomenta &momenta() { return momenta_; }
 
   // Both atoms of a contact remember it, those of other ranks included: the next neighbour list may show

@@ -161,10 +161,11 @@ std::string BodyInertias::compare(const inelastic::ContactProblem &problem,
   const double extent = std::sqrt(trace(body.point_inertia) / body.mass);
   const double rounded = std::numeric_limits<double>::epsilon() * norm(atom->x[i]);
   if (kind_ == Inertia::POINT && extent < RESOLVED_ARM * rounded)
-    return fmt::format("the spheres of molecule {} are about {:.2g} apart, too near to one another "
-                       "for point masses at coordinates that are rounded by {:.1g}: at least {:.1g} "
-                       "is needed, or rigid {} solid, or one sphere in their place",
-                       molecule, extent, rounded, RESOLVED_ARM * rounded, fix_id);
+    return fmt::format(
+        "the spheres of molecule {} are about {:.2g} apart, too near to one another "
+        "for point masses at coordinates that are rounded by {:.1g}: at least {:.1g} "
+        "is needed, or rigid {} solid, or one sphere in their place",
+        molecule, extent, rounded, RESOLVED_ARM * rounded, fix_id);
   if (same_moments(body.inertia, moments)) return "";
   return other_moments(problem.bodies, fix_id, i, b, moments);
 }

@@ -58,7 +58,8 @@ class BodyMembers : protected Pointers {
   std::vector<int> last_sphere_;    // per molecule: room for find, NONE between its calls
   std::vector<int> copy_of_;        // per member: which of the body's originals it is
   std::vector<char> incomplete_;    // per particle: of a body of which this rank has only a part
-  std::vector<double> in_body_;     // 3 per particle, of which the first tells whether it is in a body
+  std::vector<double>
+      in_body_;    // 3 per particle, of which the first tells whether it is in a body
 };
 
 }    // namespace LAMMPS_NS

@@ -28,8 +28,8 @@ void ContactOutput::begin_run(int number_of_walls)
   wall_force_step_ = -1;
 }
 
-void ContactOutput::update(const inelastic::ProjectionResult &result, long shortened_steps,
-                           const VirialTarget &virial)
+void ContactOutput::take(const inelastic::ProjectionResult &result, long shortened_steps,
+                         const VirialTarget &virial)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const double force_per_impulse = 1.0 / step_.impulse_per_force;
@@ -43,8 +43,7 @@ void ContactOutput::update(const inelastic::ProjectionResult &result, long short
     memory->grow(local_, local_room_, LOCAL_COLUMNS, "inelastic:array_local");
   }
   for (std::size_t c = 0; c < contacts.size(); ++c)
-    if (contacts.impulse[c] > 0.0)
-      add_contact(c, contacts.impulse[c] * force_per_impulse, virial);
+    if (contacts.impulse[c] > 0.0) add_contact(c, contacts.impulse[c] * force_per_impulse, virial);
   share(virial);
 
   double sums[3] = {counts_[0], counts_[1], static_cast<double>(contacts.size())};
@@ -88,8 +87,9 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   const Side &side = step_.sides[c];
   const bool is_wall = side.wall != 0;
   counts_[is_wall] += 1.0;
-  largest_kick_ = std::max(largest_kick_, problem.contacts.impulse[c] *
-                               (problem.inverse_mass[i] + problem.inverse_mass[j]));
+  largest_kick_ =
+      std::max(largest_kick_,
+               problem.contacts.impulse[c] * (problem.inverse_mass[i] + problem.inverse_mass[j]));
   contact_count_[3 * i + is_wall] += 1.0;
   for (int d = 0; d < 3; ++d) {
     contact_force_[3 * i + d] += strength * n[d];

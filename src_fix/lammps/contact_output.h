@@ -46,13 +46,13 @@ class ContactOutput : protected Pointers {
   struct VirialTarget {
     bool global;
     bool per_atom;
-    double *total;      // 6 numbers
-    double **atoms;     // 6 per atom
+    double *total;     // 6 numbers
+    double **atoms;    // 6 per atom
   };
 
   // After a step. Collective.
-  void update(const inelastic::ProjectionResult &result, long shortened_steps,
-              const VirialTarget &virial);
+  void take(const inelastic::ProjectionResult &result, long shortened_steps,
+            const VirialTarget &virial);
 
   // 3 per particle: the force of all contacts, on ghosts that of their owned atom.
   const double *contact_force() const { return contact_force_.data(); }

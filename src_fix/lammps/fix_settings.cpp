@@ -12,7 +12,7 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-constexpr const char *KEYWORDS[] = {"region",  "rigid",  "solver", "maxiter",
+constexpr const char *KEYWORDS[] = {"region", "rigid",  "solver", "maxiter",
                                     "frozen", "record", "shorten"};
 
 bool is_keyword(const char *word)
@@ -136,7 +136,8 @@ double LAMMPS_NS::read_tolerance(LAMMPS *lmp, const char *text, int argument)
 {
   const double tolerance = utils::numeric(FLERR, text, false, lmp);
   if (!(tolerance > 0.0) || std::isinf(tolerance))
-    lmp->error->all(FLERR, argument, "Fix inelastic tolerance must be a length greater than 0, not {}", text);
+    lmp->error->all(FLERR, argument,
+                    "Fix inelastic tolerance must be a length greater than 0, not {}", text);
   return tolerance;
 }
 

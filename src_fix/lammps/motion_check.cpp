@@ -23,7 +23,7 @@ using inelastic::norm;
 
 namespace {
 
-constexpr double EXPECTED_IN_EPS = 1.0e-7;      // how well the predicted motion must be met ...
+constexpr double EXPECTED_IN_EPS = 1.0e-7;       // how well the predicted motion must be met ...
 constexpr double EXPECTED_RELATIVE = 1.0e-12;    // ... beside the round-off of what it comes from
 
 }    // namespace
@@ -67,8 +67,7 @@ void MotionCheck::after_step(double largest_kick)
   // The angular momentum of a body is carried along: so is its round-off.
   largest_kick_ = bodies_ && step_.continues ? std::max(largest_kick_, largest_kick) : largest_kick;
   for (int i = 0; i < atom->nlocal; ++i)
-    state_.expected_radius(i) =
-        step_.in_group(atom, i) ? atom->radius[i] : AtomState::OUTSIDE;
+    state_.expected_radius(i) = step_.in_group(atom, i) ? atom->radius[i] : AtomState::OUTSIDE;
   step_.continues = true;
 }
 
@@ -78,9 +77,8 @@ std::string MotionCheck::not_finite() const
   const double kicks = step_.kick == Kick::WHOLE ? 1.0 : 0.5;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!step_.in_group(atom, i)) continue;
-    const double kick = step_.is_mobile(atom, i)
-        ? kicks * update->dt * force->ftm2v / mass_of(atom, i)
-        : 0.0;
+    const double kick =
+        step_.is_mobile(atom, i) ? kicks * update->dt * force->ftm2v / mass_of(atom, i) : 0.0;
     const double *const v = atom->v[i];
     const double *const f = atom->f[i];
     const double after[3] = {v[0] + kick * f[0], v[1] + kick * f[1], v[2] + kick * f[2]};
@@ -145,8 +143,7 @@ std::string MotionCheck::compare(int i) const
   const double round_off = EXPECTED_RELATIVE *
       (norm(atom->x[i]) + step_.largest_radius + h * (norm(expected_v) + largest_kick_)) *
       (bodies_ ? state_.momenta().round_off_growth(i) : 1.0);
-  const double allowed =
-      (frozen ? 1.0 : EXPECTED_IN_EPS) * step_.settings.tolerance + round_off;
+  const double allowed = (frozen ? 1.0 : EXPECTED_IN_EPS) * step_.settings.tolerance + round_off;
   const double position_error = norm(off);
   const double velocity_error = frozen ? 0.0 : h * norm(faster);
   if (position_error <= allowed && velocity_error <= allowed) return "";

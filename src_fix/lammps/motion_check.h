@@ -55,9 +55,10 @@ class MotionCheck : protected Pointers {
   AtomState &state_;
   RigidMotion *bodies_;
   SceneCheck scene_;
-  bool goes_on_ = false;          // between setup and the end of the run
-  bool ended_pushing_ = false;    // velocities lack the push that the last run's end took out of them
-  double largest_kick_ = 0.0;     // [velocity] on any rank
+  bool goes_on_ = false;    // between setup and the end of the run
+  bool ended_pushing_ =
+      false;    // velocities lack the push that the last run's end took out of them
+  double largest_kick_ = 0.0;    // [velocity] on any rank
 };
 
 }    // namespace LAMMPS_NS

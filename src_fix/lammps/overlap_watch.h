@@ -41,6 +41,7 @@ class OverlapWatch : protected Pointers {
 
   // Steps of this run in which an unexpected overlap was there.
   long unexpected_steps() const { return unexpected_steps_; }
+  void begin_count() { unexpected_steps_ = 0; }
 
   // Whether this step or the one before pushed spheres apart: a whole-step velocity holds half of each
   // push.

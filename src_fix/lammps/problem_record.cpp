@@ -34,15 +34,28 @@ ProblemRecord::Table ProblemRecord::atoms() const
   };
   const inelastic::ContactProblem &problem = step_.problem;
   return {
-      {"id", 1, Column::INTEGER, [this](int i, double *out) { *out = atom->tag[i]; }},
+      {"id", 1, Column::INTEGER,
+       [this](int i, double *out) {
+         *out = atom->tag[i];
+       }},
       {"inverse_mass", 1, Column::REAL,
-       [&problem](int i, double *out) { *out = problem.inverse_mass[i]; }},
-      {"radius", 1, Column::REAL, [this](int i, double *out) { *out = atom->radius[i]; }},
+       [&problem](int i, double *out) {
+         *out = problem.inverse_mass[i];
+       }},
+      {"radius", 1, Column::REAL,
+       [this](int i, double *out) {
+         *out = atom->radius[i];
+       }},
       {"position", 3, Column::REAL,
-       [this](int i, double *out) { std::copy_n(atom->x[i], 3, out); }},
+       [this](int i, double *out) {
+         std::copy_n(atom->x[i], 3, out);
+       }},
       {"predicted_velocity", 3, Column::REAL, vector(problem.predicted_velocity.data())},
       {"velocity", 3, Column::REAL, vector(step_.velocity.data())},
-      {"mass", 1, Column::REAL, [this](int i, double *out) { *out = mass_of(atom, i); }},
+      {"mass", 1, Column::REAL,
+       [this](int i, double *out) {
+         *out = mass_of(atom, i);
+       }},
   };
 }
 
@@ -54,7 +67,10 @@ ProblemRecord::Table ProblemRecord::members() const
        [this](int i, double *out) {
          *out = step_.is_member(i) ? static_cast<double>(atom->molecule[i]) : 0.0;
        }},
-      {"arm", 3, Column::REAL, [this](int i, double *out) { std::copy_n(step_.arm(i), 3, out); }},
+      {"arm", 3, Column::REAL,
+       [this](int i, double *out) {
+         std::copy_n(step_.arm(i), 3, out);
+       }},
   };
 }
 
@@ -64,9 +80,13 @@ ProblemRecord::Table ProblemRecord::bodies() const
   const inelastic::RigidBodies &all = step_.problem.bodies;
   return {
       {"body_molecule", 1, Column::INTEGER,
-       [this](int i, double *out) { *out = static_cast<double>(atom->molecule[i]); }},
+       [this](int i, double *out) {
+         *out = static_cast<double>(atom->molecule[i]);
+       }},
       {"body_inverse_mass", 1, Column::REAL,
-       [&all](int i, double *out) { *out = all.inverse_mass[all.body[i]]; }},
+       [&all](int i, double *out) {
+         *out = all.inverse_mass[all.body[i]];
+       }},
       {"body_inverse_inertia", 6, Column::REAL,
        [&all](int i, double *out) {
          std::copy_n(&all.inverse_inertia[6 * all.body[i]], 6, out);
@@ -84,16 +104,33 @@ ProblemRecord::Table ProblemRecord::contacts() const
   };
   return {
       {"id1", 1, Column::INTEGER,
-       [this, &set](int c, double *out) { *out = static_cast<double>(atom->tag[set.first[c]]); }},
+       [this, &set](int c, double *out) {
+         *out = static_cast<double>(atom->tag[set.first[c]]);
+       }},
       {"id2", 1, Column::INTEGER,
-       [partner](int c, double *out) { *out = static_cast<double>(partner(c)); }},
+       [partner](int c, double *out) {
+         *out = static_cast<double>(partner(c));
+       }},
       {"normal", 3, Column::REAL,
-       [&set](int c, double *out) { std::copy_n(&set.normal[3 * c], 3, out); }},
-      {"gap", 1, Column::REAL, [&set](int c, double *out) { *out = set.gap[c]; }},
-      {"gap_now", 1, Column::REAL, [&sides](int c, double *out) { *out = sides[c].gap_now; }},
+       [&set](int c, double *out) {
+         std::copy_n(&set.normal[3 * c], 3, out);
+       }},
+      {"gap", 1, Column::REAL,
+       [&set](int c, double *out) {
+         *out = set.gap[c];
+       }},
+      {"gap_now", 1, Column::REAL,
+       [&sides](int c, double *out) {
+         *out = sides[c].gap_now;
+       }},
       {"wall_motion", 1, Column::REAL,
-       [&sides](int c, double *out) { *out = sides[c].wall_motion; }},
-      {"impulse", 1, Column::REAL, [&set](int c, double *out) { *out = set.impulse[c]; }},
+       [&sides](int c, double *out) {
+         *out = sides[c].wall_motion;
+       }},
+      {"impulse", 1, Column::REAL,
+       [&set](int c, double *out) {
+         *out = set.impulse[c];
+       }},
       {"impulse_guess", 1, Column::REAL,
        [this, &set, partner](int c, double *out) {
          *out = step_.impulse_per_force * memory_.force(set.first[c], partner(c));

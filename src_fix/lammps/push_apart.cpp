@@ -14,10 +14,8 @@ namespace {
 void add(inelastic::ProjectionResult &result, const inelastic::ProjectionResult &pushed)
 {
   result.iterations += pushed.iterations;
-  result.converged = result.converged && pushed.converged;
-  result.infeasible = result.infeasible || pushed.infeasible;
+  result.status = inelastic::worse(result.status, pushed.status);
   result.round_off = std::max(result.round_off, pushed.round_off);
-  result.complete = result.complete && pushed.complete;
   result.residual.feasibility = std::max(result.residual.feasibility, pushed.residual.feasibility);
   result.residual.complementarity =
       std::max(result.residual.complementarity, pushed.residual.complementarity);

@@ -165,9 +165,10 @@ void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallVie
   for (int d = 0; d < 3; ++d) view.normal[d] = gradient[d] / std::sqrt(length_squared);
 }
 
-void RegionWalls::view_static(const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
-                              const std::function<void(const Viewpoint &, const WallView &)> &found,
-                              const std::function<void(const Viewpoint &, const std::string &)> &outside)
+void RegionWalls::view_static(
+    const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
+    const std::function<void(const Viewpoint &, const WallView &)> &found,
+    const std::function<void(const Viewpoint &, const std::string &)> &outside)
 {
   std::vector<WallView> views;
   for (const Viewpoint &from : viewpoints) {
@@ -189,9 +190,10 @@ void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)
   modify->addstep_compute(update->ntimestep + 1);
 }
 
-void RegionWalls::view_moving(const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
-                              const std::function<void(const Viewpoint &, const WallView &)> &found,
-                              const std::function<void(const Viewpoint &, const std::string &)> &outside)
+void RegionWalls::view_moving(
+    const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
+    const std::function<void(const Viewpoint &, const WallView &)> &found,
+    const std::function<void(const Viewpoint &, const std::string &)> &outside)
 {
   Region *region = obstacle.region;
 

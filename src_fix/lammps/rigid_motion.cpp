@@ -103,8 +103,8 @@ void RigidMotion::take_carried(int i)
   }
   if (!carried && inertias_.kind() == Inertia::SOLID)
     for (int d = 0; d < 3; ++d)
-      part[d] += SPHERE_MOMENT * mass_of(atom, i) * atom->radius[i] * atom->radius[i] *
-          atom->omega[i][d];
+      part[d] +=
+          SPHERE_MOMENT * mass_of(atom, i) * atom->radius[i] * atom->radius[i] * atom->omega[i][d];
 }
 
 void RigidMotion::predict_body(std::size_t b)
@@ -323,7 +323,7 @@ double RigidMotion::angle_of_first_momentum(int b) const
   for (int k = bodies.start[b]; k < bodies.start[b] + bodies.originals[b]; ++k)
     longest = std::max(longest, norm(&bodies.arm[3 * k]));
   const double *const inverse = &bodies.inverse_inertia[6 * b];
-  const double turned = step_.problem.timestep * inertias_[b].mass *
-      norm(bodies_[b].velocity_end) * (inverse[0] + inverse[1] + inverse[2]) * longest;
+  const double turned = step_.problem.timestep * inertias_[b].mass * norm(bodies_[b].velocity_end) *
+      (inverse[0] + inverse[1] + inverse[2]) * longest;
   return std::sqrt(ROUNDED * turned);
 }

@@ -44,8 +44,8 @@ void SphereMotion::apply(const double *)
         const double without = atom->v[i][d] + kick_per_force * atom->f[i][d];
         atom->f[i][d] += (v - without) / kick_per_force;
       }
-      const double push =
-          step_.bad_start && moves ? v - problem.predicted_velocity[3 * i + d] : 0.0;
+      const double push = step_.bad_start && moves ? v - problem.predicted_velocity[3 * i + d]
+                                                   : 0.0;
       if (step_.kick == Kick::WHOLE) held[d] = 0.5 * (next[d] + push);
       next[d] = push;
       state_.expected_velocity(i)[d] = v;

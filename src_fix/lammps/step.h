@@ -69,7 +69,7 @@ struct Step {
   double largest_overlap = 0.0;    // [length] at the start
   double excess = 0.0;             // [length] the overlap at the end beyond the regular ones
   int relinearisations = 0;        // rounds that have looked at the end of the step
-  std::string problem_found;       // what went wrong on this rank while collecting; empty if nothing
+  std::string problem_found;    // what went wrong on this rank while collecting; empty if nothing
 
   bool in_group(const Atom *atom, int i) const { return atom->mask[i] & settings.group_bit; }
   bool is_mobile(const Atom *atom, int i) const

@@ -91,9 +91,8 @@ void StepLength::measure_farthest()
 {
   double narrowest[3];
   for (int d = 0; d < 3; ++d) {
-    const double part = domain->triclinic
-        ? domain->subhi_lamda[d] - domain->sublo_lamda[d]
-        : (domain->subhi[d] - domain->sublo[d]) / domain->prd[d];
+    const double part = domain->triclinic ? domain->subhi_lamda[d] - domain->sublo_lamda[d]
+                                          : (domain->subhi[d] - domain->sublo[d]) / domain->prd[d];
     const bool bounded = domain->periodicity[d] || comm->nprocs > 1;
     own_width_[d] = bounded ? part * domain->prd[d] : EXTREME;
     narrowest[d] = -part;
@@ -255,10 +254,7 @@ bool StepLength::accepts(const std::string &named)
 }
 
 bool StepLength::may_shorten_unsolved() const
-{
-  return step_.settings.shorten &&
-      update->dt > SHORTEST_UNSOLVED * step_.regular_timestep;
-}
+{ return step_.settings.shorten && update->dt > SHORTEST_UNSOLVED * step_.regular_timestep; }
 
 void StepLength::shorten(double factor, const std::string &named)
 {

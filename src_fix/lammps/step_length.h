@@ -67,10 +67,11 @@ class StepLength : protected Pointers {
   Step &step_;
   GhostExchange &ranks_;
   bool one_cutoff_ = true;
-  double list_reach_ = 0.0;         // [length] the gap beyond which a pair may lack in a new list
-  double spread_at_start_ = 0.0;    // [length] largest relative displacement since the list was built
-  double growth_ = 0.0;             // [length] of a radius since then
-  double strayed_ = 0.0;            // largest displacement since then, of the width that a rank owns
+  double list_reach_ = 0.0;    // [length] the gap beyond which a pair may lack in a new list
+  double spread_at_start_ =
+      0.0;                  // [length] largest relative displacement since the list was built
+  double growth_ = 0.0;     // [length] of a radius since then
+  double strayed_ = 0.0;    // largest displacement since then, of the width that a rank owns
   // [length] The part of the box that this rank owns; no limit where nothing is beyond.
   double own_width_[3] = {EXTREME, EXTREME, EXTREME};
   // Of the box, in each direction: LAMMPS loses an atom that goes further between two lists.

@@ -58,8 +58,7 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
 {
   constexpr double LONG_ARC = 1.0;    // [radians]
   std::string cause;
-  const std::string message =
-      no_room_ ? no_room(result, cause) : out_of_iterations(result, cause);
+  const std::string message = no_room_ ? no_room(result, cause) : out_of_iterations(result, cause);
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
   const double angle = bodies_ && constraints_.relinearised() ? largest_angle() : 0.0;
   if (angle > LONG_ARC)
@@ -97,8 +96,9 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
   // In half of the iterations or more; without room it stays, and otherwise falls by half or faster.
   constexpr double STILL_FALLS = 0.7;
   constexpr double UNSEEN = 100.0;
-  const std::string help = fmt::format(
-      "raise maxiter ({}), raise the tolerance, or lower the timestep", step_.settings.max_iterations);
+  const std::string help =
+      fmt::format("raise maxiter ({}), raise the tolerance, or lower the timestep",
+                  step_.settings.max_iterations);
   double before = result.trend.earlier();
   const double now = result.trend.least();
   // The trend knows nothing of constraints that were found after the last iteration.

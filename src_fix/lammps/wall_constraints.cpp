@@ -89,8 +89,7 @@ void WallConstraints::collect(double margin)
         clear_of_walls_[from.atom] = 0.0;
         const double gap = view.distance - atom->radius[from.atom];
         rules_.overlaps().note(view.distance_now - atom->radius[from.atom], from.atom, -view.wall);
-        const double opening =
-            step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
+        const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
         if (gap + std::min(0.0, opening) <= margin) take(from, view);
       },
       [&](const RegionWalls::Viewpoint &from, const std::string &region) {
@@ -122,8 +121,7 @@ long WallConstraints::add_violated()
       viewpoints(velocity, 0.0), false,
       [&](const RegionWalls::Viewpoint &from, const WallView &view) {
         const double gap = view.distance - atom->radius[from.atom];
-        const double opening =
-            step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
+        const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
         if (gap + opening < -step_.settings.tolerance &&
             !constraint_.count(key(from.atom, view.wall)))
           take(from, view);
@@ -214,8 +212,8 @@ long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
         bodies_->angle_turned(step_.problem, i) >= HALF_A_TURN)
       continue;
     const double *const n = &step_.problem.contacts.normal[3 * c];
-    const double turning = step_.problem.timestep *
-        (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]));
+    const double turning =
+        step_.problem.timestep * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]));
     const double linear_gap = rules_.effective_gap(side.gap_now, side.size) - side.wall_motion;
     changed += rules_.follow(c, linear_gap + turning, false);
   }
