@@ -36,9 +36,9 @@ def adopt_results(study: Study, folder: Folder, source: Path) -> int:
 
     Parameters
     ----------
-    study : whose cases they are
-    folder : where the results go
-    source : where they are: one folder a study
+    study : study whose results they are
+    folder : folder in which studies run, to which the results go
+    source : folder of the results that were kept, with a folder for each study
     """
     count = 0
     for case in study.cases:

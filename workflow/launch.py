@@ -39,7 +39,7 @@ _OF_MPI = re.compile(r"^(PMI|PMIX|HYDI|HYDRA|MPI|MPIR)_")
 
 @dataclass(frozen=True)
 class Options:
-    """How cases are run.
+    """The options with which cases are run.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Options:
 
 @dataclass
 class Outcome:
-    """What became of the cases, by their names.
+    """The outcome of running cases, by their names.
 
     Attributes
     ----------

@@ -122,13 +122,7 @@ def look_at(
         walls = frame.box
     gap = None if contact_gap is None else contact_gap * float(frame.radii.min())
     steps, counts = _count_contacts(files, frame, gap, walls)
-    failure: PictureError | None = None
-    if picture is not None:
-        contacts = counts[-1].particles[frame.particles.index]
-        try:
-            draw_frame(picture, frame, frame.box if walls is None else walls, contacts)
-        except PictureError as error:
-            failure, picture = error, None
+    failure = None if picture is None else _draw(picture, frame, walls, counts[-1])
     packing = measure_packing(frame, counts, box, points=points, seed=seed, walls=walls)
     if packing.coordination is None:
         raise AnalysisError(f"{contact_dump}: at least one frame of contacts is needed")
@@ -144,9 +138,21 @@ def look_at(
         contact_steps=(steps[0], steps[-1]),
         walls_known=gap is None or walls is not None,
         wall_contacts_in_all=float(np.mean([count.walls.sum() for count in counts])),
-        picture=picture,
+        picture=picture if failure is None else None,
         failure=failure,
     )
+
+
+def _draw(
+    path: Path, frame: ParticleFrame, walls: FloatArray | None, contacts: ContactCounts
+) -> PictureError | None:
+    """Draw the packing, coloured by contacts; return why that is not possible, None if it is."""
+    container = frame.box if walls is None else walls
+    try:
+        draw_frame(path, frame, container, contacts.particles[frame.particles.index])
+    except PictureError as error:
+        return error
+    return None
 
 
 def _files(particles: ParticleDump, contacts: Path | None) -> RunFiles:

@@ -13,8 +13,8 @@ def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None
 
     Parameters
     ----------
-    files : of studies
-    out : the page
+    files : HDF5 files of studies
+    out : HTML file to write
     figures : folder for the figures and their numbers; None writes none
     """
     # Drawing takes a while to import, for which the other subcommands need not wait.

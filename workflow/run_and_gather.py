@@ -24,10 +24,10 @@ def run_and_gather(
 
     Parameters
     ----------
-    study : whose results are gathered
-    cases : those of the study that are run
-    folder : where studies run
-    options : how the cases are run
+    study : study whose results are gathered
+    cases : cases of the study that are run
+    folder : folder in which studies run
+    options : options with which the cases are run
     in_job : whether the ranks of an MPI job, each of which calls this, run them
     """
     first = True

@@ -1,4 +1,4 @@
-"""What is shipped with the program, and where the results of the shipped studies are looked for.
+"""The decks and studies that are shipped, and the places where their results are looked for.
 
 The package holds the decks and the studies. Results are data of the repository, in its folder
 `results`: one folder a study, one HDF5 file a case.

@@ -55,7 +55,7 @@ def running_options(options: argparse.Namespace, *, in_job: bool = False) -> Opt
 
     Parameters
     ----------
-    options : with those that `add_running` adds
+    options : options of a subcommand, with those that `add_running` adds
     in_job : whether an MPI job, which may have more cores than this machine, runs the cases
     """
     available = cores()

@@ -172,7 +172,7 @@ class Study:
     title : title in words
     text : text of the whole file
     cases : cases, no two of them the same
-    outputs : what is measured
+    outputs : measurements that are made of each case
     """
 
     name: str

@@ -112,7 +112,7 @@ class Outputs(_Table):
 
 
 class StudyFile(_Table):
-    """All of a study file; parameters and rows are checked against the decks later."""
+    """The whole of a study file; parameters and rows are checked against the decks later."""
 
     title: str
     deck: str | list[str]

@@ -1,4 +1,4 @@
-"""Whether the outputs that a study asks for can be measured of its cases."""
+"""A check that the outputs that a study asks for can be measured of its cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""On which lines of a TOML file its keys stand; tomllib does not tell."""
+"""The lines of a TOML file on which its keys stand, which tomllib does not tell."""
 
 from __future__ import annotations
 

@@ -21,9 +21,9 @@ def values_of(
 
     Parameters
     ----------
-    key : of the study file, for errors
+    key : key in the study file, for errors
     name : name of the parameter
-    value : what stands in the study file
+    value : value in the study file
     decks : decks of the case, which say what is allowed
     folder : folder of the study file
     mistakes : list to which one line for each mistake is added

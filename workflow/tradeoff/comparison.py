@@ -77,7 +77,7 @@ class Row:
 
     @property
     def all_at_rest(self) -> bool:
-        """Whether the configuration came to rest from all starts."""
+        """True if the configuration came to rest from all starts."""
         return len(self.values("plateau_seconds")) == len(self.outcomes)
 
     def median(self, name: str) -> float:
