@@ -32,6 +32,7 @@ from .export import (
 from .fabric import fabric_tensor
 from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
 from .geometry import particles_inside
+from .measurement import PackingMeasurement, measure_packing
 from .necks import (
     dimer_volume,
     neck_volume,
@@ -46,6 +47,7 @@ from .packing import (
     ExactPackingFraction,
     MeasuredPackingFraction,
     PackingFraction,
+    best_packing_fraction,
     exact_packing_fraction,
     measure_packing_fraction,
     packing_fraction,
@@ -89,6 +91,7 @@ __all__ = [
     "NetworkDifference",
     "Orientation",
     "PackingFraction",
+    "PackingMeasurement",
     "PairOverlap",
     "ParticleDump",
     "ParticleFrame",
@@ -106,6 +109,7 @@ __all__ = [
     "WallProfile",
     "at_steps",
     "backbone",
+    "best_packing_fraction",
     "bond_order",
     "check_contacts",
     "contact_counts",
@@ -126,6 +130,7 @@ __all__ = [
     "largest_pair_overlap",
     "largest_wall_overlap",
     "measure_evolution",
+    "measure_packing",
     "measure_packing_fraction",
     "monte_carlo",
     "mueller_packing_fraction",

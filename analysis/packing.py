@@ -89,6 +89,25 @@ def measure_packing_fraction(
     return MeasuredPackingFraction(exact.value, exact, drawn)
 
 
+def best_packing_fraction(
+    positions: ArrayLike,
+    radii: ArrayLike,
+    box: ArrayLike,
+    particles: Particles,
+    *,
+    points: int = 1_000_000,
+    seed: int = 0,
+) -> float:
+    """Return the packing fraction in a box: exact where that is possible, else by random points.
+
+    It is the value of `measure_packing_fraction`, without random points where these do not matter.
+    Parameters as for that.
+    """
+    if particles.exactly_measurable:
+        return exact_packing_fraction(positions, radii, box, particles).value
+    return packing_fraction(positions, radii, box, points=points, seed=seed).value
+
+
 def packing_fraction(
     positions: ArrayLike,
     radii: ArrayLike,

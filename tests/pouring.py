@@ -15,16 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import (
-    ContactCounts,
     CoordinationNumber,
     MeasuredPackingFraction,
     Orientation,
     contact_counts,
-    coordination_number,
-    dimer_orientation,
     iterate_contact_frames,
-    measure_packing_fraction,
-    particles_inside,
+    measure_packing,
     read_particle_frame,
 )
 
@@ -90,19 +86,14 @@ class Packing:
 def measure(folder: Path, contact_dump: str = "contacts.lammpsdump") -> Packing:
     """Packing fraction, contacts, neighbours and orientation in the paper's box."""
     frame = read_particle_frame(folder / "particles.lammpsdump")
-    particles = frame.particles
-    chosen = particles_inside(particles.centres(frame.positions), BULK)
-    counts: list[ContactCounts] = [
-        contact_counts(contacts.ids, frame.ids, particles)
+    counts = [
+        contact_counts(contacts.ids, frame.ids, frame.particles)
         for contacts in iterate_contact_frames(folder / contact_dump)
     ]
-    dimers = particles.composite and set(particles.sizes.tolist()) == {2}
-    return Packing(
-        measure_packing_fraction(frame.positions, frame.radii, BULK, particles),
-        coordination_number((frame_counts.particles for frame_counts in counts), chosen),
-        coordination_number((frame_counts.neighbours for frame_counts in counts), chosen),
-        dimer_orientation(frame.positions, particles, BULK) if dimers else None,
-    )
+    found = measure_packing(frame, counts, BULK)
+    assert found.coordination is not None
+    assert found.neighbours is not None
+    return Packing(found.packing_fraction, found.coordination, found.neighbours, found.orientation)
 
 
 @dataclass(frozen=True)

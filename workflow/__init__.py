@@ -1,1 +1,1 @@
-"""From a study's description to its report, and the command line `inelastic`."""
+"""The workflow leads from a study's description to its report; its command line is `inelastic`."""

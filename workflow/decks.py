@@ -14,28 +14,26 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.resources import files
 from pathlib import Path
 
 from .errors import WorkflowError
 from .files import is_file
+from .shipped import DECKS, deck_text
 
 Value = int | float | str
 
-# Lets a start fall until it is at rest; measured in a way of its own.
-SETTLING = "settling"
-SHIPPED = ("spheres", "dimers", "clusters", "response", SETTLING)
-# Set by the workflow itself: where a deck writes, and the packing that the deck before it has left.
+# The workflow itself sets these variables: the folder to which a deck writes, and the packing that
+# the deck before it has left.
 OUT, PACKING = "out", "packing"
-# Of a deck without a table, these parameters may name a file.
+# These parameters may name a file in a deck without a table.
 FILES = ("start", "shape")
 
 _VARIABLE = re.compile(r"^variable\s+(\w+)\s+index\s+(\S+)", re.MULTILINE)
 _TABLE = re.compile(r'^[ \t]*parameters[ \t]+"""(.*?)"""', re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-# What an integer of LAMMPS holds.
+# An integer of LAMMPS is in this range.
 _INTEGERS = (-(2**31), 2**31 - 1)
-# Of a number that LAMMPS can still calculate with.
+# LAMMPS can still calculate with numbers up to this one.
 _LARGEST = 1e300
 
 
@@ -45,7 +43,7 @@ class Bound:
 
     Attributes
     ----------
-    text : as it is written in the table
+    text : the number as it is written in the table
     included : whether the value itself is allowed
     """
 
@@ -60,13 +58,13 @@ class Bound:
 
 @dataclass(frozen=True)
 class Rule:
-    """What a parameter may be.
+    """A rule that says which values a parameter may have.
 
     Attributes
     ----------
     kind : integer, number, words or folder
-    low, high : the range of a number; None: no bound
-    words : those that are allowed
+    low, high : ends of the range of a number; None for no bound
+    words : words that are allowed
     file : whether the name of a file that is there is allowed, too
     """
 
@@ -78,7 +76,7 @@ class Rule:
 
     @property
     def allowed(self) -> str:
-        """What is allowed, in words, for error lines: those of the command `parameters`."""
+        """The allowed values in words, for error lines; the command `parameters` has the same."""
         if self.kind == "folder":
             return "a folder for output"
         if self.kind == "words":
@@ -100,7 +98,7 @@ class Rule:
         return text
 
     def accepts(self, value: Value) -> bool:
-        """Say whether a value is allowed; of a file only the words that it may be instead."""
+        """Say whether a value is allowed; the name of a file never is, but the words beside it."""
         if self.kind == "folder":
             return isinstance(value, str) and value != ""
         if self.kind == "words":
@@ -108,7 +106,7 @@ class Rule:
         kinds = int if self.kind == "integer" else int | float
         if isinstance(value, bool) or not isinstance(value, kinds):
             return False
-        # A whole number may have more digits than float() takes.
+        # The comparison comes first, as a whole number may have more digits than float() takes.
         if not abs(value) < _LARGEST:
             return False
         if self.low and not (
@@ -159,8 +157,8 @@ class Deck:
 
     Attributes
     ----------
-    name : of the file, without `.in`
-    text : the whole file
+    name : name of the file, without `.in`
+    text : text of the whole file
     shipped : whether it is one of ours
     """
 
@@ -170,7 +168,7 @@ class Deck:
 
     @cached_property
     def _table(self) -> Mapping[str, tuple[Value, Rule]]:
-        """Default and rule of every parameter in the deck's table; empty if it has none.
+        """The default and the rule of every parameter in the deck's table; empty if it has none.
 
         Raises WorkflowError that quotes the line that cannot be read.
         """
@@ -192,7 +190,7 @@ class Deck:
 
     @property
     def rules(self) -> Mapping[str, Rule]:
-        """What the parameters may be; empty for a deck without a table."""
+        """The rules of the parameters; empty for a deck without a table."""
         return {name: rule for name, (_, rule) in self._table.items()}
 
     @cached_property
@@ -204,7 +202,7 @@ class Deck:
 
     @property
     def parameters(self) -> Mapping[str, Value]:
-        """Those of the variables that are a study's to choose."""
+        """The variables that are a study's to choose, with their defaults."""
         chosen = {OUT, PACKING}
         return {name: value for name, value in self.variables.items() if name not in chosen}
 
@@ -216,7 +214,7 @@ class Deck:
         return hashlib.sha256(what.encode()).hexdigest()[:16]
 
     def names_file(self, name: str, value: Value) -> bool:
-        """Say whether a parameter's value is the name of a file, not one of the words instead."""
+        """Say whether a parameter's value names a file, and is none of the rule's words."""
         if name not in self.parameters:
             return False
         rule = self.rules.get(name)
@@ -247,17 +245,16 @@ def find_deck(name: str, folder: Path) -> Deck:
 
     Raises WorkflowError if there is none, or if it cannot be read.
     """
-    if name in SHIPPED:
-        text = (files("lammps_inelastic.inputs") / f"{name}.in").read_text()
-        return Deck(name, text, shipped=True)
+    if name in DECKS:
+        return Deck(name, deck_text(name), shipped=True)
     path = folder / name
     if not is_file(path):
         raise WorkflowError(
-            f"no deck {name!r}: it must be {', '.join(SHIPPED)} or a file as seen from {folder}"
+            f"no deck {name!r}: it must be {', '.join(DECKS)} or a file as seen from {folder}"
         )
     try:
         deck = Deck(path.stem, path.read_text(encoding="utf-8"), shipped=False)
-        # Its table is read now, while the file's name is known.
+        # The table is read now, while the file's name is known.
         _ = deck.variables
         return deck
     except UnicodeDecodeError as error:

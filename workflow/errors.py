@@ -1,16 +1,19 @@
-"""What can go wrong: the text of each error is one line, which the command line prints as it is."""
+"""The errors that are raised on purpose: the command line prints the one line of each as it is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+# This is the exit status of a command that the user has interrupted.
+INTERRUPTED = 130
+
 
 class WorkflowError(ValueError):
-    """Base of every error that the workflow raises on purpose."""
+    """The base of every error that the workflow raises on purpose."""
 
 
 class StudyError(WorkflowError):
-    """A study file has mistakes; `mistakes` has one line for each."""
+    """The mistakes of a study file; `mistakes` has one line for each."""
 
     def __init__(self, mistakes: Sequence[str]) -> None:
         """Keep the lines, at least one."""

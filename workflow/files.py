@@ -14,7 +14,7 @@ from .errors import WorkflowError
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Give a name to write to, in the folder of a file, and the file's name to it in the end.
+    """Give a temporary name to write to; what was written gets the file's own name in the end.
 
     Raises WorkflowError, with the name of the file, where the disk is full or may not be written.
     """
@@ -34,10 +34,13 @@ def whole(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Say which file or folder could not be written; the system's error often does not."""
+    """Raise WorkflowError with the file or folder that could not be written.
+
+    The system's own error often does not name it.
+    """
     try:
         yield
-    # Where a folder should be made.
+    # This one comes where a folder should be made.
     except FileExistsError as error:
         if Path(error.filename).is_dir():
             raise
@@ -66,7 +69,7 @@ def read_regular(path: Path, most: int) -> bytes:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a regular file; no name is too long or too odd to ask."""
+    """Say whether there is a regular file; no name is too long or too odd to ask."""
     try:
         return path.is_file()
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What the record of a finished run says of its files, and whether they are still the same."""
+"""The record of a finished run, and whether its files are still those that the run has left."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from lammps_inelastic.analysis import RunFiles, RunFilesError, RunLog, at_steps
 from lammps_inelastic.analysis.dump_text import open_dump
 from lammps_inelastic.analysis.run_files import AGAIN
 
-from .decks import SETTLING, SHIPPED
+from .decks import find_deck
+from .shipped import DECKS, SETTLING
 
 FINISHED = "finished.json"
 PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
 LOG = "log.lammps"
-# What is read from a finished run.
+# These files of a finished run are read.
 FILES = (LOG, PARTICLES, CONTACTS)
-# Dumps keep 12 digits and more.
+# Numbers that differ by less, relatively, are the same: dumps keep 12 digits and more.
 SAME = 1e-9
 
 
@@ -30,15 +31,15 @@ def checksums(folder: Path, stages: Iterable[Mapping[str, Any]]) -> dict[str, st
 
     Parameters
     ----------
-    folder : of the run
-    stages : of its record
+    folder : folder of the run
+    stages : stages of its record
     """
     names = [str(Path(stage["folder"]) / name) for stage in stages for name in FILES]
     return {name: checksum(folder / name) for name in names if (folder / name).is_file()}
 
 
 def checksum(path: Path) -> str:
-    """Return a checksum of what a file says, also of one that gzip has compressed since."""
+    """Return a checksum of a file's content, which gzip may have compressed since."""
     found = hashlib.sha256()
     with open_dump(path) as lines:
         for line in lines:
@@ -57,14 +58,14 @@ def check_stage(
 
     Parameters
     ----------
-    folder : of the run
-    record : of the run, all of it
+    folder : folder of the run
+    record : record of the run, all of it
     stage : one of its stages
-    files, log : of the stage
+    files, log : files and log of the stage
 
     Raises RunFilesError with one line.
     """
-    if stage["deck"] in SHIPPED:
+    if stage["deck"] in DECKS:
         _check_log(files, log)
         _check_variables(stage, files, log)
     frame = files.particles[-1]
@@ -75,7 +76,7 @@ def check_stage(
 def unchanged(folder: Path) -> None:
     """See that the files in the folder of a study's run, or of one of its stages, are unchanged.
 
-    Raises RunFilesError with one line. Says nothing of a folder that has no record.
+    A folder without a record cannot be checked. Raises RunFilesError with one line.
     """
     for where in (folder, folder.absolute().parent):
         try:
@@ -89,12 +90,12 @@ def unchanged(folder: Path) -> None:
 
 
 def other_run(folder: Path, record: Mapping[str, Any]) -> str:
-    """Say that a result is of another run than the one in a case's folder; nothing if it is not.
+    """Return how a result's run differs from the one in a case's folder; empty if they are one.
 
     Parameters
     ----------
-    folder : of the case
-    record : of the result
+    folder : folder of the case
+    record : record of the result
     """
     try:
         there = json.loads((folder / FINISHED).read_text())
@@ -108,7 +109,7 @@ def other_run(folder: Path, record: Mapping[str, Any]) -> str:
 def check_unchanged(folder: Path, record: Mapping[str, Any], stage: Mapping[str, Any]) -> None:
     """See that the files of a stage are those that the run has left.
 
-    Raises RunFilesError with one line. A record without checksums says nothing of the files.
+    Files of which the record has no checksum are not compared. Raises RunFilesError with one line.
     """
     for name in FILES:
         path = str(Path(stage["folder"]) / name)
@@ -148,8 +149,10 @@ def _check_variables(stage: Mapping[str, Any], files: RunFiles, log: RunLog) -> 
     diameter = 2 * float(frame.radii.max())
     if not np.isclose(diameter, variables["diameter"], rtol=SAME, atol=0):
         said.append((files.particles.path, "diameter", variables["diameter"], diameter))
-    # A data file brings its own number.
-    if variables.get("start", "random") in ("random", "regular") and "particles" in variables:
+    # A data file has its own number of particles.
+    deck = find_deck(stage["deck"], Path())
+    from_file = "start" in variables and deck.names_file("start", variables["start"])
+    if "particles" in variables and not from_file:
         number = len(frame.particles)
         if number != variables["particles"]:
             said.append((files.particles.path, "particles", variables["particles"], number))

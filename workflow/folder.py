@@ -1,4 +1,4 @@
-"""The folder of one or more studies: who is done, who may run, and what can be trusted.
+"""The folder of one or more studies: which cases are done, and which may run.
 
     cases/CASE/            a finished run: it gets this name only when all of it is there
     cases/CASE.part/       a run that is under way, or that was cut off
@@ -6,7 +6,7 @@
     cases/CASE.damaged/    a run whose finished.json could not be read
     cases/.locks/CASE      locked while somebody runs or measures the case
     results/STUDY/CASE.h5  what was measured of it; CASE.h5.damaged where that could not be read
-    STUDY.h5, STUDY.html   made of these
+    STUDY.h5               all results of a study
 
 Everything gets its name by a rename when it is complete: whatever is cut off, at any moment, leaves
 nothing behind that looks finished. A case's folder name is unique to its variables, and studies in
@@ -37,24 +37,25 @@ State = Literal["measured", "finished", "running", "cut off", "failed", "missing
 
 UNKNOWN = "unknown"
 FAILED = "failed.json"
-# In the environment of every process that runs a case: a user's shell in its folder is left alone.
+# Every process that runs a case has this variable in its environment: other processes in the
+# folder, such as a user's shell, are left alone.
 MARK = "INELASTIC_CASE"
-# How long a killed process may take to go.
+# A killed process may take so long to go [seconds].
 PATIENCE = 10.0
-# Of a JSON file, which holds the texts of the decks [bytes].
+# A JSON file holds the texts of the decks, and is not larger than this [bytes].
 LARGEST_RECORD = 100_000_000
 _PLAIN = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-# How long after one attempt at a lock comes the next [seconds].
-LOOK = 0.05
+# So long after one attempt at a lock comes the next [seconds].
+NEXT_ATTEMPT = 0.05
 
 
 @dataclass(frozen=True)
 class Folder:
-    """Where studies run.
+    """The folder in which studies run.
 
     Attributes
     ----------
-    root : the folder
+    root : path of the folder
     """
 
     root: Path
@@ -92,7 +93,7 @@ class Folder:
         return "cut off" if self.part(case).is_dir() else "missing"
 
     def is_measured(self, study: Study, case: Case) -> bool:
-        """Whether there is a result, of what the study asks for now."""
+        """Say whether there is a result, of what the study asks for now."""
         path = self.result(study, case)
         try:
             outputs, record = origin_of(path)
@@ -101,12 +102,12 @@ class Folder:
         return outputs == study.outputs.measured and case.is_of(record)
 
     def is_finished(self, case: Case) -> bool:
-        """Whether there is a whole run of the case that can still be measured."""
+        """Say whether there is a whole run of the case that can still be measured."""
         record = _json_of(self.case(case) / FINISHED)
         return case.is_of(record) and is_file(self.case(case) / PARTICLES)
 
     def damage(self, study: Study, case: Case) -> str | None:
-        """Say what is wrong with the result of a case; None if it can be read, or there is none."""
+        """Return what is wrong with the result of a case; None if it can be read or is missing."""
         path = self.result(study, case)
         if not os.path.lexists(path):
             return None
@@ -119,7 +120,7 @@ class Folder:
     def set_aside(self, study: Study, case: Case) -> list[str]:
         """Rename a result and a finished run that cannot be read; return a line about each.
 
-        Nothing of them is lost, and nothing of them is in the way. Call it with the case's lock.
+        Nothing of them is lost, and nothing of them is in the way. The case must be locked.
         """
         lines = []
         if damage := self.damage(study, case):
@@ -130,7 +131,7 @@ class Folder:
         return lines
 
     def obstacles(self, study: Study, cases: Iterable[Case]) -> list[str]:
-        """Say what stands where a study's files and folders should be, one line for each."""
+        """Return one line for each thing that stands where the study's files should be."""
         inner = self.root / "cases", self.root / "cases" / ".locks"
         results = self.root / "results", self.result_folder(study)
         lines = [
@@ -166,7 +167,7 @@ class Folder:
 
     @contextmanager
     def lock(self, case: Case) -> Iterator[bool]:
-        """Take a case for oneself; False if somebody else has it.
+        """Lock a case, and give whether that was possible: somebody else may hold the lock.
 
         The lock goes with the process that holds it, however that ends.
         """
@@ -183,7 +184,7 @@ class Folder:
 
     def _is_locked(self, case: Case) -> bool:
         try:
-            # It may belong to somebody else.
+            # The file may belong to somebody else, so it is opened for reading only.
             handle = os.open(self._lock(case), os.O_RDONLY | _PLAIN)
         except OSError:
             return False
@@ -199,7 +200,7 @@ class Folder:
     def begin(self, case: Case) -> Path:
         """Make the folder for a new run, and put the decks and their input files there.
 
-        What is left of a run that was cut off goes, with any process that still works in it.
+        The rest of a run that was cut off is deleted, and any process in it is killed.
         """
         part = self.part(case)
         _stop_processes_in(part)
@@ -230,9 +231,9 @@ class Folder:
 
         Parameters
         ----------
-        case : whose run it was
-        reason : in words
-        job : the MPI job that it was a part of, in which it is not tried again
+        case : case whose run it was
+        reason : reason of the failure, in words
+        job : MPI job that the run was a part of, in which it is not tried again
         """
         failure = self.failure(case)
         shutil.rmtree(failure, ignore_errors=True)
@@ -246,7 +247,7 @@ class Folder:
         return self._of_failure(case, "reason")
 
     def failed_in(self, case: Case, job: str) -> bool:
-        """Whether the last run failed as a part of this MPI job."""
+        """Say whether the last run failed as a part of this MPI job."""
         return self._of_failure(case, "job") == job
 
     def _of_failure(self, case: Case, what: str) -> str:
@@ -259,8 +260,8 @@ def _locked(file: IO[str]) -> bool:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            # It may be `status` only, which looks for a moment.
-            time.sleep(0 if last else LOOK)
+            # The lock may be held for a moment only, by `inelastic status`.
+            time.sleep(0 if last else NEXT_ATTEMPT)
         else:
             return True
     return False
@@ -288,7 +289,7 @@ def _renamed(path: Path) -> Path:
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a file that is either whole or not there."""
+    """Write a JSON file, which is either whole or not there."""
     with whole(path) as temporary:
         temporary.write_text(json.dumps(content, indent=2))
 
@@ -305,7 +306,7 @@ def last_lines(path: Path, count: int = 8) -> list[str]:
 
 
 def _stop_processes_in(folder: Path) -> None:
-    """Kill what still works in a folder whose owner is gone, such as an lmp left alone."""
+    """Kill the processes that still work in a folder whose owner is gone, such as an lmp."""
     deadline = time.monotonic() + PATIENCE
     while pids := list(_processes_in(folder)):
         for pid in pids:

@@ -1,4 +1,4 @@
-"""Running cases as processes on one machine: several at a time, each killed with its children.
+"""Cases run as processes on one machine: several at a time, each killed with its children.
 
 A case is one process after the other: LAMMPS for each stage, then the measurement. A case that
 fails, is killed or takes too long is put aside with its log, and the others go on.
@@ -23,29 +23,29 @@ from .errors import StudyError
 from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record
-from .stages import steps_of
-from .study import Case, Study
+from .study import Case, Study, steps_of
 
 POLL = 0.05
-# How often the logs are looked at for the step [seconds].
-LOOK_EVERY = 1.0
-# What the measuring process prints; nothing if all goes well.
+# The step of a run is read from its output at most so often [seconds].
+READ_EVERY = 1.0
+# The measuring process prints into this file; nothing if all goes well.
 MEASURED = "measure.out"
-# Our own decks write this last.
+# Our own decks write this file last.
 LAST_FILE = "packing.restart"
-# Of an MPI job around us: an lmp that sees them takes itself for one of its ranks.
+# An MPI job around us sets variables of these names: an lmp that sees them takes itself for one of
+# its ranks.
 _OF_MPI = re.compile(r"^(PMI|PMIX|HYDI|HYDRA|MPI|MPIR)_")
 
 
 @dataclass(frozen=True)
 class Options:
-    """How cases are run.
+    """The options with which cases are run.
 
     Attributes
     ----------
-    at_once : cases at a time
-    ranks : MPI ranks of each
-    timeout : for all of a case's stages and measuring together, seconds; None for no limit
+    at_once : number of cases at a time
+    ranks : number of MPI ranks of each
+    timeout : limit for all of a case's stages and measuring together, seconds; None for none
     """
 
     at_once: int = 1
@@ -55,14 +55,14 @@ class Options:
 
 @dataclass
 class Outcome:
-    """What became of the cases, by their names.
+    """The outcome of running cases, by their names.
 
     Attributes
     ----------
-    measured : run or measured now
-    kept : measured before
-    failed : with the reason
-    elsewhere : somebody else runs them at the moment
+    measured : cases that were measured now
+    kept : cases that had been measured before
+    failed : cases that have failed, with the reason
+    elsewhere : cases that somebody else runs at the moment
     """
 
     measured: list[str] = field(default_factory=list)
@@ -88,7 +88,7 @@ def run_study(
         try:
             while waiting or jobs:
                 while waiting and len(jobs) < options.at_once and not interrupted:
-                    # Among the jobs before it starts anything that would have to be stopped.
+                    # A job is in the list before it starts anything that must be stopped.
                     jobs.append(_Job(study, waiting.pop(0), folder, options))
                     if not jobs[-1].begin(outcome, display):
                         jobs.pop()
@@ -112,11 +112,11 @@ class _Job:
         self._measuring = False
         self._process: subprocess.Popen[bytes] | None = None
         self._started = time.time()
-        self._looked = 0.0
+        self._last_read = 0.0
         self._held = ExitStack()
 
     def begin(self, outcome: Outcome, display: Display) -> bool:
-        """Start the case unless there is nothing to do, or somebody else does it."""
+        """Start the case; return False if there is nothing to do, or somebody else does it."""
         name = self._case.name
         if not self._held.enter_context(self._folder.lock(self._case)):
             outcome.elsewhere.append(name)
@@ -139,7 +139,7 @@ class _Job:
         return False
 
     def goes_on(self, outcome: Outcome, display: Display) -> bool:
-        """Look at the process; start the next one when it has ended; False after the last."""
+        """Start the next process when one has ended; return False after the last."""
         assert self._process is not None
         name, code = self._case.name, self._process.poll()
         if code is None:
@@ -151,9 +151,9 @@ class _Job:
                     return self._fail(reason, outcome, display)
                 note_timeout(self._folder.case(self._case), limit)
                 return self._leave(measured_too_long(limit), [], outcome, display)
-            self._look(display)
+            self._show_step(display)
             return True
-        # What it may have left behind, such as an lmp whose launcher was killed.
+        # It may have left processes behind, such as an lmp whose launcher was killed.
         kill_group(self._process)
         if self._measuring:
             if code == 0 and self._folder.is_measured(self._study, self._case):
@@ -185,6 +185,7 @@ class _Job:
         return True
 
     def stop(self) -> None:
+        """Kill what runs, and give the case free."""
         if self._process is not None:
             kill_group(self._process)
         self._held.close()
@@ -211,7 +212,7 @@ class _Job:
                 stdin=subprocess.DEVNULL,
                 stdout=file,
                 stderr=subprocess.STDOUT,
-                # A group of its own: a signal to it reaches the lmp behind the launcher too.
+                # A signal to a group of its own reaches the lmp behind the launcher too.
                 start_new_session=True,
             )
 
@@ -224,20 +225,21 @@ class _Job:
         return False
 
     def _leave(self, reason: str, lines: Sequence[str], outcome: Outcome, display: Display) -> bool:
-        """Give up measuring; the run stays."""
+        """Give up measuring; the run is kept."""
         name = self._case.name
         outcome.failed[name] = reason
         display.ended(name, f"CANNOT BE MEASURED: {name}", lines)
         self._held.close()
         return False
 
-    def _look(self, display: Display) -> None:
-        if self._measuring or time.monotonic() - self._looked < LOOK_EVERY:
+    def _show_step(self, display: Display) -> None:
+        """Show how far LAMMPS has come, if that was not shown a moment ago."""
+        if self._measuring or time.monotonic() - self._last_read < READ_EVERY:
             return
-        self._looked = time.monotonic()
+        self._last_read = time.monotonic()
         stage = self._case.stages[self._stage]
         steps = steps_of(stage)
-        # Not the log: a deck that opens another one has it buffered.
+        # The log would not do: a deck that opens another one has it buffered.
         output = self._folder.part(self._case) / "lmp.out"
         if steps and (step := step_of(output)) is not None:
             display.stepped(self._case.name, min(step, steps), steps)
@@ -272,7 +274,7 @@ def measured_too_long(limit: float) -> str:
 def measure_finished(
     study: Study, case: Case, folder: Folder, limit: float | None = None
 ) -> str | None:
-    """Measure a finished run, and wait for it; say what went wrong, if anything did.
+    """Measure a finished run, and wait for it; return what went wrong, None if nothing did.
 
     Raises TimeoutExpired of subprocess if it takes longer than the limit [seconds].
     """
@@ -309,7 +311,7 @@ def missing_file(case: Case, stage: int, part: Path) -> str | None:
 
 
 def exit_reason(code: int) -> str:
-    """Say how a process ended that did not end well."""
+    """Return in words how a process ended that did not end well."""
     # The launcher of LAMMPS hands on a signal as an exit status of 256 less its number.
     number = -code if code < 0 else 256 - code if code > 192 else 0
     if number:
@@ -327,6 +329,11 @@ def step_of(output: Path) -> int | None:
         if word.isdigit() and rest.strip()[:1] in "-0123456789":
             return int(word)
     return None
+
+
+def cores() -> int:
+    """Return how many cores there are for this process."""
+    return len(os.sched_getaffinity(0))
 
 
 def environment() -> dict[str, str]:
@@ -348,8 +355,8 @@ def _interrupts() -> Iterator[list[int]]:
     """Collect interrupts, SIGTERM and SIGHUP in a list, in the place of what they do else.
 
     Nothing is cut short by them: an exception at any place could leave a process behind that has
-    just been started, and a second one those that were still to be stopped. What is ignored, as
-    SIGHUP under nohup, stays so.
+    just been started, and a second one those that were still to be stopped. A signal that is
+    ignored, as SIGHUP under nohup, stays so.
     """
     seen: list[int] = []
 

@@ -1,7 +1,7 @@
 """The entry point of the command line `inelastic`, which may be interrupted from its first moment.
 
-What the commands need takes a second to import, and extension modules turn an interrupt at that
-time into errors of their own. Nothing is running yet that would have to be stopped.
+The import of the subcommands takes a second, and extension modules turn an interrupt at that time
+into errors of their own. Nothing is running yet that would have to be stopped.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 
-INTERRUPTED = 130
+from .errors import INTERRUPTED
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run `inelastic`; return its exit status, as `cli.run` says."""
+    """Run `inelastic`; return its exit status, as `command_line.run` says."""
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:
         signal.signal(signal.SIGINT, _leave)
     try:
-        from .cli import run
+        from .cli.command_line import run
     finally:
         signal.signal(signal.SIGINT, before)
     return run(arguments)

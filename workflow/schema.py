@@ -1,4 +1,4 @@
-"""What is in a result: every dataset with its shape, unit and meaning.
+"""The layout of a result: every dataset with its shape, unit and meaning.
 
 A study's file holds one group a case, /STUDY/cases/CASE, laid out as here; README.md beside this
 file shows the same.
@@ -18,9 +18,9 @@ class Entry:
 
     Attributes
     ----------
-    shape : in words; empty for a single number
-    unit : in LAMMPS's lj units, 1 for a pure number
-    meaning : one line
+    shape : shape in words; empty for a single number
+    unit : unit in LAMMPS's lj units; 1 for a pure number
+    meaning : meaning in one line
     """
 
     shape: str

@@ -1,8 +1,8 @@
-"""What is measured of a start that settles (inputs/settling.in): when it is at rest, and how well.
+"""The measurements of a start that settles (inputs/settling.in): when it is at rest, and how well.
 
-The same numbers for hard and for soft contacts, from the same files as far as both write them: time
-and wall time from the log, overlaps from the positions alone. Soft contacts have no contact dump;
-theirs are the overlaps, each with a force that is proportional to its depth.
+Hard and soft contacts have the same numbers, from the same files as far as both write them: time
+and wall time come from the log, overlaps from the positions alone. Soft contacts have no contact
+dump: their contacts are the overlaps, each with a force that is proportional to its depth.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from lammps_inelastic.analysis import (
     largest_wall_overlap,
 )
 
-from .decks import SETTLING
+from .shipped import SETTLING
 from .thermo import read_thermo
 
 FloatArray = NDArray[np.float64]
 
-# At rest: over so much time the packing fraction has changed by less than this share, and the
-# centre of mass has stayed within so many diameters.
+# A start is at rest where over so much time the packing fraction has changed by less than this
+# share, and the centre of mass has stayed within so many diameters.
 WINDOW = 0.25
 STEADY, STANDING = 1e-3, 0.05
 
 
 def is_settling(stage: Mapping[str, Any]) -> bool:
-    """Whether a stage of a run's record is of the deck that lets a start settle."""
+    """Say whether a stage of a run's record is of the deck that lets a start settle."""
     return bool(stage["deck"] == SETTLING)
 
 
 def has_soft_contacts(stage: Mapping[str, Any]) -> bool:
-    """Whether a stage of a run's record has left no contact dump: its contacts are overlaps."""
+    """Say whether a stage of a run's record has no contact dump: its contacts are overlaps."""
     return is_settling(stage) and stage["variables"]["contacts"] == "soft"
 
 
@@ -53,9 +53,9 @@ def contact_frames(
 
     Parameters
     ----------
-    files : of the stage
-    stage : of the run's record
-    frame : the last one of the particle dump
+    files : files of the stage
+    stage : stage of the run's record
+    frame : last frame of the particle dump
     """
     if has_soft_contacts(stage):
         return [overlaps_as_contacts(frame)]
@@ -65,7 +65,7 @@ def contact_frames(
 def overlaps_as_contacts(frame: ParticleFrame) -> ContactFrame:
     """Return all overlaps of spheres with each other and with the box as contacts.
 
-    A contact's force is the depth of the overlap, that is in units of the stiffness.
+    A contact's force is the depth of the overlap, which is the force over the stiffness.
     """
     found = contacts_by_distance(
         frame.positions, frame.radii, 0.0, frame.particles, walls=frame.box
@@ -88,22 +88,22 @@ def first_at_rest(
     Two things hold there. Over the last 0.25 time units the packing fraction in the box has changed
     by less than 0.1 %. And the packing stands: all that time the centre of mass has stayed within
     5 % of a diameter. A steady packing fraction alone says little: a cloud that falls as a whole
-    keeps its own, and one that swings meets an earlier value again and again. Of a free fall 0.25
-    time units are 0.3 and more, however small the spheres; a packing that goes on being shaken, as
-    loose contacts may do, moves by more than this, too.
+    keeps its own, and one that swings meets an earlier value again and again. A free fall moves by
+    0.3 and more in 0.25 time units, however small the spheres; a packing that goes on being shaken,
+    as by loose contacts, moves by more than 5 % of a diameter, too.
 
     Parameters
     ----------
     times : (f,), ascending, time
     packing_fraction : (f,), read between two frames by linear interpolation
-    height : (f,), of the centre of mass, length; likewise
-    diameter : of a sphere, length
+    height : (f,), height of the centre of mass, length; likewise
+    diameter : diameter of a sphere, length
     """
     when = np.asarray(times, dtype=np.float64)
     share = np.asarray(packing_fraction, dtype=np.float64)
     up = np.asarray(height, dtype=np.float64)
     for index, before in enumerate(when - WINDOW):
-        # A hair of round-off: the frame at 0.25 has the first one before it. NaN is in no window.
+        # The frame at 0.25 has the first one before it, but for round-off. NaN is in no window.
         if not before >= when[0] - 1e-9:
             continue
         within = (when > before) & (when <= when[index])
@@ -122,15 +122,16 @@ def measure_settling(
     Parameters
     ----------
     files : dumps of the run
-    log : of the run
-    stage : of the run's record
-    seen : the evolution of the dump: `evolution/time`, `evolution/packing_fraction` and
+    log : log of the run
+    stage : stage of the run's record
+    seen : evolution of the dump: `evolution/time`, `evolution/packing_fraction` and
         `evolution/centre_height`, (f,) each
 
     Returns
     -------
-    The numbers by the names in the schema, without `numbers/`; NaN where the packing has not come
-    to rest. And the contact network of the last frame by the names in the schema.
+    numbers : by the names in the schema, without `numbers/`; NaN where the packing has not come to
+        rest
+    network : contact network of the last frame, by the names in the schema
     """
     dump = files.particles
     last = dump[-1]
@@ -143,7 +144,7 @@ def measure_settling(
         "plateau_time": math.nan if rest is None else float(times[rest]),
         "plateau_seconds": math.nan,
         "overlap_at_rest": math.nan if rest is None else float(overlaps[rest:].max()),
-        # The start's own overlaps are those of the run that made it.
+        # The overlaps in the first frame are of the run that made the start.
         "overlap_falling": float(overlaps[1:rest].max(initial=0.0)),
         "drift": _drift(times, height) / diameter,
         "settling_seconds": math.fsum(run.seconds or 0.0 for run in log.runs),

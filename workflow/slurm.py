@@ -11,7 +11,7 @@ from .errors import WorkflowError
 from .folder import Folder
 from .study import Study
 
-# As Slurm writes the limit of a job: minutes, with hours and seconds, with days.
+# Slurm writes the limit of a job like this: minutes, with hours and seconds, with days.
 _TIME = re.compile(
     r"\d+(:\d+){0,2}|\d+-\d+(:\d+){0,2}|infinite|unlimited", re.ASCII | re.IGNORECASE
 )
@@ -23,6 +23,14 @@ def job_script(study: Study, path: Path, folder: Folder, ranks: int, time: str) 
     A task runs its case as `inelastic run --case N` on one machine would; a case that somebody has
     run in the meantime is left alone. Raises WorkflowError if nothing is left to do, and for a time
     or a folder's name that Slurm would not read as it is meant.
+
+    Parameters
+    ----------
+    study : study whose cases are run
+    path : path of the study's file
+    folder : folder where the study runs
+    ranks : number of MPI ranks of a case
+    time : limit of a case, as Slurm writes it
     """
     if not _TIME.fullmatch(time):
         raise WorkflowError(
@@ -36,7 +44,7 @@ def job_script(study: Study, path: Path, folder: Folder, ranks: int, time: str) 
         raise WorkflowError(f"{study.name}: every case has a result")
     out = folder.root.resolve()
     for place in (str(out), str(path.resolve())):
-        # Lines for Slurm end at a line's end, and Slurm has quotes of its own.
+        # A line break would end a line for Slurm, and Slurm has quotes of its own.
         if not place.isprintable() or re.search(r"[\"'\\]", place):
             raise WorkflowError(
                 f"{place!r}: a path in a job script must be printable, without quotes and \\"
@@ -55,14 +63,14 @@ def job_script(study: Study, path: Path, folder: Folder, ranks: int, time: str) 
     return "\n".join(
         [
             "#!/bin/bash",
-            # Any other letter would have to be quoted as Slurm does it.
+            # Other letters would have to be quoted as Slurm does it.
             f"#SBATCH --job-name={re.sub(r'[^A-Za-z0-9_.+-]+', '-', study.name)}",
             f"#SBATCH --array={_ranges(left)}",
             f"#SBATCH --ntasks={ranks}",
             "#SBATCH --nodes=1",
             "#SBATCH --cpus-per-task=1",
             f"#SBATCH --time={time}",
-            # In a path Slurm puts the number of the job for %j, and so on.
+            # Slurm puts the number of the job in the place of %j in a path, and so on.
             f"#SBATCH --output={_quoted(str(out).replace('%', '%%') + '/slurm-%A_%a.out')}",
             f'exec {shlex.join(command)} --case "$SLURM_ARRAY_TASK_ID"',
         ]

@@ -3,7 +3,7 @@
     /                     title, schema version
     /STUDY                one group a study: its title and the text of its file
     /STUDY/summary        one dataset a parameter and a number, one row a case: a table
-    /STUDY/cases/CASE     as in schema.py; where the packing comes from in the attributes
+    /STUDY/cases/CASE     datasets as in schema.py; the attributes say how the packing was made
 
 Everything is written under another name and renamed when it is complete. After the end of the HDF5
 file, where its readers do not look, comes a line with its check sum: a damaged file is known before
@@ -39,15 +39,15 @@ CHUNK = 2**20
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was measured of a case.
+    """The measurements of a case.
 
     Attributes
     ----------
-    values : by the names in SCHEMA
+    values : arrays by the names in SCHEMA
     pictures : PNG files by their names
-    record : how the run was made: see `provenance.run_record`
+    record : how the run was made, from `provenance.run_record`
     outputs : what was asked for, as JSON
-    before : the same of the packing before the last stage; None where there is one stage
+    before : result of the packing before the last stage; None where there is one stage
     """
 
     values: Mapping[str, Array]
@@ -58,7 +58,7 @@ class Result:
 
     @property
     def case(self) -> str:
-        """Name of the case."""
+        """The name of the case."""
         return str(self.record["case"])
 
     @property
@@ -67,7 +67,7 @@ class Result:
         return {k: v for stage in self.record["stages"] for k, v in stage["variables"].items()}
 
     def number(self, name: str) -> float:
-        """One of the numbers; NaN where it was not measured."""
+        """Return one of the numbers; NaN where it was not measured."""
         value = self.values.get(f"numbers/{name}")
         return float("nan") if value is None else float(value)
 
@@ -82,7 +82,7 @@ def write_result(path: Path, result: Result) -> None:
 def read_result(path: Path) -> Result:
     """Read one case's file.
 
-    Raises WorkflowError if it is none, or damaged.
+    Raises WorkflowError if the file is no result, or damaged.
     """
     with _opened(path, "a result") as file:
         return _get(file)
@@ -103,8 +103,8 @@ class StoredStudy:
 
     Attributes
     ----------
-    name, title, text : of the study
-    results : those that there are
+    name, title, text : name, title and file of the study
+    results : results that there are
     """
 
     name: str
@@ -130,7 +130,7 @@ def write_studies(path: Path, studies: Sequence[StoredStudy]) -> None:
 def read_studies(path: Path) -> list[StoredStudy]:
     """Read a file that `write_studies` wrote.
 
-    Raises WorkflowError if it is none.
+    Raises WorkflowError if the file is none of these.
     """
     with _opened(path, "a file of studies") as file:
         return [
@@ -182,7 +182,7 @@ def _summarise(group: h5py.Group, results: Sequence[Result]) -> None:
     names = dict.fromkeys(name for result in results for name in result.variables)
     for name in names:
         column = [result.variables.get(name) for result in results]
-        # That of the names is there already.
+        # The column of the names of cases is there already.
         name = _free(group, name, "variable")
         if any(isinstance(value, str) for value in column):
             group.create_dataset(name, data=["" if v is None else str(v) for v in column])
@@ -193,7 +193,7 @@ def _summarise(group: h5py.Group, results: Sequence[Result]) -> None:
     for name, entry in SCHEMA.items():
         if not name.startswith("numbers/") or not any(name in r.values for r in results):
             continue
-        # A parameter such as `particles` is what was asked for, the number what there was.
+        # A parameter such as `particles` was asked for, and the number of the same name measured.
         short = name.removeprefix("numbers/")
         label = _free(group, short, "measured")
         dataset = group.create_dataset(label, data=[result.number(short) for result in results])
@@ -226,14 +226,14 @@ def _opened(path: Path, what: str) -> Iterator[h5py.File]:
     except OSError as error:
         reason = error.strerror or " ".join(str(error).split())
         raise WorkflowError(f"{path}: {reason[:1].lower()}{reason[1:]}") from None
-    # A file that some other program has sealed may lack anything.
+    # A file that another program has sealed may lack anything.
     except (KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
         raise WorkflowError(f"{path}: not {what}: {' '.join(str(error).split())}") from None
 
 
 def _check_seal(path: Path) -> None:
     """Raise WorkflowError if a file is not as it was written, and OSError if it cannot be read."""
-    # What is no file may keep one waiting.
+    # A pipe would keep the program waiting.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(handle, "rb") as file:
         status = os.fstat(handle)
@@ -259,7 +259,7 @@ def _whole(path: Path) -> Iterator[h5py.File]:
     HDF5 keeps it in memory: where a disk is full, the library prints a traceback for every object
     that is open, and crashes when the process ends.
     """
-    # The newer layout has smaller headers, of which there are many here.
+    # The newer layout has smaller headers, and there are many of them here.
     with h5py.File(
         path.name, "w", libver=("v110", "v110"), driver="core", backing_store=False
     ) as file:

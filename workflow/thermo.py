@@ -18,8 +18,8 @@ def read_thermo(log: RunLog, *names: str) -> dict[str, FloatArray]:
 
     Parameters
     ----------
-    log : of LAMMPS
-    names : of the columns, as the log's header has them
+    log : log of LAMMPS
+    names : names of the columns, as the log's header has them
     """
     wanted = ("Step", *names)
     lines: dict[int, tuple[float, ...]] = {}

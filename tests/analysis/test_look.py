@@ -14,10 +14,11 @@ from lammps_inelastic.analysis import (
     contact_counts,
     contacts_by_distance,
     exact_packing_fraction,
+    measure_packing,
     read_particle_frame,
 )
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.measure import _packing
+from lammps_inelastic.workflow.measure import SEED, _packing_fractions
 
 RADIUS, EXCESS = 0.1, 1e-4
 CELLS = 5
@@ -115,7 +116,8 @@ def test_packing_fraction_is_the_one_of_studies(dimers, capsys):
     exact = exact_packing_fraction(frame.positions, frame.radii, box, frame.particles)
     assert (shown["value"], shown["common_volume"]) == (exact.value, exact.overlap)
     # Studies draw their points with the same seed.
-    measured = _packing(frame, frame.particles, box, 1000)
+    packing = measure_packing(frame, (), box, points=1000, seed=SEED)
+    measured = _packing_fractions(packing, frame, box, 1000)
     assert shown["value"] == measured["packing_fraction"]
     assert shown["monte_carlo"]["value"] == measured["packing_fraction_monte_carlo"]
 
@@ -269,7 +271,7 @@ def test_colours_are_the_contacts_of_bodies(dimers, monkeypatch):
     def remember(path, positions, radii, container, contacts, *, contacts_per_colour):
         drawn["contacts"], drawn["contacts_per_colour"] = contacts.tolist(), contacts_per_colour
 
-    monkeypatch.setattr("lammps_inelastic.workflow.look_command.draw_packing", remember)
+    monkeypatch.setattr("lammps_inelastic.workflow.pictures.draw_packing", remember)
     assert main(["look", str(dimers), *MIDDLE]) == 0
     # Of the last frame, sphere by sphere in the order of the ids.
     assert drawn == {"contacts": [4, 7, 7, 4] * 2, "contacts_per_colour": 2}

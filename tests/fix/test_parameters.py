@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.decks import SHIPPED, Rule, as_value, find_deck, read_rule
+from lammps_inelastic.workflow.decks import Rule, as_value, find_deck, read_rule
+from lammps_inelastic.workflow.shipped import DECKS
 from lammps_run import OF_A_LAUNCHER, Runner, run_lmp
 
 SERVER = Path(__file__).with_name("table_server.py")
@@ -175,7 +176,7 @@ def right_values(rule: Rule) -> list[str]:
     return list(just_inside(rule))
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", DECKS)
 def test_every_bad_value_is_named_with_what_is_allowed(name: str, ask: Ask) -> None:
     """Every parameter of a deck with every kind of value that it must not have."""
     rules = find_deck(name, Path()).rules
@@ -193,7 +194,7 @@ def test_every_bad_value_is_named_with_what_is_allowed(name: str, ask: Ask) -> N
         assert not any(more), error
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", DECKS)
 def test_the_last_values_within_bounds_are_allowed(name: str, ask: Ask) -> None:
     rules = find_deck(name, Path()).rules
     cases = [(each, value) for each, rule in rules.items() for value in right_values(rule)]

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.decks import SHIPPED, Deck, find_deck, read_rule
+from lammps_inelastic.workflow.decks import Deck, find_deck, read_rule
 from lammps_inelastic.workflow.errors import StudyError
+from lammps_inelastic.workflow.shipped import DECKS
 from lammps_inelastic.workflow.study import read_study
 
 TABLE = '''# My own
@@ -107,7 +108,7 @@ def test_a_table_that_cannot_be_read(line: str, message: str, tmp_path: Path) ->
     assert message in mistake
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", DECKS)
 def test_shipped_decks_state_rules_that_their_defaults_keep(name: str) -> None:
     deck = find_deck(name, Path())
     assert deck.rules.keys() == deck.variables.keys() > {"out", "diameter"}

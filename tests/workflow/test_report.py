@@ -40,7 +40,7 @@ from lammps_inelastic.workflow.report.statistics import (
     root_mean_square_difference,
     sample,
 )
-from lammps_inelastic.workflow.reproduce_command import STUDIES
+from lammps_inelastic.workflow.shipped import STUDIES
 from lammps_inelastic.workflow.store import Result, StoredStudy, write_studies
 
 ANCHORS = {

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lammps_inelastic.workflow.decks import SHIPPED, find_deck
+from lammps_inelastic.workflow.decks import find_deck
 from lammps_inelastic.workflow.errors import StudyError
+from lammps_inelastic.workflow.shipped import DECKS as SHIPPED
 from lammps_inelastic.workflow.study import MOST_CASES, Study, read_study
 
 # The same examples on every machine; a folder may serve all examples of a test, each writes anew.

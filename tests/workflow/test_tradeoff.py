@@ -17,19 +17,16 @@ from lammps_inelastic.analysis import (
     network_difference,
     read_run_log,
 )
-from lammps_inelastic.workflow import tradeoff_command
+from lammps_inelastic.workflow.cli import tradeoff as tradeoff_command
+from lammps_inelastic.workflow.launch import cores
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.settling import first_at_rest, overlaps_as_contacts
 from lammps_inelastic.workflow.store import Result, read_studies
 from lammps_inelastic.workflow.study import Case
 from lammps_inelastic.workflow.thermo import read_thermo
-from lammps_inelastic.workflow.tradeoff import (
-    Configuration,
-    Run,
-    compare,
-    recommendations,
-    reference_of,
-)
+from lammps_inelastic.workflow.tradeoff.advice import recommendations
+from lammps_inelastic.workflow.tradeoff.comparison import compare, reference_of
+from lammps_inelastic.workflow.tradeoff.plan import Configuration, Run
 from study_run import killed_when, numbers_of, same
 
 # Deep enough to fill the measuring box, few enough for a second a run.
@@ -463,7 +460,7 @@ def test_starts_from_data_files(tmp_path):
 
 
 def test_two_ranks_are_kept_apart(tmp_path):
-    if tradeoff_command.cores() < 2:
+    if cores() < 2:
         # The command refuses more ranks than cores, whose times would say nothing.
         pytest.skip("two ranks need two cores")
     out = tmp_path / "out"

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..decks import SHIPPED, Value, find_deck
+from ..decks import Value, find_deck
 from ..errors import WorkflowError
-from ..reproduce_command import STUDIES as OF_THE_PAPER
+from ..shipped import DECKS
+from ..shipped import STUDIES as OF_THE_PAPER
 from ..store import Result, StoredStudy, read_studies
 from .statistics import FloatArray, grouped, matching
 
@@ -89,7 +90,7 @@ def _completed(result: Result) -> Result:
 @cache
 def deck_defaults(deck: str) -> Mapping[str, Value]:
     """Return the variables of one of our decks with their defaults; of another deck, none."""
-    return find_deck(deck, Path()).parameters if deck in SHIPPED else {}
+    return find_deck(deck, Path()).parameters if deck in DECKS else {}
 
 
 def profile(result: Result) -> tuple[FloatArray, FloatArray] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..reproduce_command import STUDIES as OF_THE_PAPER
+from ..shipped import STUDIES as OF_THE_PAPER
 from .beyond import beyond_sections
 from .blocks import Section
 from .data import Data

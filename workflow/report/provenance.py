@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ..reproduce_command import QUICK
+from ..shipped import QUICK_FOLDER, STUDIES_FOLDER
 from ..store import Result, StoredStudy
-from ..study_commands import SHIPPED
 from .blocks import DASH, Block, Listing, Section, Table, Text, as_short, cells
 from .data import Data
 from .statistics import computing_seconds
@@ -30,8 +29,8 @@ def commands(data: Data, name: str) -> list[str]:
     """Return the commands that make a study's part of a report."""
     report = f"inelastic report DIR/{name}.h5"
     study = data.studies.get(name)
-    if study is not None and not _is_shipped(study, SHIPPED):
-        if _is_shipped(study, SHIPPED / QUICK):
+    if study is not None and not _is_shipped(study, STUDIES_FOLDER):
+        if _is_shipped(study, QUICK_FOLDER):
             return ["inelastic reproduce --quick --out DIR"]
         return [f"inelastic run {name}.toml --out DIR", report]
     return [f"inelastic run {name} --out DIR", report]

@@ -1,4 +1,4 @@
-"""On which lines of a TOML file its keys stand; tomllib does not tell."""
+"""The lines of a TOML file on which its keys stand, which tomllib does not tell."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-# A value of more lines is not looked through to its end: the time grows as their square.
+# A value of more lines is not read to its end: the time grows as their square.
 MOST_LINES = 1000
 
 
@@ -33,7 +33,7 @@ def lines_of_keys(text: str) -> Mapping[str, int]:
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:
     """Split a file where tomllib takes each part alone: a table's name, or a key with its value."""
-    # TOML knows no other end of a line.
+    # TOML has no other end of a line.
     lines = text.split("\n")
     start = 0
     for end in range(1, len(lines) + 1):
@@ -60,7 +60,7 @@ def _named(content: Mapping[str, Any], tables: Counter[str]) -> str:
             (inside,) = inside
             name = f"{name}[{tables[name]}]"
         elif tables[name]:
-            # Inside the last table of an array.
+            # The table is inside the last table of an array.
             name = f"{name}[{tables[name]}]"
     return name
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .files import whole
+from ..report_files import write_report
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -33,40 +32,10 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="DIR",
         help="write each figure there too, as PDF and PNG, and its numbers as CSV",
     )
+    report.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the page and the figures, and print where they are; 0, or a WorkflowError."""
     write_report(options.files, options.out, options.figures)
     return 0
-
-
-def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None:
-    """Write a report, and print where it is.
-
-    Parameters
-    ----------
-    files : of studies
-    out : the page
-    figures : folder for the figures and their numbers; None writes none
-    """
-    # Here and not above: drawing takes a while to import, and the other commands need not wait.
-    from .report import all_sections, read_data, render
-    from .report.figures import Figure, Pictures
-    from .report.page import summarise
-
-    data = read_data(files)
-    sections = all_sections(data, [path.name for path in files])
-    text = render(data, sections)
-    with whole(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    summary = summarise(sections)
-    if summary is not None:
-        print(f"{summary.large} of {summary.compared} differences are above two standard errors")
-    if figures is not None:
-        figures.mkdir(parents=True, exist_ok=True)
-        drawn = [b for one in sections for b in one.blocks if isinstance(b, Figure | Pictures)]
-        for figure in drawn:
-            figure.write(figures)
-        print(f"{len(drawn)} figures: {figures}")
-    print(f"written: {out}")

@@ -2,28 +2,21 @@
 
 Decks find each other's packings by their files only. A deck that is given a packing of another kind
 may not notice: bodies, for example, would move on as free spheres. So a study is checked for it
-before anything runs. Of a deck of the user's own nothing is known, and nothing is refused.
+before anything runs. Nothing is known of a user's own deck, and nothing is refused.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from .decks import OUT, PACKING, SETTLING, Deck
+from ..decks import OUT, PACKING, Deck
+from ..shipped import RESPONSE, SETTLING
+from .case import Stage, takes_out
+from .file_format import Bounds
 
-if TYPE_CHECKING:
-    from .study import Stage
-
-Bounds = tuple[float, float, float, float, float, float]
-
-RESPONSE = "response"
-# What each of our decks that start from a packing may start from: settling is told which.
-TAKES = {RESPONSE: ("spheres",), SETTLING: ("spheres", "dimers")}
-# Decks that leave the container as they found it, so that another one may go on in it.
+# These decks leave the container as they found it, so that another one may go on in it.
 KEEPS_CONTAINER = ("spheres", "dimers", "clusters", SETTLING)
-# Variables that describe the packing and not what is done to it.
+# These variables describe the packing and not what is done to it.
 SHARED = ("diameter", "inertia")
 
 CONTAINER: Bounds = (0, 1, 0, 5, 0, 1)
@@ -32,9 +25,9 @@ TRAY: Bounds = (-2, 3, 0, 5, -2, 3)
 
 
 def misfit(stages: Sequence[Stage]) -> tuple[str, str] | None:
-    """Say what does not fit together in the decks of a case, if anything does not.
+    """Return what does not fit together in the decks of a case; None if everything does.
 
-    Returns the name of the variable that is to blame, or `deck`, and one line in words.
+    It is the name of the variable that is to blame, or `deck`, and one line in words.
     """
     kind: str | None = None
     for number, stage in enumerate(stages):
@@ -56,11 +49,11 @@ def misfit(stages: Sequence[Stage]) -> tuple[str, str] | None:
                 )
             kind = name
             continue
-        allowed = " or ".join(TAKES[name])
+        takes = _packings_for(stage.deck)
         if before is None:
             return "deck", (
-                f"{name} starts from a packing, which a deck before it must make: {allowed}, as in "
-                f'deck = ["{TAKES[name][0]}", "{name}"]'
+                f"{name} starts from a packing, which a deck before it must make: "
+                f'{" or ".join(takes)}, as in deck = ["{takes[0]}", "{name}"]'
             )
         if wrong := _wrong_before(stage, before, kind):
             return wrong
@@ -77,16 +70,17 @@ def misfit(stages: Sequence[Stage]) -> tuple[str, str] | None:
 
 
 def _wrong_before(stage: Stage, before: Stage, kind: str | None) -> tuple[str, str] | None:
-    """Say why one of our decks cannot start from what the one before it leaves."""
+    """Return why one of our decks cannot start from what the one before it leaves, if it cannot."""
     name = stage.deck.name
     if kind is None:
         return None
     if before.deck.name not in KEEPS_CONTAINER:
         return "deck", f"{name} cannot follow {before.deck.name}, which changes the container"
-    if kind not in TAKES[name]:
+    takes = _packings_for(stage.deck)
+    if kind not in takes:
         return "deck", (
             f"{name} cannot follow {before.deck.name}, which leaves {kind}: it takes "
-            f"{' or '.join(TAKES[name])} only"
+            f"{' or '.join(takes)} only"
         )
     particle = stage.variables.get("particle", kind)
     if particle != kind:
@@ -101,13 +95,15 @@ def _wrong_before(stage: Stage, before: Stage, kind: str | None) -> tuple[str, s
     return None
 
 
-def takes_out(deck: Deck) -> bool:
-    """Whether `-var out FOLDER` may be given: LAMMPS refuses it if the deck has another out."""
-    own = r"^[^#\n]*\bvariable\s+out\s+(?!\s|index\b)"
-    return not re.search(own, deck.text, re.MULTILINE)
+def _packings_for(deck: Deck) -> tuple[str, ...]:
+    """Return the decks from whose packings one of our decks may start."""
+    # A deck that may start from several has a parameter that says from which.
+    rule = deck.rules.get("particle")
+    return ("spheres",) if rule is None else rule.words
 
 
 def _uses_out(deck: Deck) -> bool:
+    """Say whether a deck writes to the folder in its variable out."""
     return OUT in deck.variables or "${out}" in deck.text
 
 

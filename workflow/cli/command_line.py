@@ -1,4 +1,4 @@
-"""The command line `inelastic`: one subcommand for each thing that a user does."""
+"""The command line `inelastic`: all subcommands together, and what becomes of their errors."""
 
 from __future__ import annotations
 
@@ -12,16 +12,33 @@ from typing import NoReturn
 
 from lammps_inelastic.analysis import AnalysisError
 
+from ..errors import INTERRUPTED, StudyError, WorkflowError
 from . import (
-    export_command,
-    look_command,
-    report_command,
-    reproduce_command,
-    study_commands,
-    tradeoff_command,
+    collect,
+    export,
+    look,
+    report,
+    reproduce,
+    slurm,
+    status,
+    tradeoff,
+    validate,
 )
-from .errors import StudyError, WorkflowError
-from .main import INTERRUPTED
+from . import run as run_cases
+
+# The help lists them in this order. Each adds a parser, whose default `run` is called.
+SUBCOMMANDS = (
+    look,
+    validate,
+    run_cases,
+    status,
+    collect,
+    slurm,
+    reproduce,
+    tradeoff,
+    export,
+    report,
+)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -35,16 +52,16 @@ def run(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     options = _parser().parse_args(arguments)
     try:
-        status = _run(options)
+        code = int(options.run(options))
         sys.stdout.flush()
-        return status
+        return code
     except StudyError as error:
         # Every rank of an MPI job finds the same mistakes.
         for mistake in error.mistakes if os.environ.get("PMI_RANK", "0") == "0" else ():
             _complain(mistake)
         return 2
     except BrokenPipeError:
-        # Such as `| head`, which has what it wanted. What is still buffered would fail at exit.
+        # A reader such as `head` has what it wanted. What is still buffered would fail at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except (AnalysisError, WorkflowError, OSError) as error:
@@ -58,22 +75,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _run(options: argparse.Namespace) -> int:
-    if options.command == "look":
-        return look_command.run(options)
-    if options.command == "export":
-        return export_command.run(options)
-    if options.command == "report":
-        return report_command.run(options)
-    if options.command == "reproduce":
-        return reproduce_command.run(options)
-    if options.command == "tradeoff":
-        return tradeoff_command.run(options)
-    return study_commands.run_command(options)
-
-
 class _Parser(argparse.ArgumentParser):
-    """Reports a wrong argument like every other error, in one line."""
+    """An argument parser that reports a wrong argument like every other error, in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"inelastic: {message} (see {self.prog} --help)\n")
@@ -82,12 +85,8 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="inelastic", description="Packings of inelastic spheres with LAMMPS.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    look_command.add_parser(commands)
-    study_commands.add_parsers(commands)
-    reproduce_command.add_parser(commands)
-    tradeoff_command.add_parser(commands)
-    export_command.add_parser(commands)
-    report_command.add_parser(commands)
+    for subcommand in SUBCOMMANDS:
+        subcommand.add_parser(commands)
     return parser
 
 

@@ -1,4 +1,4 @@
-"""The plot of `inelastic tradeoff`: wall time against overlap, errors against the tolerance."""
+"""The figure of a comparison: wall time against overlap, errors against the tolerance."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 
 from lammps_inelastic.analysis.plots import plot_bounds, plot_points, style_of
 
-from .files import whole
-from .report.figures import DPI, RC
-from .tradeoff import Comparison, Configuration, Row
+from ..files import whole
+from ..report.figures import DPI, RC
+from .comparison import Comparison, Row
+from .plan import Configuration
 
-# Inches: about the width of a page.
+# The figure is about as wide as a page [inches].
 SIZE = (7.4, 4.3)
 FORMATS = ("png", "svg")
 SCATTER = "scatter between starts"
-# Of largest to smallest y, below which powers of ten alone would be too few ticks.
+# Below this ratio of largest to smallest y, powers of ten alone would be too few ticks.
 FEW = 200
 
 
@@ -31,8 +32,8 @@ def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
 
     Parameters
     ----------
-    comparison : with at least one row
-    path : of the files, without `.png` and `.svg`
+    comparison : comparison with at least one row
+    path : path of the files, without `.png` and `.svg`
     """
     files = [path.with_name(f"{path.name}.{kind}") for kind in FORMATS]
     with matplotlib.rc_context(RC):
@@ -54,7 +55,7 @@ def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
         }
         figure.legend(known.values(), known, loc="outside lower center", ncols=min(len(known), 3))
         for file in files:
-            # No date: the same numbers give the same file.
+            # The file has no date, so that the same numbers give the same file.
             metadata = {"Date": None} if file.suffix == ".svg" else {}
             form = file.suffix.removeprefix(".")
             with whole(file) as temporary:
@@ -124,7 +125,7 @@ def _plot(
 
 
 def _curves(rows: Sequence[Row]) -> Mapping[str, list[Row]]:
-    """Return the rows that differ in the tolerance alone, by what tells them from others."""
+    """Return rows that differ in the tolerance alone as one curve, by what tells it from others."""
     curves: dict[str, list[Row]] = {}
     for row in rows:
         one = row.configuration
@@ -147,7 +148,7 @@ PARTS: Mapping[str, Callable[[Configuration], object]] = {
 def _logarithmic(ax: Axes) -> None:
     """Make both axes logarithmic, the loosest on the left: accuracy grows to the right.
 
-    Where nothing is drawn, that is said.
+    Axes without data say so.
     """
     if not ax.has_data():
         ax.text(0.5, 0.5, "no data", transform=ax.transAxes, ha="center", va="center")
@@ -171,6 +172,6 @@ def _label_heights(ax: Axes) -> None:
 
 
 def _positive(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:
-    """Return those of some points (x, y) that have a place on logarithmic axes, (k, 2)."""
+    """Return the points (x, y) that have a place on logarithmic axes, (k, 2)."""
     there = [point for point in points if all(0 < value < np.inf for value in point)]
     return np.array(there, dtype=np.float64).reshape(-1, 2)

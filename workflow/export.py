@@ -1,14 +1,12 @@
-"""The subcommand `inelastic export`: a packing as a file that another program opens."""
+"""A frame of a run written as a file that another program opens."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich import filesize
@@ -35,112 +33,49 @@ from lammps_inelastic.analysis import (
     write_xyz,
 )
 from lammps_inelastic.analysis.export import Progress
-from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray, as_box
+from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray
 
 from .finished import CONTACTS as CONTACT_DUMP
 from .finished import LOG, unchanged
-from .finished import PARTICLES as PARTICLE_DUMP
 
-# What the file is called that is not named.
+# The file has this name if no other is given, and its format's ending.
 NAME = "packing"
 ENDINGS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
 IMAGES = ("tiff", "raw")
 
-# Without --voxel, the smallest radius is this many voxels long.
+# The smallest radius is so many voxels long, if no other size is given.
 VOXELS_PER_RADIUS = 10
 SUBDIVISIONS = 2
 
-# Steps that are named where one is not found.
+# So many steps are named where one is not found.
 STEPS_SHOWN = 6
-# Where there is no terminal, a line is printed after each of so many equal parts.
+# A line is printed after each of so many equal parts where there is no terminal.
 PARTS = 10
 
 
-def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
-    """Add the subcommand to those of `inelastic`."""
-    export = commands.add_parser(
-        "export",
-        help="write a packing for another program",
-        description="Write one frame of a run as points (xyz for OVITO, ASE and MDAnalysis; vtk "
-        "for ParaView), as a voxel image (tiff; raw, with a MetaImage header) or as the surfaces "
-        "of its spheres (stl).",
-    )
-    export.add_argument(
-        "source",
-        type=Path,
-        metavar="FOLDER|DUMP",
-        help=f"folder of a run, which holds {PARTICLE_DUMP}, or a particle dump",
-    )
-    export.add_argument("--format", required=True, choices=tuple(ENDINGS))
-    export.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help=f"file to write (default: {NAME} and the format's ending, in the run's folder)",
-    )
-    frames = export.add_mutually_exclusive_group()
-    frames.add_argument(
-        "--frame",
-        type=int,
-        metavar="N",
-        help="frame, counted from 0, or from the end: -1 is the last (default: the last)",
-    )
-    frames.add_argument("--step", type=int, metavar="N", help="frame of this time step")
-    export.add_argument(
-        "--box",
-        type=float,
-        nargs=6,
-        metavar=("XLO", "XHI", "YLO", "YHI", "ZLO", "ZHI"),
-        help="box of a voxel image (default: the dump's); for the other formats, write the spheres "
-        "whose centres lie in this box (default: all)",
-    )
-    export.add_argument(
-        "--voxel",
-        type=float,
-        metavar="SIZE",
-        help="edge of a voxel, tiff and raw only (default: a tenth of the smallest radius)",
-    )
-    export.add_argument(
-        "--subdivisions",
-        type=int,
-        metavar="N",
-        help="each sphere has 20 x 4^N faces, stl only "
-        f"(default: {SUBDIVISIONS}, {20 * 4**SUBDIVISIONS} faces)",
-    )
+def choose_frame(
+    dump: ParticleDump, source: Path, *, number: int | None, step: int | None
+) -> ParticleFrame:
+    """Return a frame of a dump, the last one if none is chosen.
 
-
-def run(options: argparse.Namespace) -> int:
-    """Write the file, and print what is in it; 0, or an AnalysisError."""
-    if options.voxel is not None and options.format not in IMAGES:
-        raise AnalysisError(f"--voxel is for tiff and raw, not for {options.format}")
-    if options.subdivisions is not None and options.format != "stl":
-        raise AnalysisError(f"--subdivisions is for stl, not for {options.format}")
-    source: Path = options.source
-    dump = ParticleDump(source / PARTICLE_DUMP if source.is_dir() else source)
-    frame = _chosen_frame(dump, options)
-    box = None if options.box is None else as_box(np.reshape(options.box, (3, 2)))
-    out: Path = options.out or dump.path.with_name(NAME + ENDINGS[options.format])
-    if options.format in IMAGES:
-        rows = _write_image(out, dump.path, frame, box, options)
-    else:
-        rows = _write_spheres(out, dump.path, frame, box, options)
-    left = max(len(name) for name, _ in rows)
-    print("\n".join(f"{name:<{left}}  {value}" for name, value in rows))
-    return 0
-
-
-def _chosen_frame(dump: ParticleDump, options: argparse.Namespace) -> ParticleFrame:
-    if options.step is not None:
-        # A frame that is named by its step is what it says, whatever became of the others.
-        if options.step not in dump.steps:
-            raise AnalysisError(f"{dump.path}: no step {options.step}; {_as_steps(dump.steps)}")
-        if dump.steps.count(options.step) > 1:
+    Parameters
+    ----------
+    dump : particle dump
+    source : folder of the run, or the dump's own path if it was named alone
+    number : number of the frame from 0, or from the end: -1 is the last
+    step : time step of the frame, which comes before its number
+    """
+    if step is not None:
+        # A frame that is named by its step is the right one, whatever became of the others.
+        if step not in dump.steps:
+            raise AnalysisError(f"{dump.path}: no step {step}; {_as_steps(dump.steps)}")
+        if dump.steps.count(step) > 1:
             raise AnalysisError(
-                f"{dump.path}: more than one frame of step {options.step}; --frame N chooses one"
+                f"{dump.path}: more than one frame of step {step}; --frame N chooses one"
             )
-        return dump[dump.steps.index(options.step)]
-    _check_frames(dump, options.source)
-    index = -1 if options.frame is None else options.frame
+        return dump[dump.steps.index(step)]
+    _check_frames(dump, source)
+    index = -1 if number is None else number
     if not -len(dump) <= index < len(dump):
         raise AnalysisError(
             f"{dump.path}: no frame {index}; there are {len(dump)}, from 0 to {len(dump) - 1}"
@@ -149,7 +84,7 @@ def _chosen_frame(dump: ParticleDump, options: argparse.Namespace) -> ParticleFr
 
 
 def _check_frames(dump: ParticleDump, source: Path) -> None:
-    """See that no frame is missing: a frame is named by its place among all.
+    """See that no frame is missing, as a frame is named by its place among all.
 
     A dump that was named alone may be of another run than the contacts beside it.
     """
@@ -173,10 +108,27 @@ def _as_steps(steps: tuple[int, ...]) -> str:
     return f"the {len(steps)} steps are {first}, ..., {steps[-1]}"
 
 
-def _write_spheres(
-    out: Path, path: Path, frame: ParticleFrame, box: FloatArray | None, options: argparse.Namespace
+def write_spheres(
+    form: str,
+    out: Path,
+    path: Path,
+    frame: ParticleFrame,
+    box: FloatArray | None,
+    source: Path,
+    subdivisions: int | None,
 ) -> list[tuple[str, str]]:
-    """Write the spheres whose centres lie in the box, all if there is none; return what to say."""
+    """Write spheres as points or as surfaces; return names and values of what was written.
+
+    Parameters
+    ----------
+    form : xyz, vtk or stl
+    out : file to write
+    path : path of the dump, for errors
+    frame : frame that is written
+    box : (3, 2), box in which the centres of the spheres lie, length; None for all spheres
+    source : folder of the run, or the dump's own path if it was named alone
+    subdivisions : each sphere of stl has 20 x 4^subdivisions faces; None for the usual ones
+    """
     chosen = np.ones(len(frame.ids), dtype=np.bool_)
     if box is not None:
         chosen = particles_inside(frame.positions, box)
@@ -184,13 +136,13 @@ def _write_spheres(
             raise AnalysisError(f"{path}: no sphere's centre lies in the box at step {frame.step}")
     positions, radii = frame.positions[chosen], frame.radii[chosen]
     rows = [("spheres", f"{len(radii)} of {len(chosen)}, step {frame.step}")]
-    if options.format == "stl":
-        divided = SUBDIVISIONS if options.subdivisions is None else options.subdivisions
+    if form == "stl":
+        divided = SUBDIVISIONS if subdivisions is None else subdivisions
         faces = write_stl(out, positions, radii, subdivisions=divided)
         return [*rows, ("faces", f"{faces}"), _as_file("file", out)]
 
-    columns = _Columns.of(frame, chosen, options.source)
-    if options.format == "xyz":
+    columns = _Columns.of(frame, chosen, source)
+    if form == "xyz":
         write_xyz(
             out,
             positions,
@@ -216,7 +168,7 @@ def _write_spheres(
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """What is written of each chosen sphere beside place and radius; k spheres are chosen.
+    """The columns for k chosen spheres that are written beside place and radius.
 
     Attributes
     ----------
@@ -231,6 +183,7 @@ class _Columns:
 
     @classmethod
     def of(cls, frame: ParticleFrame, chosen: BoolArray, source: Path) -> _Columns:
+        """Return the columns of the chosen spheres, (n,) of bool, of a frame."""
         contacts = _contacts(frame, source)
         return cls(
             ids=frame.ids[chosen],
@@ -240,6 +193,7 @@ class _Columns:
 
     @property
     def names(self) -> str:
+        """The names of the columns, for the user."""
         names = "radius, id" + ("" if self.bodies is None else ", body")
         if self.contacts is None:
             return f"{names}; no contacts are known at this step"
@@ -261,10 +215,25 @@ def _contacts(frame: ParticleFrame, source: Path) -> IntArray | None:
     return None
 
 
-def _write_image(
-    out: Path, path: Path, frame: ParticleFrame, box: FloatArray | None, options: argparse.Namespace
+def write_image(
+    form: str,
+    out: Path,
+    path: Path,
+    frame: ParticleFrame,
+    box: FloatArray | None,
+    voxel: float | None,
 ) -> list[tuple[str, str]]:
-    """Write the voxel image of the box, the dump's if there is none; return what to say."""
+    """Write a voxel image; return names and values of what was written.
+
+    Parameters
+    ----------
+    form : tiff or raw
+    out : file to write
+    path : path of the dump, for errors
+    frame : frame that is written
+    box : (3, 2), box of the image, length; None for the dump's
+    voxel : edge of a voxel, length; None for a tenth of the smallest radius
+    """
     if any("p" in flags for flags in frame.boundaries):
         raise AnalysisError(
             f"{path}: the box is periodic ({' '.join(frame.boundaries)}), and spheres that reach "
@@ -275,18 +244,18 @@ def _write_image(
     reaches = (frame.positions + radii > bounds[:, 0]) & (frame.positions - radii < bounds[:, 1])
     if not reaches.all(axis=1).any():
         raise AnalysisError(f"{path}: no sphere reaches into the box at step {frame.step}")
-    voxel = float(frame.radii.min()) / VOXELS_PER_RADIUS if options.voxel is None else options.voxel
-    slices, rows, columns = voxel_shape(bounds, voxel)
-    write = write_tiff if options.format == "tiff" else write_raw
+    edge = float(frame.radii.min()) / VOXELS_PER_RADIUS if voxel is None else voxel
+    slices, rows, columns = voxel_shape(bounds, edge)
+    write = write_tiff if form == "tiff" else write_raw
     with _progress() as progress:
-        image = write(out, frame.positions, frame.radii, bounds, voxel, progress=progress)
+        image = write(out, frame.positions, frame.radii, bounds, edge, progress=progress)
     said = [
         ("spheres", f"{len(frame.ids)}, step {frame.step}"),
-        ("voxels", f"{columns} x {rows} x {slices} of {voxel:g}"),
+        ("voxels", f"{columns} x {rows} x {slices} of {edge:g}"),
         ("solid share", f"{image.solid_share:.4f}"),
         _as_file("file", out),
     ]
-    return [*said, _as_file("header", out.with_suffix(".mhd"))] if options.format == "raw" else said
+    return [*said, _as_file("header", out.with_suffix(".mhd"))] if form == "raw" else said
 
 
 @contextmanager

@@ -1,0 +1,111 @@
+"""The imports of the Python modules: they close no circle, and analysis stands alone."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = "lammps_inelastic"
+ROOMS = ("analysis", "workflow")
+
+
+def name_of(path: Path) -> str:
+    """Return the name of a module, without that of the package around both rooms."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(path): path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))}
+
+
+def imports_in(text: str, module: str, *, is_package: bool = False) -> Iterator[str]:
+    """Return the modules of both rooms that a module imports, anywhere in it.
+
+    An import inside a function, or for type checking alone, is an arrow like any other.
+    """
+    inside = module.split(".") if is_package else module.split(".")[:-1]
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            wanted = [alias.name.removeprefix(f"{PACKAGE}.") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = (node.module or "").removeprefix(f"{PACKAGE}.").split(".")
+            if node.level:
+                above = inside[: len(inside) - node.level + 1]
+                base = [*above, *(base if node.module else [])]
+            start = ".".join(base)
+            # What is imported from a package may be a module of it.
+            inner = [f"{start}.{alias.name}" for alias in node.names]
+            wanted = [name if name in MODULES else start for name in inner]
+        else:
+            continue
+        yield from (name for name in wanted if name in MODULES and name != module)
+
+
+def circle_in(arrows: Mapping[str, set[str]]) -> list[str]:
+    """Return the modules of a circle of imports, the first one again at the end; [] if none is."""
+    try:
+        TopologicalSorter(arrows).prepare()
+    except CycleError as error:
+        return list(reversed(error.args[1]))
+    return []
+
+
+@pytest.fixture(scope="module")
+def arrows() -> dict[str, set[str]]:
+    return {
+        name: set(imports_in(path.read_text(), name, is_package=path.name == "__init__.py"))
+        for name, path in MODULES.items()
+    }
+
+
+def test_no_circle_of_imports(arrows: dict[str, set[str]]) -> None:
+    assert {"workflow.main", "workflow.cli.look", "analysis.packing"} <= arrows.keys()
+    assert "workflow.cli.command_line" in arrows["workflow.main"]
+    assert "workflow.cli.look" in arrows["workflow.cli.command_line"]
+    assert "analysis" in arrows["workflow.measure"]
+    circle = circle_in(arrows)
+    assert not circle, f"a circle of imports: {' -> '.join(circle)}"
+
+
+def test_analysis_imports_nothing_of_the_workflow(arrows: dict[str, set[str]]) -> None:
+    wrong = {
+        name: sorted(one for one in to if one.split(".")[0] == "workflow")
+        for name, to in arrows.items()
+        if name.split(".")[0] == "analysis"
+    }
+    assert {name: to for name, to in wrong.items() if to} == {}
+
+
+def test_no_subcommand_is_imported_but_by_the_command_line(arrows: dict[str, set[str]]) -> None:
+    rooms = {"workflow.cli.arguments", "workflow.cli.command_line", "workflow.cli"}
+    subcommands = {name for name in arrows if name.startswith("workflow.cli.")} - rooms
+    assert len(subcommands) >= 10
+    importing = {name: sorted(to & subcommands) for name, to in arrows.items() if to & subcommands}
+    assert importing == {"workflow.cli.command_line": sorted(subcommands)}
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("from .store import Result", ["workflow.store"]),
+        ("from . import store, files", ["workflow.store", "workflow.files"]),
+        ("from ..analysis.packing import Cover", ["analysis.packing"]),
+        ("def f():\n    from lammps_inelastic.workflow import store", ["workflow.store"]),
+        ("if TYPE_CHECKING:\n    import lammps_inelastic.analysis.bodies", ["analysis.bodies"]),
+        ("from lammps_inelastic.analysis import packing_fraction", ["analysis"]),
+        ("import numpy\nfrom pathlib import Path", []),
+    ],
+)
+def test_imports_are_seen_in_every_form(text: str, found: list[str]) -> None:
+    assert list(imports_in(text, "workflow.measure")) == found
+
+
+def test_a_circle_is_seen() -> None:
+    circle = circle_in({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}})
+    assert len(circle) == 4
+    assert circle[0] == circle[-1]

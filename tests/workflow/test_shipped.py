@@ -1,0 +1,127 @@
+"""What is shipped, where stored results are looked for, and decks as inputs/README.md has them."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from lammps_inelastic.workflow.decks import as_value, find_deck
+from lammps_inelastic.workflow.errors import WorkflowError
+from lammps_inelastic.workflow.folder import Folder
+from lammps_inelastic.workflow.gather import adopt_results, gather_results
+from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.shipped import (
+    DECKS,
+    QUICK_FOLDER,
+    RESULTS_VARIABLE,
+    STUDIES,
+    STUDIES_FOLDER,
+    find_stored_results,
+    shipped_studies,
+)
+from lammps_inelastic.workflow.study import read_study
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start in a folder without results, and in an environment that names none."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv(RESULTS_VARIABLE, raising=False)
+
+
+def stored(folder: Path) -> Path:
+    (folder / STUDIES[0]).mkdir(parents=True)
+    return folder
+
+
+def test_every_study_of_the_paper_is_shipped() -> None:
+    assert shipped_studies().keys() == set(STUDIES)
+    for folder in (STUDIES_FOLDER, QUICK_FOLDER):
+        assert {path.stem for path in folder.glob("*.toml")} == set(STUDIES)
+
+
+def test_results_are_no_part_of_the_package() -> None:
+    assert not list(STUDIES_FOLDER.rglob("*.h5"))
+
+
+def test_results_are_those_of_the_folder_of_the_start(tmp_path: Path) -> None:
+    results = stored(tmp_path / "results")
+    assert find_stored_results() == results
+
+
+def test_a_named_folder_comes_before_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored(tmp_path / "results")
+    monkeypatch.setenv(RESULTS_VARIABLE, str(stored(tmp_path / "named")))
+    assert find_stored_results() == tmp_path / "named"
+    assert find_stored_results(stored(tmp_path / "chosen")) == tmp_path / "chosen"
+
+
+def test_without_results_one_line_says_where_they_were_looked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # A folder for runs of one's own may have this name, too.
+    (tmp_path / "results" / "cases").mkdir(parents=True)
+    assert main(["reproduce", "--stored-only", "--out", "paper"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"inelastic: no stored results in {tmp_path / 'results'}")
+    assert f"--results or {RESULTS_VARIABLE}" in line
+    assert not (tmp_path / "paper").exists()
+    with pytest.raises(WorkflowError, match="no stored results in chosen: "):
+        find_stored_results(Path("chosen"))
+    stored(tmp_path / "other")
+    # A folder that is named and is wrong is not passed over.
+    monkeypatch.setenv(RESULTS_VARIABLE, "named")
+    with pytest.raises(WorkflowError, match="no stored results in named: "):
+        find_stored_results()
+
+
+def test_results_are_for_stored_ones_only(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", "--quick", "--results", "anywhere"]) == 2
+    assert "only --stored and --stored-only take results" in capsys.readouterr().err
+
+
+def test_the_results_of_the_repository_are_those_of_its_studies(tmp_path: Path) -> None:
+    study = read_study(STUDIES_FOLDER / "protocol.toml")
+    folder = Folder(tmp_path / "out")
+    shutil.copytree(ROOT / "results" / study.name, tmp_path / "kept" / study.name)
+    assert adopt_results(study, folder, tmp_path / "kept") == len(study.cases)
+    assert len(gather_results(study, folder).results) == len(study.cases)
+    assert adopt_results(study, folder, tmp_path / "kept") == 0
+
+
+ROW = re.compile(r"^\| `(\w+)` \| (\S+) \| ?[^|]* \| ([^|]+) \|$", re.MULTILINE)
+RANGE = re.compile(r"\bfrom (-?[\d.e-]+)(?: \([^)]*\))? to (below )?([\d.e]+)")
+MOST = re.compile(r"\bup to ([\d.e]+)(?![\d.e]*\w)")
+
+
+@pytest.mark.parametrize("name", DECKS)
+def test_the_tables_of_the_documentation_are_those_of_the_deck(name: str) -> None:
+    """Names, defaults, words and the ends of ranges in inputs/README.md."""
+    document = (ROOT / "inputs" / "README.md").read_text()
+    (section,) = re.findall(rf"^## {name}\.in\n(.*?)(?=^## |\Z)", document, re.M | re.S)
+    tables = re.findall(r"^\| name \|.*?(?=\n\n|\Z)", section, re.M | re.S)
+    deck = find_deck(name, Path())
+    rows = [row for table in tables for row in ROW.findall(table)]
+    assert len(rows) >= 4
+    for variable, default, meaning in rows:
+        assert variable in deck.variables
+        assert as_value(default) == deck.variables[variable], variable
+        rule = deck.rules[variable]
+        for word in rule.words:
+            assert word in meaning, (variable, word)
+        for low, below, high in RANGE.findall(meaning):
+            assert rule.low is not None
+            assert rule.high is not None
+            assert (low, high) == (rule.low.text, rule.high.text), variable
+            assert rule.low.included
+            assert rule.high.included is not bool(below), variable
+        for most in MOST.findall(meaning):
+            assert rule.high is not None
+            assert (most, rule.high.included) == (rule.high.text, True), variable

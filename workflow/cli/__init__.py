@@ -1,0 +1,1 @@
+"""The subcommands of `inelastic`, one file each; `command_line` assembles them."""

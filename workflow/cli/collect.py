@@ -1,0 +1,56 @@
+"""The subcommand `inelastic collect`: the results of studies in one HDF5 file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..errors import WorkflowError
+from ..files import is_file
+from ..folder import Folder
+from ..gather import gather_results
+from ..store import write_studies
+from .arguments import add_out, add_studies, as_cases, read_studies
+
+# Every HDF5 file begins with these bytes.
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the subcommand to those of `inelastic`."""
+    collect = commands.add_parser(
+        "collect",
+        help="gather a study's results in one HDF5 file",
+        description="Gather the results of studies in one HDF5 file.",
+    )
+    add_studies(collect)
+    add_out(collect)
+    collect.add_argument(
+        "--file", type=Path, help="the file (default: the study's name in the --out folder)"
+    )
+    collect.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the file, and print how many results are in it; return 0."""
+    studies = read_studies(options.studies)
+    folder = Folder(options.out)
+    file = options.file or folder.root / f"{'+'.join(study.name for study in studies)}.h5"
+    _check_target(file)
+    stored = [gather_results(study, folder) for study in studies]
+    write_studies(file, stored)
+    for study, found in zip(studies, stored, strict=True):
+        print(f"{study.name}: {len(found.results)} of {as_cases(study.cases)}")
+    print(f"written: {file}")
+    return 0
+
+
+def _check_target(file: Path) -> None:
+    """Raise WorkflowError if a file that would be replaced is no HDF5 file."""
+    if not is_file(file):
+        return
+    with file.open("rb") as opened:
+        start = opened.read(len(HDF5))
+    if start and start != HDF5:
+        raise WorkflowError(f"{file}: this file is no HDF5 file, and is not replaced")

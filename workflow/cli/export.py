@@ -1,0 +1,91 @@
+"""The subcommand `inelastic export`: a packing as a file that another program opens."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lammps_inelastic.analysis import AnalysisError, ParticleDump
+from lammps_inelastic.analysis.geometry import as_box
+
+from ..export import ENDINGS, IMAGES, NAME, SUBDIVISIONS, choose_frame, write_image, write_spheres
+from ..finished import PARTICLES as PARTICLE_DUMP
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the subcommand to those of `inelastic`."""
+    export = commands.add_parser(
+        "export",
+        help="write a packing for another program",
+        description="Write one frame of a run as points (xyz for OVITO, ASE and MDAnalysis; vtk "
+        "for ParaView), as a voxel image (tiff; raw, with a MetaImage header) or as the surfaces "
+        "of its spheres (stl).",
+    )
+    export.add_argument(
+        "source",
+        type=Path,
+        metavar="FOLDER|DUMP",
+        help=f"folder of a run, which holds {PARTICLE_DUMP}, or a particle dump",
+    )
+    export.add_argument("--format", required=True, choices=tuple(ENDINGS))
+    export.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help=f"file to write (default: {NAME} and the format's ending, in the run's folder)",
+    )
+    frames = export.add_mutually_exclusive_group()
+    frames.add_argument(
+        "--frame",
+        type=int,
+        metavar="N",
+        help="frame, counted from 0, or from the end: -1 is the last (default: the last)",
+    )
+    frames.add_argument("--step", type=int, metavar="N", help="frame of this time step")
+    export.add_argument(
+        "--box",
+        type=float,
+        nargs=6,
+        metavar=("XLO", "XHI", "YLO", "YHI", "ZLO", "ZHI"),
+        help="box of a voxel image (default: the dump's); for the other formats, write the spheres "
+        "whose centres lie in this box (default: all)",
+    )
+    export.add_argument(
+        "--voxel",
+        type=float,
+        metavar="SIZE",
+        help="edge of a voxel, tiff and raw only (default: a tenth of the smallest radius)",
+    )
+    export.add_argument(
+        "--subdivisions",
+        type=int,
+        metavar="N",
+        help="each sphere has 20 x 4^N faces, stl only "
+        f"(default: {SUBDIVISIONS}, {20 * 4**SUBDIVISIONS} faces)",
+    )
+    export.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the file, and print what is in it; 0, or an AnalysisError."""
+    if options.voxel is not None and options.format not in IMAGES:
+        raise AnalysisError(f"--voxel is for tiff and raw, not for {options.format}")
+    if options.subdivisions is not None and options.format != "stl":
+        raise AnalysisError(f"--subdivisions is for stl, not for {options.format}")
+    source: Path = options.source
+    dump = ParticleDump(source / PARTICLE_DUMP if source.is_dir() else source)
+    frame = choose_frame(dump, source, number=options.frame, step=options.step)
+    box = None if options.box is None else as_box(np.reshape(options.box, (3, 2)))
+    out: Path = options.out or dump.path.with_name(NAME + ENDINGS[options.format])
+    if options.format in IMAGES:
+        rows = write_image(options.format, out, dump.path, frame, box, options.voxel)
+    else:
+        rows = write_spheres(
+            options.format, out, dump.path, frame, box, source, options.subdivisions
+        )
+    left = max(len(name) for name, _ in rows)
+    print("\n".join(f"{name:<{left}}  {value}" for name, value in rows))
+    return 0

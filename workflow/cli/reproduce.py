@@ -1,0 +1,85 @@
+"""The subcommand `inelastic reproduce`: all shipped studies, one HDF5 file, one report."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..errors import WorkflowError
+from ..folder import Folder
+from ..gather import adopt_results, gather_results
+from ..report_files import write_report
+from ..run_and_gather import run_and_gather
+from ..shipped import (
+    QUICK_FOLDER,
+    RESULTS,
+    RESULTS_VARIABLE,
+    STUDIES,
+    STUDIES_FOLDER,
+    find_stored_results,
+)
+from ..store import write_studies
+from ..study import read_study
+from .arguments import add_out, add_running, running_options
+
+STORE, REPORT, FIGURES = "paper.h5", "report.html", "figures"
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the subcommand to those of `inelastic`."""
+    reproduce = commands.add_parser(
+        "reproduce",
+        help="run the studies of the paper, and write one HDF5 file and one report",
+        description=f"Run the shipped studies, and write {STORE}, {REPORT} and the folder "
+        f"{FIGURES}. It can be interrupted at any moment: the next time does what is left.",
+    )
+    add_out(reproduce, "paper")
+    which = reproduce.add_mutually_exclusive_group()
+    which.add_argument(
+        "--quick", action="store_true", help="fewer cases and smaller packings: about ten minutes"
+    )
+    which.add_argument(
+        "--stored",
+        action="store_true",
+        help="take the stored results, and run only what they lack",
+    )
+    which.add_argument(
+        "--stored-only", action="store_true", help="take the stored results, and run nothing"
+    )
+    reproduce.add_argument(
+        "--results",
+        type=Path,
+        metavar="DIR",
+        help=f"where the stored results are (default: the environment variable {RESULTS_VARIABLE}, "
+        f"or the folder {RESULTS} of the repository)",
+    )
+    add_running(reproduce)
+    reproduce.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run what is missing, and write the report; 1 if any case has failed, else 0."""
+    stored = None
+    if options.stored or options.stored_only:
+        stored = find_stored_results(options.results)
+        print(f"stored results: {stored}")
+    elif options.results is not None:
+        raise WorkflowError("--results: only --stored and --stored-only take results")
+    where = QUICK_FOLDER if options.quick else STUDIES_FOLDER
+    folder = Folder(options.out)
+    running = running_options(options)
+    studies = [read_study(where / f"{name}.toml") for name in STUDIES]
+    failed = 0
+    for number, study in enumerate(studies, 1):
+        print(f"study {number} of {len(studies)}: {study.name}, {study.title}")
+        if stored is not None:
+            count = adopt_results(study, folder, stored)
+            print(f"{study.name}: {count} stored results of {len(study.cases)} taken")
+        if not options.stored_only:
+            failed += len(run_and_gather(study, study.cases, folder, running).failed)
+    store = folder.root / STORE
+    write_studies(store, [gather_results(study, folder) for study in studies])
+    print(f"results: {store}")
+    write_report([store], folder.root / REPORT, folder.root / FIGURES)
+    return 1 if failed else 0

@@ -1,0 +1,72 @@
+"""The subcommand `inelastic status`: how far studies have come."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from ..folder import Folder, last_lines
+from ..launch import MEASURED
+from ..store import read_result
+from ..study import Case, Study
+from ..wide_table import print_wide
+from .arguments import add_out, add_studies, read_studies
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the subcommand to those of `inelastic`."""
+    status = commands.add_parser(
+        "status", help="say how far a study has come", description="Say how far a study has come."
+    )
+    add_studies(status)
+    add_out(status)
+    status.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the state of every case; return 0."""
+    studies = read_studies(options.studies)
+    folder = Folder(options.out)
+    for study in studies:
+        _print_status(study, folder)
+    return 0
+
+
+def _print_status(study: Study, folder: Folder) -> None:
+    table = Table("", "case", "state", "", title=Text(study.title), title_justify="left", box=None)
+    states: Counter[str] = Counter()
+    other = 0
+    for number, case in enumerate(study.cases, 1):
+        state = folder.state(study, case)
+        states[state] += 1
+        note = ""
+        if state == "failed":
+            note = folder.reason(case)
+        elif state == "finished" and (lines := last_lines(folder.case(case) / MEASURED)):
+            note = f"cannot be measured: {lines[-1]}"
+        elif state == "measured":
+            note, same = _of_result(study, case, folder)
+            other += not same
+        if damage := folder.damage(study, case):
+            note = f"{note}; {damage}" if note else damage
+        table.add_row(str(number), Text(case.name), state, Text(note))
+    print_wide(table)
+    print(f"{study.name}: " + ", ".join(f"{count} {state}" for state, count in states.items()))
+    if other:
+        print(
+            f"{other} results are of other versions of the decks; they are kept. Delete them in "
+            f"{folder.result_folder(study)} to run these cases again."
+        )
+
+
+def _of_result(study: Study, case: Case, folder: Folder) -> tuple[str, bool]:
+    """Say how long a case took, and whether its decks were those of today."""
+    record = read_result(folder.result(study, case)).record
+    note = f"{record['wall_seconds']:.0f} s"
+    if record["fingerprint"] == case.fingerprint:
+        return note, True
+    return f"{note}, by another version of the deck", False

@@ -1,0 +1,147 @@
+"""The subcommand `inelastic tradeoff`: how fast, how accurate, hard contacts beside soft ones."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..decks import find_deck
+from ..files import whole
+from ..folder import Folder
+from ..gather import gather_results
+from ..launch import Options, run_study
+from ..progress import Display
+from ..run_and_gather import print_outcome
+from ..shipped import SETTLING
+from ..store import Result, read_result, write_studies
+from ..study import Outputs, Study
+from ..tradeoff.advice import recommendations
+from ..tradeoff.comparison import compare
+from ..tradeoff.options import read_plan
+from ..tradeoff.plan import Plan, Run, command_line, runs_of
+from ..tradeoff.table import TITLE, as_csv, as_markdown, never_at_rest, print_comparison
+from .arguments import add_out, seconds
+
+STORE, ROWS, PAGE, FIGURE = "tradeoff.h5", "tradeoff.csv", "tradeoff.md", "tradeoff"
+# Only the result of a run is kept: the dumps of many would fill a disk. Random points are not
+# needed where the exact packing fraction is known.
+OUTPUTS = Outputs(points=10_000, structure=False, keep="results")
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the subcommand to those of `inelastic`."""
+    tradeoff = commands.add_parser(
+        "tradeoff",
+        help="measure time against accuracy, hard contacts beside LAMMPS's soft ones",
+        description="Let the same starts settle with several tolerances, hard contacts and soft "
+        "ones, one run at a time; print a table of time and accuracy and what to take, and write "
+        f"it with a plot ({PAGE}, {ROWS}, {STORE}, {FIGURE}.png, {FIGURE}.svg). LIST is values "
+        "with commas between them. It can be interrupted at any moment: the next time does what "
+        "is left.",
+    )
+
+    def add(name: str, default: str | None, metavar: str, what: str) -> None:
+        tradeoff.add_argument(
+            name, default=default, metavar=metavar, help=what.format(default=default)
+        )
+
+    add_out(tradeoff, "tradeoff", "runs")
+    rules = find_deck(SETTLING, Path()).rules
+    add("--particle", "spheres", "WORD", f"{rules['particle'].allowed} (default: {{default}})")
+    add("--particles", "1000", "N", "number of them in a random start (default: {default})")
+    add("--diameter", "0.11", "D", "of a sphere; the container is 1 wide (default: {default})")
+    add("--aspect-ratio", None, "A", "length of a dimer over its diameter (default: 1.5)")
+    add(
+        "--tolerances",
+        "0.05,0.005,0.0005,0.00005,0.000005,0.0000005",
+        "LIST",
+        "largest overlaps of hard contacts, radii (default: 0.05 to 5e-7 in decades)",
+    )
+    add(
+        "--soft-tolerances",
+        "0.05,0.005,0.0005",
+        "LIST",
+        "largest overlaps of soft contacts at rest, about, radii; none: no soft contacts "
+        "(default: {default})",
+    )
+    add("--dts", "0.01", "LIST", "longest time steps of hard contacts (default: {default})")
+    solvers = ", ".join(rules["solver"].words)
+    add("--solvers", "apgd", "LIST", f"of hard contacts: {solvers} (default: {{default}})")
+    add("--ranks", "1", "LIST", "MPI ranks; all is run with each number (default: {default})")
+    add("--time", "3", "T", "time from the start to the end of a run (default: {default})")
+    which = tradeoff.add_mutually_exclusive_group()
+    which.add_argument(
+        "--seeds", default="3", metavar="N", help="random starts, of seeds 1 to N (default: 3)"
+    )
+    which.add_argument(
+        "--start",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="data files to start from, as the deck's variable start, in the place of seeds",
+    )
+    tradeoff.add_argument(
+        "--timeout", type=seconds, help="give up a run after so many seconds (default: never)"
+    )
+    tradeoff.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run what is missing, print, write, draw; 1 if any run has failed, else 0."""
+    plan = read_plan(options)
+    results, left_out, failed = _run_all(plan, options.out, options.timeout)
+    comparison = compare(results)
+    lines = [*left_out, *never_at_rest(comparison), *recommendations(comparison)]
+    print_comparison(comparison, lines)
+    _write(options.out / ROWS, as_csv(comparison))
+    _write(options.out / PAGE, as_markdown(plan, comparison, lines))
+    names = [STORE, ROWS, PAGE]
+    if comparison.rows:
+        # Drawing takes a while to import, for which the other subcommands need not wait.
+        from ..tradeoff.figure import draw_tradeoff
+
+        names += [path.name for path in draw_tradeoff(comparison, options.out / FIGURE)]
+    print(f"written: {', '.join(names)} in {options.out}")
+    return 1 if failed else 0
+
+
+def _run_all(
+    plan: Plan, out: Path, timeout: float | None
+) -> tuple[list[tuple[Run, Result]], list[str], bool]:
+    """Run what has no result yet, one run at a time, and write all results to one file.
+
+    Returns the results, one line for each run without one, and whether any has failed.
+    """
+    runs = runs_of(plan)
+    failed: dict[str, str] = {}
+    elsewhere: list[str] = []
+    results: list[tuple[Run, Result]] = []
+    stored = []
+    for ranks in plan.ranks:
+        chosen = [one for one in runs if one.configuration.ranks == ranks]
+        folder = Folder(out / f"ranks-{ranks}")
+        cases = tuple(one.case for one in chosen)
+        study = Study(folder.root.name, TITLE, command_line(plan), cases, OUTPUTS)
+        with Display(len(cases)) as display:
+            # Runs beside each other would take each other's time.
+            limits = Options(at_once=1, ranks=ranks, timeout=timeout)
+            outcome = run_study(study, cases, folder, limits, display)
+        print_outcome(study, outcome)
+        failed |= outcome.failed
+        elsewhere += outcome.elsewhere
+        results += [
+            (one, read_result(folder.result(study, one.case)))
+            for one in chosen
+            if folder.is_measured(study, one.case)
+        ]
+        stored.append(gather_results(study, folder))
+    write_studies(out / STORE, stored)
+    left_out = [f"left out: {name}: {reason}" for name, reason in failed.items()]
+    left_out += [f"left out: {name}: somebody else runs it" for name in elsewhere]
+    return results, left_out, bool(failed)
+
+
+def _write(path: Path, text: str) -> None:
+    with whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -1,0 +1,207 @@
+"""One run measured and drawn, as a user looks at it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lammps_inelastic.analysis import (
+    AnalysisError,
+    ContactCounts,
+    CoordinationNumber,
+    PackingMeasurement,
+    ParticleDump,
+    ParticleFrame,
+    PictureError,
+    RunFiles,
+    UnfinishedRunError,
+    contact_counts,
+    contacts_by_distance,
+    measure_packing,
+    open_run,
+    particles_inside,
+    read_run_log,
+)
+
+from .finished import LOG, unchanged
+from .pictures import draw_frame
+
+PICTURE = "packing.png"
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """The numbers of a run. A particle is a body, or a free sphere.
+
+    Attributes
+    ----------
+    dump : path of the particle dump
+    contact_dump : path of the contact dump; None where contacts are counted by distance
+    contact_gap : gap below which two spheres are in contact, length; None where contacts are those
+        of the contact dump, which carry a force
+    frame : last particle frame, on which everything but the contacts is measured
+    box : (3, 2), where the packing fraction and the coordination number are measured, length
+    seed : seed of the random points
+    packing : numbers of the packing, as studies measure them
+    coordination : coordination number of the particles in the box, over all contact frames
+    contact_steps : first and last step of the contact frames
+    walls_known : whether contacts with walls are counted
+    wall_contacts_in_all : contacts of all particles with walls, mean over the contact frames
+    picture : path of the picture; None if there is none
+    failure : reason why there is no picture; None if there is one, or none was asked for
+    """
+
+    dump: Path
+    contact_dump: Path | None
+    contact_gap: float | None
+    frame: ParticleFrame
+    box: FloatArray
+    seed: int
+    packing: PackingMeasurement
+    coordination: CoordinationNumber
+    contact_steps: tuple[int, int]
+    walls_known: bool
+    wall_contacts_in_all: float
+    picture: Path | None
+    failure: PictureError | None
+
+    @property
+    def smallest_radius(self) -> float:
+        """The smallest radius of a sphere, length."""
+        return float(self.frame.radii.min())
+
+
+def look_at(
+    dump: Path,
+    contact_dump: Path,
+    box: FloatArray,
+    *,
+    contact_gap: float | None,
+    radius: float | None,
+    points: int,
+    seed: int,
+    container: FloatArray | None,
+    box_is_container: bool,
+    picture: Path | None,
+) -> Look:
+    """Measure the last frame of a run and its contacts, and draw it.
+
+    Parameters
+    ----------
+    dump : path of the particle dump
+    contact_dump : path of the contact dump
+    box : (3, 2), where the packing fraction and the coordination number are measured, length
+    contact_gap : gap below which two spheres are in contact, smallest radii; None to read the
+        contact dump
+    radius : radius of all spheres, for a dump without radii, length
+    points : number of random points for the packing fraction
+    seed : seed of these points
+    container : (3, 2), box whose faces are the walls, length; None for the dump's, if its faces are
+        fixed
+    box_is_container : whether the faces of the dump's box are walls even if they are not fixed
+    picture : path of the picture; None draws none
+
+    Raises AnalysisError with one line. A picture that cannot be drawn is told by `Look.failure`:
+    the numbers do not need it.
+    """
+    particle_dump = ParticleDump(dump, radius=radius)
+    if contact_gap is None and not contact_dump.exists():
+        raise AnalysisError(
+            f"{contact_dump}: no such file; --contact-gap GAP counts contacts by distance"
+        )
+    files = _files(particle_dump, contact_dump if contact_gap is None else None)
+    frame = particle_dump[-1]
+    _check_frame(dump, frame, box)
+    walls = container
+    if walls is None and (box_is_container or all(flags == "ff" for flags in frame.boundaries)):
+        walls = frame.box
+    gap = None if contact_gap is None else contact_gap * float(frame.radii.min())
+    steps, counts = _count_contacts(files, frame, gap, walls)
+    failure = None if picture is None else _draw(picture, frame, walls, counts[-1])
+    packing = measure_packing(frame, counts, box, points=points, seed=seed, walls=walls)
+    if packing.coordination is None:
+        raise AnalysisError(f"{contact_dump}: at least one frame of contacts is needed")
+    return Look(
+        dump=dump,
+        contact_dump=contact_dump if gap is None else None,
+        contact_gap=gap,
+        frame=frame,
+        box=box,
+        seed=seed,
+        packing=packing,
+        coordination=packing.coordination,
+        contact_steps=(steps[0], steps[-1]),
+        walls_known=gap is None or walls is not None,
+        wall_contacts_in_all=float(np.mean([count.walls.sum() for count in counts])),
+        picture=picture if failure is None else None,
+        failure=failure,
+    )
+
+
+def _draw(
+    path: Path, frame: ParticleFrame, walls: FloatArray | None, contacts: ContactCounts
+) -> PictureError | None:
+    """Draw the packing, coloured by contacts; return why that is not possible, None if it is."""
+    container = frame.box if walls is None else walls
+    try:
+        draw_frame(path, frame, container, contacts.particles[frame.particles.index])
+    except PictureError as error:
+        return error
+    return None
+
+
+def _files(particles: ParticleDump, contacts: Path | None) -> RunFiles:
+    """Open the files of a run, which must belong together, as far as there is a log to tell."""
+    folder = particles.path.parent
+    log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
+    try:
+        # By distance, contacts are those of one frame, whatever comes after it.
+        files = open_run(particles, contacts, log, over=contacts is not None)
+    except UnfinishedRunError as error:
+        raise AnalysisError(
+            f"{error}; --contact-gap GAP counts contacts in the last frame that is there"
+        ) from None
+    files.check_last(particles[-1])
+    unchanged(folder)
+    return files
+
+
+def _check_frame(dump: Path, frame: ParticleFrame, box: FloatArray) -> None:
+    """Raise AnalysisError for a periodic box, and where no particle is in the measuring box."""
+    if any("p" in flags for flags in frame.boundaries):
+        raise AnalysisError(
+            f"{dump}: the box is periodic ({' '.join(frame.boundaries)}), and "
+            "overlaps across its faces are not looked for yet"
+        )
+    if not particles_inside(frame.particles.centres(frame.positions), box).any():
+        raise AnalysisError(
+            f"{dump}: no particle's centre lies in the box {as_ranges(box)} "
+            f"at step {frame.step}; choose another with --box"
+        )
+
+
+def _count_contacts(
+    files: RunFiles, frame: ParticleFrame, gap: float | None, walls: FloatArray | None
+) -> tuple[list[int], list[ContactCounts]]:
+    """Count contacts by distance or in every contact frame; return the frames' steps, too."""
+    particles = frame.particles
+    if gap is not None:
+        near = contacts_by_distance(frame.positions, frame.radii, gap, particles, walls)
+        return [frame.step], [contact_counts(near.ids(frame.ids), frame.ids, particles)]
+    steps, counts = [], []
+    for contacts in files.contact_frames(frame):
+        steps.append(contacts.step)
+        counts.append(contact_counts(contacts.ids, frame.ids, particles))
+    return steps, counts
+
+
+def as_ranges(box: FloatArray) -> str:
+    """Write a box, (3, 2), as the range of each axis."""
+    return ", ".join(
+        f"{axis} {low:g} to {high:g}" for axis, (low, high) in zip("xyz", box.tolist(), strict=True)
+    )

@@ -1,0 +1,39 @@
+"""The files of a report: its page, its figures, and the numbers of these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from .files import whole
+
+
+def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None:
+    """Write a report, and print where it is.
+
+    Parameters
+    ----------
+    files : HDF5 files of studies
+    out : HTML file to write
+    figures : folder for the figures and their numbers; None writes none
+    """
+    # Drawing takes a while to import, for which the other subcommands need not wait.
+    from .report import all_sections, read_data, render
+    from .report.figures import Figure, Pictures
+    from .report.page import summarise
+
+    data = read_data(files)
+    sections = all_sections(data, [path.name for path in files])
+    text = render(data, sections)
+    with whole(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    summary = summarise(sections)
+    if summary is not None:
+        print(f"{summary.large} of {summary.compared} differences are above two standard errors")
+    if figures is not None:
+        figures.mkdir(parents=True, exist_ok=True)
+        drawn = [b for one in sections for b in one.blocks if isinstance(b, Figure | Pictures)]
+        for figure in drawn:
+            figure.write(figures)
+        print(f"{len(drawn)} figures: {figures}")
+    print(f"written: {out}")

@@ -1,0 +1,62 @@
+"""The cases of a study run, its results gathered in one file, and what became of them printed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .folder import Folder
+from .gather import gather_results
+from .launch import Options, Outcome, run_study
+from .progress import Display
+from .store import write_studies
+from .study import Case, Study
+
+
+def run_and_gather(
+    study: Study,
+    cases: Sequence[Case],
+    folder: Folder,
+    options: Options,
+    *,
+    in_job: bool = False,
+) -> Outcome:
+    """Run the cases of a study, gather its results, and print what became of them.
+
+    Parameters
+    ----------
+    study : study whose results are gathered
+    cases : cases of the study that are run
+    folder : folder in which studies run
+    options : options with which the cases are run
+    in_job : whether the ranks of an MPI job, each of which calls this, run them
+    """
+    first = True
+    with Display(None if in_job else len(cases)) as display:
+        if in_job:
+            from mpi4py import MPI
+
+            from .mpi_route import run_in_job
+
+            first = MPI.COMM_WORLD.rank == 0
+            outcome = run_in_job(study, cases, folder, options, display)
+        else:
+            outcome = run_study(study, cases, folder, options, display)
+    if first:
+        print_outcome(study, outcome)
+        file = folder.root / f"{study.name}.h5"
+        write_studies(file, [gather_results(study, folder)])
+        print(f"results: {file}")
+    return outcome
+
+
+def print_outcome(study: Study, outcome: Outcome) -> None:
+    """Print what became of a study's cases, and why some failed."""
+    parts = [
+        (len(outcome.measured), "done"),
+        (len(outcome.kept), "there before"),
+        (len(outcome.elsewhere), "run by somebody else"),
+        (len(outcome.failed), "failed"),
+    ]
+    print(f"{study.name}: " + (", ".join(f"{n} {what}" for n, what in parts if n) or "nothing"))
+    for name, reason in outcome.failed.items():
+        print(f"  failed: {name}: {reason}")

@@ -1,0 +1,23 @@
+"""Studies: from a TOML file to its cases, all of it checked before anything runs."""
+
+from .case import INPUTS, Case, Input, Stage, Study, is_word, stage_of
+from .file_format import PAPER_BOX, Outputs, ProfileOutput
+from .stages import steps_of
+from .study_file import read_study
+from .values import MOST_CASES
+
+__all__ = [
+    "INPUTS",
+    "MOST_CASES",
+    "PAPER_BOX",
+    "Case",
+    "Input",
+    "Outputs",
+    "ProfileOutput",
+    "Stage",
+    "Study",
+    "is_word",
+    "read_study",
+    "stage_of",
+    "steps_of",
+]

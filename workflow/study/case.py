@@ -1,0 +1,209 @@
+"""A case of a study: decks that run in turn, and a value for each of their variables."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..decks import OUT, PACKING, Deck, Value
+from ..files import digest_of
+from .file_format import Outputs
+
+LONGEST_NAME = 160
+# The files that decks read have a folder of their own in a case's, so that they may have any name.
+INPUTS = "inputs"
+# The name of a case shows these variables even at their defaults, and others where they differ.
+ALWAYS_SHOWN = ("particles", "aspect_ratio", "change", "seed")
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file that a deck reads.
+
+    Attributes
+    ----------
+    path : path of the file
+    digest : hash of its content when the study was read
+    """
+
+    path: Path
+    digest: str
+
+    @classmethod
+    def of(cls, path: Path) -> Input:
+        """Return a file as it is now. Raises OSError if it cannot be read."""
+        return cls(path, digest_of(path))
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One deck of a case and the values of its variables.
+
+    Attributes
+    ----------
+    deck : the deck
+    values : variables that are not left at their defaults, with their values
+    """
+
+    deck: Deck
+    values: Mapping[str, Value]
+
+    @property
+    def variables(self) -> dict[str, Value]:
+        """All variables of the deck that are a study's to choose, with their values."""
+        return {**self.deck.parameters, **self.values}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run: a deck, or several in turn, with a value for each variable.
+
+    Attributes
+    ----------
+    stages : decks with their values, in the order in which they run
+    inputs : files that the decks read, by the name that they get in the case's folder of inputs
+    """
+
+    stages: tuple[Stage, ...]
+    inputs: Mapping[str, Input]
+
+    @property
+    def variables(self) -> dict[str, Value]:
+        """The variables of all stages with their values."""
+        return {name: v for stage in self.stages for name, v in stage.variables.items()}
+
+    @property
+    def deck(self) -> str:
+        """Names of the decks, joined by +."""
+        return "+".join(stage.deck.name for stage in self.stages)
+
+    @cached_property
+    def name(self) -> str:
+        """The name of the case's folder: what tells it from others, and a hash of all that is set.
+
+        It depends on nothing else in the study, so that a study can be extended.
+        """
+        shown = {
+            name: value
+            for stage in self.stages
+            for name, value in stage.variables.items()
+            if name in stage.values or name in ALWAYS_SHOWN
+        }
+        words = [self.deck, *(f"{name}={_as_word(v)}" for name, v in shown.items())]
+        # Defaults are left out, as a deck may get a new variable; `is_of` sees when one changes.
+        identity = {
+            "stages": [
+                [stage.deck.name, dict(stage.values)]
+                + ([] if stage.deck.shipped else [stage.deck.fingerprint])
+                for stage in self.stages
+            ],
+            "inputs": {name: file.digest for name, file in self.inputs.items()},
+        }
+        text = json.dumps(identity, sort_keys=True)
+        digest = hashlib.sha256(text.encode()).hexdigest()[:8]
+        readable = re.sub(r"[^\w.=+-]", "-", "_".join(words), flags=re.ASCII)
+        return f"{readable[:LONGEST_NAME]}_{digest}"
+
+    @property
+    def fingerprint(self) -> str:
+        """A hash of what the decks do: another one means that a result is of another deck."""
+        return "+".join(stage.deck.fingerprint for stage in self.stages)
+
+    def is_of(self, record: Any) -> bool:
+        """Say whether a run was made with the values of this case, as far as it had the variables.
+
+        Parameters
+        ----------
+        record : record of the run, from `provenance.run_record`; anything else is of no case
+        """
+        try:
+            made = [dict(stage["variables"]) for stage in record["stages"]]
+        except (KeyError, TypeError, ValueError):
+            return False
+        if len(made) != len(self.stages):
+            return False
+        return all(
+            name not in before or before[name] == value
+            for before, stage in zip(made, self.stages, strict=True)
+            for name, value in stage.variables.items()
+        )
+
+    def folder_of(self, stage: Stage) -> str:
+        """Return the folder of a stage, seen from the case's; the last stage writes into that."""
+        return "." if stage is self.stages[-1] else stage.deck.name
+
+    def commands(self, ranks: int = 1) -> list[list[str]]:
+        """Return the commands that run the stages in the case's folder.
+
+        The output is not buffered, so that one can see how far a run has come.
+        """
+        commands = []
+        before = None
+        for stage in self.stages:
+            out = self.folder_of(stage)
+            values = dict(stage.values)
+            if takes_out(stage.deck):
+                values[OUT] = out
+            if before is not None and PACKING in stage.deck.variables:
+                values[PACKING] = f"{before}/packing.restart"
+            command = ["lmp", "-nonbuf", "-in", f"{stage.deck.name}.in"]
+            for name, value in values.items():
+                command += ["-var", name, _as_word(value)]
+            if ranks > 1:
+                command = ["mpiexec", "-bind-to", "core", "-n", str(ranks), *command]
+            commands.append(command)
+            before = out
+        return commands
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: its cases, and what is measured of each.
+
+    Attributes
+    ----------
+    name : name of its file, without `.toml`
+    title : title in words
+    text : text of the whole file
+    cases : cases, no two of them the same
+    outputs : measurements that are made of each case
+    """
+
+    name: str
+    title: str
+    text: str
+    cases: tuple[Case, ...]
+    outputs: Outputs
+
+
+def stage_of(deck: Deck, values: Mapping[str, Value]) -> Stage:
+    """Return a deck with those of the values that it knows and that are not its defaults."""
+    return Stage(
+        deck,
+        {
+            name: values[name]
+            for name, default in deck.parameters.items()
+            if name in values and values[name] != default
+        },
+    )
+
+
+def takes_out(deck: Deck) -> bool:
+    """Say whether `-var out FOLDER` may be given: LAMMPS refuses it if the deck has another out."""
+    own = r"^[^#\n]*\bvariable\s+out\s+(?!\s|index\b)"
+    return not re.search(own, deck.text, re.MULTILINE)
+
+
+def is_word(text: str) -> bool:
+    """Say whether LAMMPS takes a text as one word wherever a deck may put it."""
+    return text.isprintable() and not re.search(r"[\s$\"'&]|^$", text)
+
+
+def _as_word(value: Value) -> str:
+    return value if isinstance(value, str) else repr(value)

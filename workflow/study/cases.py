@@ -1,0 +1,160 @@
+"""The cases of a study: all combinations of the values of its parameters, row by row."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..decks import Deck, Value, file_of, find_deck
+from ..errors import WorkflowError
+from ..files import is_file, read_regular
+from ..shipped import DECKS
+from .case import INPUTS, Case, Input, is_word, stage_of
+from .file_format import StudyFile
+from .stages import misfit
+from .values import MOST_CASES, values_of
+
+# A larger deck is some other file [bytes].
+LARGEST_DECK = 1_000_000
+# A case's folder holds these files beside decks: no folder of a stage may have such a name.
+OWN_FILES = (
+    *(INPUTS, "finished.json", "failed.json", "log.lammps", "lmp.out", "screen.out", "measure.out"),
+    *("particles.lammpsdump", "contacts.lammpsdump", "packing.restart"),
+    *("dimer.json", "tetrahedron.json"),
+)
+
+
+def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Case]:
+    """Return the cases of a study file, each once, as long as there are no mistakes.
+
+    Parameters
+    ----------
+    file : all of the study file
+    folder : folder of the study file, from which it names decks and other files
+    mistakes : list to which one line for each mistake is added
+    """
+    known: set[str] = set()
+    seen: set[str] = set()
+    files: dict[Path, Input] = {}
+    missing = False
+    rows = file.rows or [{}]
+    for number, row in enumerate(rows, 1):
+        where = f"rows[{number}]" if file.rows else "parameters"
+        own = {name: value for name, value in row.items() if name != "deck"}
+        try:
+            decks = _decks(row.get("deck", file.deck), folder)
+        except WorkflowError as error:
+            mistakes.append(f"{f'{where}.deck' if 'deck' in row else 'deck'}: {error}")
+            missing = True
+            continue
+        parameters = {name: p for deck in decks for name, p in deck.parameters.items()}
+        known |= set(parameters)
+        for name in own:
+            if name in parameters:
+                continue
+            mistakes.append(_unknown(f"{where}.{name}", decks))
+        wanted = {f"parameters.{name}": (name, v) for name, v in file.parameters.items()}
+        wanted = {key: pair for key, pair in wanted.items() if pair[0] not in own}
+        wanted |= {f"{where}.{name}": (name, v) for name, v in own.items()}
+        choices: dict[str, list[Value]] = {}
+        for key, (name, value) in wanted.items():
+            if name in parameters:
+                choices[name] = values_of(key, name, value, decks, folder, mistakes)
+        if math.prod(len(values) for values in choices.values()) > MOST_CASES:
+            mistakes.append(f"{where}: more than {MOST_CASES} cases")
+        if mistakes:
+            continue
+        keys = {name: key for key, (name, _) in wanted.items()}
+        keys["deck"] = f"{where}.deck" if "deck" in row else "deck"
+        for combination in itertools.product(*choices.values()):
+            try:
+                case = _case(decks, dict(zip(choices, combination, strict=True)), folder, files)
+            except WorkflowError as error:
+                mistakes.append(f"{where}: {error}")
+                break
+            if wrong := misfit(case.stages):
+                mistakes.append(f"{keys.get(wrong[0], keys['deck'])}: {wrong[1]}")
+            elif case.name not in seen:
+                seen.add(case.name)
+                yield case
+    if missing:
+        # The variables of a deck that was not found are not known.
+        return
+    for name in file.parameters:
+        if name not in known:
+            mistakes.append(_unknown(f"parameters.{name}", _all_decks(file, folder)))
+
+
+def _decks(name: Any, folder: Path) -> list[Deck]:
+    """Return the decks that a study file names, which must be able to run in one folder."""
+    names = name if isinstance(name, list) else [name]
+    if not names or not all(isinstance(each, str) for each in names):
+        raise WorkflowError(f"a deck is a name, or a list of names, not {name!r}")
+    decks = []
+    for each in names:
+        path = folder / each
+        if each not in DECKS and is_file(path):
+            # A file that is too large, or a pipe, is refused before all of it is read.
+            read_regular(path, LARGEST_DECK)
+        decks.append(find_deck(each, folder))
+        if not is_word(decks[-1].name) or decks[-1].name.startswith("."):
+            raise WorkflowError(
+                f"{each!r}: a deck's name must be one word without quotes, $ and &, that does not "
+                "begin with a dot"
+            )
+    # Each deck writes to a folder of its name.
+    if len({deck.name for deck in decks}) < len(decks):
+        raise WorkflowError(f"{names!r} names a deck twice; each may be there once")
+    if len(decks) > 1:
+        for deck in decks:
+            if deck.name in (*OWN_FILES, *(f"{other.name}.in" for other in decks)):
+                raise WorkflowError(
+                    f"{deck.name}.in: the folder of this deck would be named as a file of the "
+                    "case; rename the deck"
+                )
+    return decks
+
+
+def _all_decks(file: StudyFile, folder: Path) -> list[Deck]:
+    """Return the decks of all rows, each once; those that cannot be read are left out."""
+    decks: dict[str, Deck] = {}
+    for row in file.rows or [{}]:
+        try:
+            decks |= {deck.name: deck for deck in _decks(row.get("deck", file.deck), folder)}
+        except WorkflowError:
+            continue
+    return list(decks.values())
+
+
+def _unknown(key: str, decks: Sequence[Deck]) -> str:
+    """Say that no deck has a variable of the name that a key gives."""
+    if not decks:
+        return f"{key}: no deck knows it"
+    allowed = "; ".join(f"{deck.name}: {', '.join(deck.parameters) or 'none'}" for deck in decks)
+    return f"{key}: no variable of that name; allowed are {allowed}"
+
+
+def _case(
+    decks: Sequence[Deck], values: dict[str, Value], folder: Path, files: dict[Path, Input]
+) -> Case:
+    """Return a case; `files` holds those that have been read, so that each is read once.
+
+    Raises WorkflowError if a file cannot be read, or if two have the same name.
+    """
+    inputs: dict[str, Input] = {}
+    for name in values:
+        path = file_of(decks, name, values[name], folder)
+        if path is None:
+            continue
+        if path not in files:
+            try:
+                files[path] = Input.of(path)
+            except OSError as error:
+                raise WorkflowError(f"{path}: {error.strerror}") from None
+        if inputs.setdefault(path.name, files[path]) != files[path]:
+            raise WorkflowError(f"two files are named {path.name}; rename one of them")
+        values[name] = f"{INPUTS}/{path.name}"
+    return Case(tuple(stage_of(deck, values) for deck in decks), inputs)

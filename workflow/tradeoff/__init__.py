@@ -1,0 +1,1 @@
+"""Time against accuracy: hard contacts beside LAMMPS's soft ones, from the same starts."""

@@ -1,0 +1,204 @@
+"""The results of a comparison of time and accuracy, configuration by configuration.
+
+The right packing is not known, so each run is compared with the tightest hard one from the same
+start, the reference. Trajectories are chaotic: two runs from one start end in different packings
+with the same statistics. An error therefore means little by itself; it counts where it is above the
+scatter between starts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lammps_inelastic.analysis import network_difference
+
+from ..store import Result
+from .plan import Configuration, Run
+
+FloatArray = NDArray[np.float64]
+
+# These numbers of a result are compared, by their names in the schema.
+MEASURED = (
+    "plateau_time",
+    "plateau_seconds",
+    "settling_seconds",
+    "steps",
+    "plateau_iterations",
+    "iterations",
+    "overlap_at_rest",
+    "overlap_falling",
+    "complementarity_at_rest",
+    "drift",
+    "packing_fraction",
+    "coordination_number",
+)
+# These are computed from them and the reference's.
+COMPARED = ("packing_fraction_error", "coordination_number_error", "network_error", "shared")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The numbers that came out of one run.
+
+    Attributes
+    ----------
+    run : the run
+    numbers : numbers by the names of MEASURED and COMPARED; NaN where there is none
+    """
+
+    run: Run
+    numbers: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Row:
+    """The outcomes of a configuration from all starts.
+
+    Attributes
+    ----------
+    configuration : the configuration
+    outcomes : outcome of each start
+    slower : times that soft contacts of the same tolerance took to come to rest, over the times of
+        these hard ones, for each start that both have; empty for soft contacts
+    """
+
+    configuration: Configuration
+    outcomes: Sequence[Outcome]
+    slower: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def values(self, name: str) -> FloatArray:
+        """Return a number from each start that has it."""
+        return _finite(outcome.numbers[name] for outcome in self.outcomes)
+
+    @property
+    def all_at_rest(self) -> bool:
+        """True if the configuration came to rest from all starts."""
+        return len(self.values("plateau_seconds")) == len(self.outcomes)
+
+    def median(self, name: str) -> float:
+        """Return the median over the starts; NaN if none has the number."""
+        values = self.values(name)
+        return float(np.median(values)) if len(values) else math.nan
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All configurations side by side.
+
+    Attributes
+    ----------
+    rows : row of each configuration of which anything came out
+    """
+
+    rows: Sequence[Row]
+
+    def reference(self, ranks: int | None = None) -> Row | None:
+        """Return the row that those of so many ranks are compared with; None if there is none.
+
+        Without a number of ranks, that of the first row is taken.
+        """
+        if ranks is None:
+            ranks = self.rows[0].configuration.ranks if self.rows else 1
+        wanted = reference_of((row.configuration for row in self.rows), ranks)
+        return next((row for row in self.rows if row.configuration == wanted), None)
+
+    def scatter(self, name: str) -> float:
+        """Return the standard deviation of a number between the starts at the reference.
+
+        NaN where there are fewer than two starts.
+        """
+        row = self.reference()
+        values = np.empty(0) if row is None else row.values(name)
+        return float(values.std(ddof=1)) if len(values) > 1 else math.nan
+
+    def shifts(self, row: Row, name: str) -> FloatArray:
+        """Return a number less the reference's, one a start that both have."""
+        reference = self.reference(row.configuration.ranks)
+        if reference is None:
+            return np.empty(0)
+        known = {one.run.start: one.numbers[name] for one in reference.outcomes}
+        return _finite(
+            one.numbers[name] - known.get(one.run.start, math.nan) for one in row.outcomes
+        )
+
+
+def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
+    """Compare all runs of which there is a result with the reference's from the same start.
+
+    The same start on another number of ranks is another one: its spheres have other numbers.
+    """
+    configurations = list(dict.fromkeys(run.configuration for run, _ in results))
+    references = {
+        (run.configuration.ranks, run.start): result
+        for run, result in results
+        if run.configuration == reference_of(configurations, run.configuration.ranks)
+    }
+    outcomes = [
+        Outcome(run, _numbers(result, references.get((run.configuration.ranks, run.start))))
+        for run, result in results
+    ]
+    grouped = {
+        configuration: [one for one in outcomes if one.run.configuration == configuration]
+        for configuration in configurations
+    }
+    rows = []
+    for configuration, group in grouped.items():
+        soft = next((other for other in grouped if _matches(configuration, other)), None)
+        slower = np.empty(0) if soft is None else _ratios(grouped[soft], group)
+        rows.append(Row(configuration, group, slower))
+    return Comparison(rows)
+
+
+def reference_of(configurations: Iterable[Configuration], ranks: int) -> Configuration | None:
+    """Return the tightest hard configuration on so many ranks; None if there is none.
+
+    If there are several, it is the one with the shortest time step, and the first of these.
+    """
+    hard = [one for one in configurations if (one.contacts, one.ranks) == ("hard", ranks)]
+    return min(hard, key=lambda one: (one.tolerance, one.dt), default=None)
+
+
+def _matches(hard: Configuration, soft: Configuration) -> bool:
+    return (
+        (hard.contacts, soft.contacts) == ("hard", "soft")
+        and math.isclose(hard.tolerance, soft.tolerance)
+        and hard.ranks == soft.ranks
+    )
+
+
+def _ratios(above: Sequence[Outcome], below: Sequence[Outcome]) -> FloatArray:
+    """Return the ratios of the times to rest, one a start that came to rest in both."""
+    known = {one.run.start: one.numbers["plateau_seconds"] for one in below}
+    return _finite(
+        one.numbers["plateau_seconds"] / known.get(one.run.start, math.nan) for one in above
+    )
+
+
+def _finite(values: Iterable[float]) -> FloatArray:
+    """Return numbers without those that are NaN or infinite."""
+    return np.array([value for value in values if math.isfinite(value)], dtype=np.float64)
+
+
+def _numbers(result: Result, reference: Result | None) -> dict[str, float]:
+    numbers = {name: result.number(name) for name in MEASURED}
+    numbers |= dict.fromkeys(COMPARED, math.nan)
+    # A packing that still moves has no error to speak of: its last moment is one of many.
+    if reference is None or reference is result or math.isnan(numbers["plateau_time"]):
+        return numbers
+    for name in ("packing_fraction", "coordination_number"):
+        numbers[f"{name}_error"] = abs(numbers[name] - reference.number(name))
+    networks = [
+        one.values[name]
+        for one in (result, reference)
+        for name in ("network/ids", "network/forces")
+    ]
+    # A packing without contacts has no network.
+    if len(networks[0]) and len(networks[2]):
+        apart = network_difference(*networks)
+        numbers |= {"network_error": apart.forces, "shared": apart.shared}
+    return numbers

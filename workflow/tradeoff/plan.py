@@ -1,0 +1,158 @@
+"""The plan of a comparison of time and accuracy: its configurations, and the runs that show them.
+
+Every configuration (hard or soft contacts, a tolerance, and for hard ones a solver and a time
+step) lets the same starts settle.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Literal
+
+from ..decks import Value, find_deck
+from ..shipped import SETTLING
+from ..study import INPUTS, Case, Input, stage_of
+
+# The deck that makes a start does nothing else: its phases have no steps.
+NO_STEPS: Mapping[str, Value] = {
+    "steps_agitated": 0,
+    "steps_settling": 0,
+    "steps_tightening": 0,
+    "steps_measuring": 0,
+}
+# This word in the place of a list leaves soft contacts out.
+NONE = "none"
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One way to let a start settle.
+
+    Attributes
+    ----------
+    contacts : hard or soft
+    tolerance : largest overlap, radii; soft contacts keep it at rest only, and about
+    solver : solver of hard contacts; None for soft ones
+    dt : longest time step of hard contacts, time; None for soft ones
+    ranks : number of MPI ranks
+    """
+
+    contacts: Literal["hard", "soft"]
+    tolerance: float
+    solver: str | None
+    dt: float | None
+    ranks: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A plan of what is to be run.
+
+    Attributes
+    ----------
+    particle : spheres or dimers
+    values : variables of the decks that all runs share
+    starts : seeds of random starts, or data files
+    tolerances : tolerances of hard contacts, radii
+    soft_tolerances : tolerances of soft contacts, radii; an empty list leaves them out
+    dts : time steps of hard contacts, time
+    solvers : solvers of hard contacts
+    ranks : numbers of MPI ranks; everything is run with each of them
+    """
+
+    particle: str
+    values: Mapping[str, Value]
+    starts: Sequence[int | Path]
+    tolerances: Sequence[float]
+    soft_tolerances: Sequence[float]
+    dts: Sequence[float]
+    solvers: Sequence[str]
+    ranks: Sequence[int]
+
+    @property
+    def configurations(self) -> list[Configuration]:
+        """The configurations, hard ones first, from the loosest tolerance to the tightest."""
+        tolerances = sorted(self.tolerances, reverse=True)
+        hard = [
+            Configuration("hard", tolerance, solver, dt, ranks)
+            for ranks, solver, dt, tolerance in product(
+                self.ranks, self.solvers, self.dts, tolerances
+            )
+        ]
+        soft = [
+            Configuration("soft", tolerance, None, None, ranks)
+            for ranks, tolerance in product(self.ranks, sorted(self.soft_tolerances, reverse=True))
+        ]
+        return hard + soft
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of one configuration from one start.
+
+    Attributes
+    ----------
+    configuration : how the start settles
+    start : seed or name of the data file
+    case : case that is run
+    """
+
+    configuration: Configuration
+    start: str
+    case: Case
+
+
+def runs_of(plan: Plan) -> list[Run]:
+    """Return all runs, start by start: what slows a machine for a while slows all configurations.
+
+    All runs from a start are given the very same one: the tolerance, the time step and the solver
+    are the settling's, and the deck that makes the start keeps its defaults.
+    """
+    folder = Path()
+    first, second = find_deck(plan.particle, folder), find_deck(SETTLING, folder)
+    files = {start: Input.of(start) for start in plan.starts if isinstance(start, Path)}
+    runs = []
+    for start, configuration in product(plan.starts, plan.configurations):
+        own: dict[str, Value] = {**NO_STEPS, **plan.values}
+        inputs: dict[str, Input] = {}
+        if isinstance(start, Path):
+            own["start"] = f"{INPUTS}/{start.name}"
+            inputs[start.name] = files[start]
+        else:
+            own["seed"] = start
+        settling: dict[str, Value] = {
+            **plan.values,
+            "particle": plan.particle,
+            "contacts": configuration.contacts,
+            "tolerance": configuration.tolerance,
+        }
+        if configuration.solver is not None and configuration.dt is not None:
+            settling |= {"solver": configuration.solver, "dt": configuration.dt}
+        case = Case((stage_of(first, own), stage_of(second, settling)), inputs)
+        label = start.name if isinstance(start, Path) else str(start)
+        runs.append(Run(configuration, label, case))
+    return runs
+
+
+def command_line(plan: Plan) -> str:
+    """Return the command that asks for a plan."""
+
+    def joined(values: Sequence[object]) -> str:
+        return ",".join(f"{value}" for value in values)
+
+    values = dict(plan.values)
+    words = ["inelastic", "tradeoff", "--particle", plan.particle]
+    words += ["--time", f"{values.pop('time_settling')}"]
+    for name, value in values.items():
+        words += [f"--{name.replace('_', '-')}", f"{value}"]
+    files = [str(start) for start in plan.starts if isinstance(start, Path)]
+    words += ["--start", *files] if files else ["--seeds", str(len(plan.starts))]
+    words += ["--tolerances", joined(plan.tolerances)]
+    words += ["--soft-tolerances", joined(plan.soft_tolerances) or NONE]
+    words += ["--dts", joined(plan.dts), "--solvers", joined(plan.solvers)]
+    words += ["--ranks", joined(plan.ranks)]
+    return shlex.join(words)

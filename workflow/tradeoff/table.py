@@ -1,0 +1,146 @@
+"""The table of a comparison of time and accuracy: printed, as Markdown, and all numbers as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..wide_table import print_wide
+from .advice import described, ratio_text
+from .comparison import COMPARED, MEASURED, Comparison, Row
+from .plan import Plan, command_line
+
+TITLE = "Time and accuracy of hard and soft contacts"
+MISSING = "-"
+
+
+def _number(form: str, name: str) -> Callable[[Row], str]:
+    """Return a function that writes the median of a number."""
+
+    def write(row: Row) -> str:
+        value = row.median(name)
+        return MISSING if math.isnan(value) else f"{value:{form}}"
+
+    return write
+
+
+def _at_rest(row: Row) -> str:
+    return f"{len(row.values('plateau_time'))} of {len(row.outcomes)}"
+
+
+# Each column has a heading, and a function that writes a row's cell.
+COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
+    ("contacts", lambda row: row.configuration.contacts),
+    ("solver", lambda row: row.configuration.solver or MISSING),
+    ("tolerance / r", lambda row: f"{row.configuration.tolerance:g}"),
+    ("dt", lambda row: MISSING if row.configuration.dt is None else f"{row.configuration.dt:g}"),
+    ("ranks", lambda row: str(row.configuration.ranks)),
+    ("at rest", _at_rest),
+    ("overlap / r", _number(".2g", "overlap_at_rest")),
+    ("falling", _number(".2g", "overlap_falling")),
+    ("seconds", _number(".3g", "plateau_seconds")),
+    ("time", _number(".2f", "plateau_time")),
+    ("error of phi", _number(".4f", "packing_fraction_error")),
+    ("of z", _number(".3f", "coordination_number_error")),
+    ("of network", _number(".2f", "network_error")),
+    ("complementarity / r", _number(".2g", "complementarity_at_rest")),
+    ("drift", _number(".1e", "drift")),
+    ("soft/hard time", lambda row: ratio_text(row.slower) if len(row.slower) else MISSING),
+)
+LEGEND = (
+    "Medians over the starts. At rest: starts that came to rest within the run; the others have no "
+    "time and no errors. Overlap: largest at rest, and before. Seconds: wall time until at rest; "
+    "time: simulated. Errors: difference to the reference from the same start, of packing "
+    "fraction (phi), contacts per particle (z) and contact forces (0: the same network, 2: no "
+    "contact in common). Complementarity: largest gap under a force. Drift: of the centre of mass "
+    "at the end, diameters per time."
+)
+
+
+def _heading(comparison: Comparison) -> list[str]:
+    """Return what the errors are compared with, and from where on they mean something."""
+    reference = comparison.reference()
+    if reference is None:
+        return []
+    one = reference.configuration
+    line = f"Reference: hard contacts, {one.solver}, {one.tolerance:g} r, dt {one.dt:g}."
+    scatter = [comparison.scatter(name) for name in ("packing_fraction", "coordination_number")]
+    if not math.isnan(scatter[0]):
+        line += (
+            f" Its scatter between starts (standard deviation): phi {scatter[0]:.4f}, "
+            f"z {scatter[1]:.3f}."
+        )
+    return [line]
+
+
+def never_at_rest(comparison: Comparison) -> list[str]:
+    """Return one line for each configuration with runs that did not come to rest."""
+    lines = []
+    for row in comparison.rows:
+        moving = [one for one in row.outcomes if math.isnan(one.numbers["plateau_time"])]
+        if moving:
+            one = row.configuration
+            drift = max(each.numbers["drift"] for each in moving)
+            lines.append(
+                f"never at rest: {one.contacts}, {described(one, comparison)}, start "
+                f"{', '.join(each.run.start for each in moving)} (drift at the end {drift:.1e}; a "
+                "longer --time helps if the packing still sinks, not if it is shaken)"
+            )
+    return lines
+
+
+def print_comparison(comparison: Comparison, lines: Sequence[str]) -> None:
+    """Print the table, what its columns mean, and more lines."""
+    console = Console(highlight=False)
+    if comparison.rows:
+        table = Table(box=None, pad_edge=False)
+        for number, (head, _) in enumerate(COLUMNS):
+            table.add_column(head, justify="left" if number < 2 else "right", no_wrap=True)
+        for row in comparison.rows:
+            table.add_row(*(Text(write(row)) for _, write in COLUMNS))
+        print_wide(table)
+        lines = [*_heading(comparison), LEGEND, *lines]
+    for line in lines:
+        console.print(line, markup=False, soft_wrap=not console.is_terminal)
+
+
+def as_markdown(plan: Plan, comparison: Comparison, lines: Sequence[str]) -> str:
+    """Return the table and more lines as a page of Markdown."""
+    head = [name for name, _ in COLUMNS]
+    rows = [[write(row) for _, write in COLUMNS] for row in comparison.rows]
+    table = [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+    parts = [
+        f"# {TITLE}",
+        f"`{command_line(plan)}`",
+        "\n".join(table),
+        *_heading(comparison),
+        LEGEND,
+        *lines,
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def as_csv(comparison: Comparison) -> str:
+    """Return all numbers as CSV, one row a run."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    own = ("contacts", "solver", "tolerance", "dt", "ranks")
+    writer.writerow([*own, "start", "case", *MEASURED, *COMPARED])
+    for outcome in (one for row in comparison.rows for one in row.outcomes):
+        described = [getattr(outcome.run.configuration, name) for name in own]
+        numbers = [outcome.numbers[name] for name in (*MEASURED, *COMPARED)]
+        writer.writerow(
+            [
+                *("" if value is None else value for value in described),
+                outcome.run.start,
+                outcome.run.case.name,
+                *("" if math.isnan(value) else repr(value) for value in numbers),
+            ]
+        )
+    return text.getvalue()
