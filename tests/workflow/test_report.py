@@ -23,15 +23,14 @@ from lammps_inelastic.analysis.plots import (
     plot_wall_profile,
 )
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.report.blocks import Comparison, Table, as_short, as_text
+from lammps_inelastic.workflow.report.blocks import Comparison, Table
+from lammps_inelastic.workflow.report.contents import all_sections
 from lammps_inelastic.workflow.report.data import Data, paper_numbers, read_data
 from lammps_inelastic.workflow.report.figures import Figure, Panel, curve
 from lammps_inelastic.workflow.report.page import summarise
-from lammps_inelastic.workflow.report.paper import all_sections
 from lammps_inelastic.workflow.report.statistics import (
     Sample,
     Stated,
-    as_value,
     difference_in_errors,
     mean_curve,
     mean_distribution,
@@ -40,6 +39,7 @@ from lammps_inelastic.workflow.report.statistics import (
     root_mean_square_difference,
     sample,
 )
+from lammps_inelastic.workflow.report.text import as_short, as_text, as_value
 from lammps_inelastic.workflow.reproduce_command import STUDIES
 from lammps_inelastic.workflow.store import Result, StoredStudy, write_studies
 

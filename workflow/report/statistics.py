@@ -1,11 +1,11 @@
-"""From the cases of a study to means over seeds, and from two numbers to a difference."""
+"""Means over runs with their scatter, means of curves, and differences in standard errors."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,14 @@ from ..store import Result
 
 FloatArray = NDArray[np.float64]
 Key = TypeVar("Key", bound=Hashable)
+# x, mean y and its standard error, (k,) each; no error of a single curve.
+MeanCurve = tuple[FloatArray, FloatArray, FloatArray | None]
 
-# Parameters that do not change the packing but by chance: cases that differ in these alone are
-# repeats.
-REPEATS = frozenset({"seed", "dump_every"})
 # Samples of fewer values get the scatter of all samples of their kind.
 FEW = 4
-# Above this many standard errors a difference is marked.
-LARGE = 2.0
+# Above this many standard errors a difference is marked. Chance alone makes about this share of all
+# differences so large (Gauss: 4.6 %).
+LARGE, SHARE_ABOVE_LARGE = 2.0, 0.05
 
 
 @dataclass(frozen=True)
@@ -121,80 +121,9 @@ def difference_in_errors(ours: Sample, stated: Stated) -> float:
     return (ours.mean - stated.value) / math.sqrt(sum(squares))
 
 
-def grouped(
-    results: Iterable[Result], key: Callable[[Result], Hashable]
-) -> dict[Any, list[Result]]:
-    """Return the results by a key, in the order in which the keys first appear."""
-    groups: dict[Any, list[Result]] = {}
-    for result in results:
-        groups.setdefault(key(result), []).append(result)
-    return groups
-
-
-def by_variables(names: Sequence[str]) -> Callable[[Result], tuple[Any, ...]]:
-    """Return a key: a result's deck and its values of some variables."""
-    return lambda result: (result.record["deck"], *map(result.variables.get, names))
-
-
-def by_value(name: str) -> Callable[[Result], float]:
-    """Return a key: a result's value of a variable that is a number."""
-    return lambda result: float(result.variables[name])
-
-
-def varying(results: Sequence[Result]) -> list[str]:
-    """Return the parameters, other than repeats, that are not the same in all results."""
-    names = dict.fromkeys(name for result in results for name in result.variables)
-    return [
-        name
-        for name in names
-        if name not in REPEATS and len({result.variables.get(name) for result in results}) > 1
-    ]
-
-
-def as_value(value: object) -> str:
-    """Write a parameter: a number with its own digits, or a word."""
-    if not isinstance(value, int | float):
-        return str(value)
-    # Not 5e-05.
-    small = 0 < abs(value) < 1e-3
-    return f"{value:.10f}".rstrip("0") if small else f"{value:,.10g}"
-
-
-def labelled(results: Sequence[Result]) -> dict[str, list[Result]]:
-    """Return the results of the same parameters together, by what is not the same in all.
-
-    The label names the deck, where there are several, and what varies among the runs of that deck.
-    """
-    decks = grouped(results, lambda result: str(result.record["deck"]))
-    groups: dict[str, list[Result]] = {}
-    for deck, runs in decks.items():
-        names = varying(runs)
-        for (_, *values), group in grouped(runs, by_variables(names)).items():
-            words = [f"{n} = {as_value(v)}" for n, v in zip(names, values, strict=True)]
-            if len(decks) > 1 or not words:
-                words.insert(0, deck)
-            groups[", ".join(words)] = group
-    return groups
-
-
-def matching(results: Iterable[Result], **wanted: float | str) -> list[Result]:
-    """Return the results whose variables have these values, numbers up to round-off."""
-    return [
-        result
-        for result in results
-        if all(_equal(result.variables.get(name), value) for name, value in wanted.items())
-    ]
-
-
-def _equal(value: object, wanted: float | str) -> bool:
-    if isinstance(value, int | float) and isinstance(wanted, int | float):
-        return math.isclose(value, wanted, rel_tol=1e-9)
-    return value == wanted
-
-
 def mean_curve(
     curves: Sequence[tuple[FloatArray, FloatArray]],
-) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+) -> MeanCurve:
     """Return the mean of curves: x, mean y, and its standard error; None of a single curve.
 
     Others than the first are read at the x of the first by linear interpolation, NaN beyond their
