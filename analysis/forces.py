@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .bodies import Particles
-from .coordination import contact_sides
+from .coordination import contact_sides, number_of_particles
 from .errors import InputError
 from .geometry import BoolArray, FloatArray
 from .plots import error_lengths
@@ -61,7 +61,7 @@ def contacts_of(
     """
     sides = contact_sides(contact_ids, sphere_ids, particles)
     mask = np.asarray(chosen, dtype=np.bool_)
-    count = len(np.asarray(sphere_ids)) if particles is None else len(particles)
+    count = number_of_particles(sphere_ids, particles)
     if mask.shape != (count,):
         raise InputError(f"chosen must have shape ({count},), not {mask.shape}")
     at_wall = sides[:, 1] < 0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .bodies import Particles
-from .coordination import ContactCounts, contact_counts, contact_sides
+from .coordination import ContactCounts, contact_counts, contact_sides, number_of_particles
 from .errors import InputError
 from .geometry import BoolArray, IntArray
 
@@ -69,7 +69,7 @@ def backbone(
     """
     contacts = np.asarray(contact_ids, dtype=np.int64)
     sides = contact_sides(contacts, sphere_ids, particles)
-    count = len(np.asarray(sphere_ids)) if particles is None else len(particles)
+    count = number_of_particles(sphere_ids, particles)
     if fewest is None:
         fewest = 4 if particles is None else contacts_to_hold(particles)
     needed = np.asarray(fewest, dtype=np.int64)
