@@ -16,7 +16,7 @@ from .geometry import FloatArray, IntArray, as_positions
 
 @dataclass(frozen=True, eq=False)
 class Particles:
-    """Which spheres make up which particle.
+    """The particles that some spheres make up.
 
     Particles come in the order of their first spheres: where no two spheres belong together,
     particle i is sphere i.
@@ -98,7 +98,7 @@ def group_spheres(bodies: ArrayLike) -> Particles:
 
 def dimer_spheres(particles: Particles) -> tuple[IntArray, IntArray]:
     """Return the indices of the first and of the second sphere of each dimer, both (k,)."""
-    # Ordered by particle, the two spheres of each dimer follow each other.
+    # In the order of the particles, the two spheres of each dimer follow each other.
     order = np.argsort(particles.index, kind="stable")
     pairs = order[particles.sizes[particles.index[order]] == 2].reshape(-1, 2)
     return pairs[:, 0], pairs[:, 1]

@@ -58,6 +58,8 @@ def contacts_of(
     sphere_ids : (n,), ids of the spheres, in any order
     particles : which spheres make up which particle; None: all are free
     walls : whether contacts with walls are among them
+
+    Raises InputError as `contact_sides` does, and for a choice of another shape.
     """
     sides = contact_sides(contact_ids, sphere_ids, particles)
     mask = np.asarray(chosen, dtype=np.bool_)
@@ -81,6 +83,8 @@ def force_distribution(
         frames one after the other, force
     bins : number of bins of the same width, from 0
     largest : upper edge of the last bin, in mean forces
+
+    Raises InputError for forces that are negative, not finite or all 0, and without any bin.
     """
     strength = np.asarray(forces, dtype=np.float64)
     if strength.ndim != 1 or len(strength) == 0:
@@ -106,7 +110,10 @@ def force_distribution(
 def plot_force_distribution(
     ax: Axes, distribution: ForceDistribution, *, label: str | None = None
 ) -> Axes:
-    """Plot P(f / <f>) over f / <f>, on a logarithmic scale; empty bins are left out."""
+    """Plot P(f / <f>) over f / <f>, on a logarithmic scale; empty bins are left out.
+
+    The axes are returned.
+    """
     filled = distribution.density > 0
     density = distribution.density[filled]
     middles = (distribution.edges[:-1] + distribution.edges[1:]) / 2

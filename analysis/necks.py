@@ -59,21 +59,24 @@ def neck_volume(radius: float, distance: float) -> float:
     """
     _check(radius, distance)
     angle = math.asin(min(distance / (4 * radius), 0.5))
-    # sin(b) - b cos(b), without cancellation where the angle is small.
+    # This form of sin(b) - b cos(b) has no cancellation where the angle is small.
     return float(4 * math.pi * radius**3 * angle**2 * spherical_jn(1, angle))
 
 
 def with_scaled_necks(value: float, radius: float, distance: float) -> float:
     """Return the packing fraction of equal dimers scaled as if each was as large as with its neck.
 
-    value (V + V_neck) / V. Necks of different dimers may overlap, and then count twice here; also,
-    this says nothing of what the box cuts. `packing_fraction_with_necks` measures both.
+    The result is value (V + V_neck) / V. Necks of different dimers may overlap, and then count
+    twice here; also, nothing is said of the necks that the box cuts. `packing_fraction_with_necks`
+    measures both.
 
     Parameters
     ----------
     value : packing fraction of the dimers
     radius : of all spheres, length
     distance : of the two centres of each dimer, 0 < distance <= 2 radius, length
+
+    Raises InputError for a radius or a distance out of its range.
     """
     return value * (1 + neck_volume(radius, distance) / dimer_volume(radius, distance))
 

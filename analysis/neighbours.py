@@ -18,7 +18,7 @@ from .bodies import Particles
 from .errors import InputError
 from .geometry import FloatArray, IntArray, as_box, as_spheres
 
-# Up to this ratio of the largest to the smallest radius one reach for all spheres is the fastest.
+# One reach for all spheres is the fastest up to this ratio of the largest to the smallest radius.
 SIMILAR_RADII = 1.5
 
 
@@ -29,7 +29,7 @@ class DistanceContacts:
     Attributes
     ----------
     sides : (m, 2), indices of the spheres on both sides; the second is -k for wall k, k >= 1.
-        Goes for contact ids where the spheres' ids are 0 to n - 1
+        These are contact ids if the spheres' ids are 0 to n - 1
     points : (m, 3), in the middle of the gap between two spheres, on the wall for a wall, length
     normals : (m, 3), unit vector from side 2 to side 1
     gaps : (m,), negative where the two overlap, length

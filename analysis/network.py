@@ -26,7 +26,7 @@ LARGEST_SHOWN = 4.0
 
 @dataclass(frozen=True)
 class NetworkDifference:
-    """How far two contact networks of the same spheres differ.
+    """The difference of two contact networks of the same spheres.
 
     Attributes
     ----------

@@ -15,7 +15,7 @@ from .geometry import BoolArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Backbone:
-    """Which particles are rattlers, and the contacts that the others have with one another.
+    """The rattlers of a packing, and the contacts that the others have with one another.
 
     The coordination number without rattlers is that of `counts.particles` over `~rattlers`.
 
@@ -66,6 +66,8 @@ def backbone(
         free
     fewest : contacts that a particle must have to stay, one number or (p,); None: the numbers of
         `contacts_to_hold`
+
+    Raises InputError as `contact_sides` does, and for `fewest` of another shape.
     """
     contacts = np.asarray(contact_ids, dtype=np.int64)
     sides = contact_sides(contacts, sphere_ids, particles)

@@ -121,6 +121,8 @@ def sphere_volumes_in_box(positions: ArrayLike, radii: ArrayLike, box: ArrayLike
     positions : (n, 3), length
     radii : (n,), length
     box : (3, 2), lower and upper bound per axis, length
+
+    Raises InputError for arrays of other shapes.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
@@ -142,6 +144,8 @@ def particle_volumes_in_box(
     radii : (n,), of the spheres, length
     box : (3, 2), lower and upper bound per axis, length
     particles : which spheres make up which particle
+
+    Raises InputError for arrays of other shapes, and for a body of three or more spheres.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
@@ -188,7 +192,7 @@ def pieces_of(centres: FloatArray, radii: FloatArray, particles: Particles | Non
 
 
 def require_dimers(particles: Particles) -> None:
-    """Refuse bodies of three or more spheres."""
+    """Raise InputError if there are bodies of three or more spheres."""
     large = np.flatnonzero(particles.sizes > 2)
     if len(large):
         raise InputError(
@@ -217,13 +221,14 @@ def split(
     distance = np.linalg.norm(between, axis=1)
     first, second = radii[one], radii[other]
     axis = between / np.where(distance > 0, distance, 1)[:, None]
-    # From r1^2 - o^2 = r2^2 - (D - o)^2, the squared radius of the circle on which they meet.
+    # The offset o follows from r1^2 - o^2 = r2^2 - (D - o)^2, the squared radius of the circle on
+    # which they meet.
     excess = (first - second) * (first + second) / np.where(distance > 0, 2 * distance, 1)
     offset = np.clip(distance / 2 + excess, -first, first)
     rest = np.clip(distance / 2 - excess, -second, second)
     meet = (distance > abs(first - second)) & (distance < first + second)
     apart = distance >= first + second
-    # Two equal balls in one place: the first stays.
+    # The first of two equal balls in one place stays.
     stays = apart | (first >= second)
     offset = np.where(meet, offset, np.where(stays, np.inf, -np.inf))
     rest = np.where(meet, rest, np.where(apart | ~stays, np.inf, -np.inf))
@@ -243,7 +248,7 @@ def _balls_in_boxes(radius: FloatArray, low: FloatArray, high: FloatArray) -> Fl
     radius : (m,)
     low, high : (3, m), bounds of the boxes from the centres, -radius to radius
     """
-    # (3, 2, m): distances of the faces, positive where the centre is on the inner side.
+    # The distances of the faces, (3, 2, m), are positive where the centre is on the inner side.
     faces = np.stack([-low, high], axis=1)
     total = np.zeros_like(radius)
     for face, edge, end in permutations(faces):
@@ -273,9 +278,9 @@ def _cut_balls_in_boxes(
     """
     bounds = np.stack([low, high], axis=1)
     outward = np.stack([-low, high], axis=1)
-    # (2, 2, 2, m), distance of each corner in front of the plane. Floating point sums are
-    # monotone, so that no face can have both ends of one diagonal kept and of the other one lost:
-    # each face has no crossed edge or two.
+    # `height`, (2, 2, 2, m), is the distance of each corner in front of the plane. Sums of floats
+    # are monotone, so that no face can have both ends of one diagonal kept and of the other one
+    # lost: each face has no crossed edge or two.
     x, y, z = normal[:, None] * bounds
     height = (x - offset)[:, None, None] + y[None, :, None] + z[None, None]
     total = np.zeros_like(radius)

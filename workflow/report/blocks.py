@@ -132,7 +132,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Content:
-    """What a section shows, without its title.
+    """The content of a section, without its title.
 
     Attributes
     ----------

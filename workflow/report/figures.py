@@ -257,7 +257,7 @@ class Pictures:
 
     @property
     def sources(self) -> list[tuple[str, str]]:
-        """What is written below each picture, and the picture as a data URI."""
+        """The text below each picture, and the picture as a data URI."""
         return [
             (label, f"data:image/png;base64,{base64.b64encode(data).decode()}")
             for label, data in self._shown()

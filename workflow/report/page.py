@@ -56,7 +56,7 @@ class _Row:
 
     @property
     def remarks(self) -> str:
-        """What is not as in the paper, and why a large difference is large."""
+        """The differences from the paper's case, and why a large difference is large."""
         one = self.comparison
         return "; ".join(text for text in (one.note, one.why if one.is_large else "") if text)
 

@@ -14,7 +14,7 @@ from ..store import Result
 
 FloatArray = NDArray[np.float64]
 Key = TypeVar("Key", bound=Hashable)
-# x, mean y and its standard error, (k,) each; no error of a single curve.
+# A mean curve is x, mean y and its standard error, (k,) each; a single curve has no error.
 MeanCurve = tuple[FloatArray, FloatArray, FloatArray | None]
 
 # Samples of fewer values get the scatter of all samples of their kind.
@@ -30,8 +30,8 @@ class Sample:
 
     Attributes
     ----------
-    mean : NaN of no values
-    std : standard deviation, with n - 1 in its denominator; NaN of fewer than two values
+    mean : NaN without any value
+    std : standard deviation, with n - 1 in its denominator; NaN for fewer than two values
     n : number of values
     """
 
@@ -41,11 +41,11 @@ class Sample:
 
     @property
     def error(self) -> float:
-        """Standard error of the mean; NaN of fewer than two values."""
+        """Standard error of the mean; NaN for fewer than two values."""
         return self.std / math.sqrt(self.n) if self.n else math.nan
 
     def scaled(self, factor: float) -> Sample:
-        """Return the same in another unit."""
+        """Return the sample with its values multiplied by a factor, as in another unit."""
         return Sample(self.mean * factor, self.std * abs(factor), self.n)
 
 
@@ -67,8 +67,8 @@ def pooled(samples: Mapping[Key, Sample]) -> dict[Key, Sample]:
     """Give samples of few values the scatter that all samples share.
 
     The standard deviation of two or three values is itself uncertain by half and more, and near
-    zero by chance in some of many samples. Where the scatter can be taken to be the same in all,
-    sqrt(sum of (n - 1) s^2 / sum of (n - 1)) is a better one.
+    zero by chance in some of many samples. If the scatter can be taken to be the same in all, the
+    pooled one, sqrt(sum of (n - 1) s^2 / sum of (n - 1)), is better.
     """
     freedom = sum(one.n - 1 for one in samples.values() if one.n > 1)
     if not freedom:
@@ -111,11 +111,11 @@ class Stated:
 def difference_in_errors(ours: Sample, stated: Stated) -> float:
     """Return ours - the paper's, over the standard error of that difference.
 
-    Where the paper tells no scatter, over our own standard error alone; NaN where there is none,
-    as of a single run.
+    The standard error is our own alone if the paper tells no scatter. The result is NaN if we have
+    none, as for a single run.
     """
     squares = [error**2 for error in (ours.error, stated.error) if not math.isnan(error)]
-    # One run beside a paper's range: how far it would fall from it by chance is not known.
+    # It is not known how far a single run would fall from the paper's range by chance.
     if math.isnan(ours.error) or sum(squares) == 0:
         return math.nan
     return (ours.mean - stated.value) / math.sqrt(sum(squares))
@@ -124,10 +124,10 @@ def difference_in_errors(ours: Sample, stated: Stated) -> float:
 def mean_curve(
     curves: Sequence[tuple[FloatArray, FloatArray]],
 ) -> MeanCurve:
-    """Return the mean of curves: x, mean y, and its standard error; None of a single curve.
+    """Return the mean of curves (x, y): x, mean y, and its standard error, None for a single curve.
 
-    Others than the first are read at the x of the first by linear interpolation, NaN beyond their
-    ends.
+    The curves after the first are read at the x of the first by linear interpolation; they are NaN
+    beyond their ends.
     """
     x = curves[0][0]
     rows = np.array([np.interp(x, *curve, left=np.nan, right=np.nan) for curve in curves])
@@ -140,9 +140,9 @@ def mean_curve(
 def root_mean_square_difference(
     one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray]
 ) -> float:
-    """Return that of two curves (x, y) where they overlap, at the x of the first; NaN if nowhere.
+    """Return the root mean square difference of two curves (x, y) at the x of the first.
 
-    The second is read by linear interpolation.
+    The second is read by linear interpolation, and only where it is known: NaN if nowhere.
     """
     x, y = one
     apart = y - np.interp(x, *other, left=np.nan, right=np.nan)
@@ -151,7 +151,10 @@ def root_mean_square_difference(
 
 
 def mean_distribution(distributions: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray | None]:
-    """Return the mean share of each number and its standard error; short ones end with zeros."""
+    """Return the mean share of each number and its standard error, (k,) both.
+
+    Shorter distributions go on with zeros. A single one has no standard error: None.
+    """
     length = max(len(one) for one in distributions)
     rows = np.array([np.pad(one, (0, length - len(one))) for one in distributions])
     mean: FloatArray = rows.mean(axis=0)
@@ -171,16 +174,16 @@ def peak(
     """Return where a parabola near the largest value is largest, and its standard error.
 
     The parabola is fitted to the largest value and those up to `reach` places to either side; the
-    error is what the errors of these values make of its top (linear propagation). The x of the
-    largest value, and NaN, where that one is too near to either end or the parabola has no top.
+    error is what the errors of these values make of its top (linear propagation). The result is the
+    x of the largest value, and NaN, if that is too near to either end or the parabola has no top.
     """
     best = int(np.argmax(y))
     if not reach <= best < len(y) - reach:
         return float(x[best]), math.nan
     near = slice(best - reach, best + reach + 1)
-    # About the middle one, which keeps the numbers small.
+    # Places are counted from the largest value, which keeps the numbers small.
     apart = np.asarray(x[near]) - x[best]
-    # Rows of the pseudo-inverse: how much of each value is in the coefficients a and b.
+    # These rows of the pseudo-inverse say how much of each value is in the coefficients a and b.
     of_a, of_b, _ = np.linalg.pinv(np.vander(apart, 3))
     values = np.asarray(y[near])
     a, b = float(of_a @ values), float(of_b @ values)

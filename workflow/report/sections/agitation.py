@@ -21,7 +21,7 @@ STATED_DROP = 0.5
 
 
 class _Kind(NamedTuple):
-    """What the runs of one row have in common."""
+    """The parameters that the runs of one row have in common."""
 
     particles: int
     diameter: float

@@ -13,7 +13,7 @@ from ..quantities import Quantity
 from ..statistics import pooled_numbers
 from ..text import as_short
 
-# A note below tables of few runs a row.
+# This note stands below tables with few runs a row.
 POOLED = (
     "Mean ± standard deviation (standard error); the standard deviation of rows of fewer than four "
     "runs is that of all rows, pooled."

@@ -28,9 +28,9 @@ from ..text import as_count, as_short
 
 # The paper's rows are of so many spheres and runs.
 SPHERES_OF_PAPER, RUNS_OF_EACH_ROW = 1000, 9
-# Why a packing fraction of nine runs of 1,000 spheres may be far from ours.
+# This is why a packing fraction of nine runs of 1,000 spheres may be far from ours.
 CHANCE = "chance in few runs: see Table 1 with more seeds"
-# What stands in place of a number of the paper in rows that the paper does not have.
+# Rows that the paper does not have hold this in place of its number.
 NOTHING_STATED = Stated(math.nan)
 
 
