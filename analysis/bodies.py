@@ -16,7 +16,7 @@ from .geometry import FloatArray, IntArray, as_positions
 
 @dataclass(frozen=True, eq=False)
 class Particles:
-    """Which spheres make up which particle.
+    """The particles that some spheres make up.
 
     Particles come in the order of their first spheres: where no two spheres belong together,
     particle i is sphere i.
@@ -47,21 +47,23 @@ class Particles:
         return bool((self.sizes <= 2).all())
 
     def centres(self, positions: ArrayLike) -> FloatArray:
-        """Return the particles' centres, (p, 3): of each, the mean of its spheres' centres.
+        """Return the particles' centres, (p, 3): each is the mean of its spheres' centres.
 
-        The centre of mass of `fix rigid` where all spheres of a body have the same mass. Nothing
-        is periodic.
+        This is the centre of mass of `fix rigid` if all spheres of a body have the same mass.
+        Nothing is periodic.
 
         Parameters
         ----------
         positions : (n, 3), of the spheres, length
+
+        Raises InputError for another number of positions.
         """
         spheres = self.checked(positions)
         sums = [np.bincount(self.index, weights=x, minlength=len(self)) for x in spheres.T]
         return np.column_stack(sums) / self.sizes[:, None]
 
     def checked(self, positions: ArrayLike) -> FloatArray:
-        """Return positions of the spheres, (n, 3), one for each."""
+        """Return positions of the spheres, (n, 3); raise InputError if their number differs."""
         spheres = as_positions(positions)
         if len(spheres) != len(self.index):
             raise InputError(
@@ -76,6 +78,8 @@ def group_spheres(bodies: ArrayLike) -> Particles:
     Parameters
     ----------
     bodies : (n,), body of each sphere, 0 for a free sphere, such as `ParticleFrame.bodies`
+
+    Raises InputError for an array of another shape, and for negative numbers.
     """
     body = np.asarray(bodies, dtype=np.int64)
     if body.ndim != 1 or len(body) == 0:
@@ -90,3 +94,11 @@ def group_spheres(bodies: ArrayLike) -> Particles:
     place[order] = np.arange(len(order))
     index = place[group]
     return Particles(index=index, sizes=np.bincount(index), bodies=body[first[order]])
+
+
+def dimer_spheres(particles: Particles) -> tuple[IntArray, IntArray]:
+    """Return the indices of the first and of the second sphere of each dimer, both (k,)."""
+    # In the order of the particles, the two spheres of each dimer follow each other.
+    order = np.argsort(particles.index, kind="stable")
+    pairs = order[particles.sizes[particles.index[order]] == 2].reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]

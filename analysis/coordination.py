@@ -74,9 +74,11 @@ def contact_counts(
     sphere_ids : (n,), ids of the spheres, in any order
     particles : which spheres make up which particle, in the order of `sphere_ids`; the result has
         the order of the particles. None: all spheres are free, and in the order of the result
+
+    Raises InputError as `contact_sides` does.
     """
     sides = contact_sides(contact_ids, sphere_ids, particles)
-    count = len(np.asarray(sphere_ids)) if particles is None else len(particles)
+    count = number_of_particles(sphere_ids, particles)
     with_wall = sides[:, 1] < 0
     walls = np.bincount(sides[with_wall, 0], minlength=count)
     pairs = np.sort(sides[~with_wall], axis=1)
@@ -87,12 +89,19 @@ def contact_counts(
     return ContactCounts(between, np.bincount(touching, minlength=count), walls)
 
 
+def number_of_particles(sphere_ids: ArrayLike, particles: Particles | None) -> int:
+    """Return the number of particles that some spheres make up; all are free for None."""
+    return len(np.asarray(sphere_ids)) if particles is None else len(particles)
+
+
 def contact_sides(
     contact_ids: ArrayLike, sphere_ids: ArrayLike, particles: Particles | None = None
 ) -> IntArray:
     """Return the particles on both sides of every contact, (m, 2); -k stays for wall k.
 
-    Parameters as for `contact_counts`. Particles are indices, 0 to p - 1.
+    The parameters are those of `contact_counts`. Particles are indices, 0 to p - 1. Raises
+    InputError for arrays of other shapes, for a contact of an unknown sphere, and for a contact
+    within a body.
     """
     contacts = np.asarray(contact_ids, dtype=np.int64)
     ids = np.asarray(sphere_ids, dtype=np.int64)
@@ -132,6 +141,8 @@ def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> Coord
     ----------
     counts : one array (p,) per frame, such as `ContactCounts.particles`
     chosen : (p,) of bool, such as the result of `particles_inside`
+
+    Raises InputError where no particle is chosen, no frame is there, or shapes differ.
     """
     mask = np.asarray(chosen, dtype=np.bool_)
     particles = int(mask.sum())

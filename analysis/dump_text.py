@@ -38,7 +38,7 @@ LARGEST_ID = 2**53
 
 @dataclass(frozen=True, eq=False)
 class FrameHeader:
-    """What stands above the rows of one frame.
+    """The header of one frame, the lines above its rows.
 
     Attributes
     ----------
@@ -65,7 +65,10 @@ class FrameHeader:
 
 @contextmanager
 def open_dump(path: Path) -> Iterator[Iterator[bytes]]:
-    """Open a dump for reading, also one that gzip has compressed, whatever its name ends in."""
+    """Open a dump for reading, also one that gzip has compressed, whatever its name ends in.
+
+    Raises DumpError for a file that is not there or cannot be read.
+    """
     try:
         with path.open("rb") as raw:
             compressed = raw.read(len(GZIP_MAGIC)) == GZIP_MAGIC
@@ -77,7 +80,7 @@ def open_dump(path: Path) -> Iterator[Iterator[bytes]]:
                 yield raw
     except FileNotFoundError:
         raise DumpError(path, "no such file") from None
-    # A compressed file that was cut off or damaged.
+    # These are raised for a compressed file that was cut off or damaged.
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise DumpError(path, f"cannot be unpacked: {error}") from None
     except OSError as error:
@@ -85,7 +88,10 @@ def open_dump(path: Path) -> Iterator[Iterator[bytes]]:
 
 
 def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | None:
-    """Read the header that starts at the given line number; None at the end of the file."""
+    """Read the header that starts at the given line number; None at the end of the file.
+
+    Raises DumpError for a header that is not LAMMPS's or not whole.
+    """
     raw = list(islice(dump, HEADER_LINES))
     if not raw:
         return None
@@ -130,7 +136,7 @@ def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | N
 
 
 def read_rows(dump: Iterator[bytes], path: Path, header: FrameHeader) -> list[bytes]:
-    """Read the lines of one frame's rows, unparsed, and see that they are all there."""
+    """Read the lines of one frame's rows, unparsed; raise DumpError if some are missing."""
     # A file that announces more rows than a computer can count has fewer.
     rows = list(islice(dump, min(header.rows, sys.maxsize)))
     # A last line without its end of line may have lost digits: it counts as missing.
@@ -146,7 +152,7 @@ def read_rows(dump: Iterator[bytes], path: Path, header: FrameHeader) -> list[by
 
 
 def require_columns(header: FrameHeader, needed: Sequence[str], path: Path) -> None:
-    """Raise with the names of the columns that are missing and of those that are there."""
+    """Raise DumpError with the columns that are missing, and those that are there."""
     missing = [name for name in needed if name not in header.columns]
     if missing:
         raise missing_columns(header, path, ", ".join(missing))
@@ -194,7 +200,7 @@ def _shortened(text: str) -> str:
 
 
 def _printable(text: str) -> str:
-    """Return a text that spoils no terminal: what was a binary file is quoted too."""
+    """Return a text that spoils no terminal, also where a binary file is quoted."""
     return "".join(
         letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text
     )

@@ -1,4 +1,4 @@
-"""What can go wrong: the text of each error is one line, which the command line prints as it is."""
+"""The errors of the analysis: the text of each is one line, which the command line prints."""
 
 from __future__ import annotations
 
@@ -13,22 +13,21 @@ class InputError(AnalysisError):
     """An array, a box or a number does not have the shape or the value that the function needs."""
 
 
-class DumpError(AnalysisError):
+class FileError(AnalysisError):
+    """A file that is read is missing, incomplete or malformed."""
+
+    def __init__(self, path: str | PathLike[str], message: str, line: int | None = None) -> None:
+        """Make the text `path, line N: message`; lines are counted from 1."""
+        where = f"{path}" if line is None else f"{path}, line {line}"
+        super().__init__(f"{where}: {message}")
+
+
+class DumpError(FileError):
     """A dump file is missing, incomplete or malformed."""
 
-    def __init__(self, path: str | PathLike[str], message: str, line: int | None = None) -> None:
-        """Make the text `path, line N: message`; lines are counted from 1."""
-        where = f"{path}" if line is None else f"{path}, line {line}"
-        super().__init__(f"{where}: {message}")
 
-
-class LogError(AnalysisError):
+class LogError(FileError):
     """A log is missing, cannot be read, or lacks a part."""
-
-    def __init__(self, path: str | PathLike[str], message: str, line: int | None = None) -> None:
-        """Make the text `path, line N: message`; lines are counted from 1."""
-        where = f"{path}" if line is None else f"{path}, line {line}"
-        super().__init__(f"{where}: {message}")
 
 
 class RunFilesError(AnalysisError):

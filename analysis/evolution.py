@@ -20,13 +20,13 @@ from .particles import ParticleFrame
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Positions (n, 3), radii (n,) and a box (3, 2) to a packing fraction.
+# Such a function measures a packing fraction of positions (n, 3) and radii (n,) in a box (3, 2).
 PackingFractionOf = Callable[[ArrayLike, ArrayLike, ArrayLike], float]
 
 
 @dataclass(frozen=True, eq=False)
 class Evolution:
-    """What a packing was like at each step; NaN where it is not known.
+    """The state of a packing at each step; NaN where a number is not known.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Evolution:
 
 @dataclass(frozen=True)
 class Plateau:
-    """Where a series stays near its final value.
+    """The end of a series, where it stays near its final value.
 
     Attributes
     ----------
@@ -91,6 +91,8 @@ def measure_evolution(
     contacts : such as `iterate_contact_frames(path)`, in the order of their steps
     packing : measures the packing fraction; None: `monte_carlo()`
     up : axis against gravity, 0 to 2 for x to z
+
+    Raises InputError without any frame, for another axis, and for a box of another shape.
     """
     bounds = as_box(box)
     if up not in (0, 1, 2):
@@ -133,6 +135,8 @@ def plateau(
     values : (k,), NaN is never within the band
     band : largest distance from the final mean, relative to it
     last : share of the values, the last ones, whose mean is the final mean; at least one value
+
+    Raises InputError for arrays of other shapes, and where the last values are not finite.
     """
     when, series = np.asarray(steps, dtype=np.int64), np.asarray(values, dtype=np.float64)
     if when.ndim != 1 or len(when) == 0 or when.shape != series.shape:
@@ -158,7 +162,15 @@ def plot_evolution(
     reached: Plateau | None = None,
     label: str | None = None,
 ) -> Axes:
-    """Plot a series over the steps, as in Figure 5 of Faure et al. (2009), and its plateau."""
+    """Plot a series over the steps, as in Figure 5 of Faure et al. (2009), and its plateau.
+
+    Parameters
+    ----------
+    ax : the axes to draw on, which are returned
+    steps, values : (k,)
+    reached : the plateau; None draws none
+    label : the name of the series in the legend
+    """
     (line,) = ax.plot(np.asarray(steps), np.asarray(values, dtype=np.float64), "o-", markersize=3)
     if label is not None:
         line.set_label(label)
@@ -173,7 +185,7 @@ def plot_evolution(
 def _not_before(
     step: int, current: ContactFrame | None, more: Iterator[ContactFrame]
 ) -> ContactFrame | None:
-    """Return the first contact frame that is not before a step; None if there is no such."""
+    """Return the first contact frame that is not before a step; None if there is none."""
     while current is not None and current.step < step:
         current = next(more, None)
     return current

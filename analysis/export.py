@@ -27,21 +27,21 @@ PORE, SOLID = 0, 255
 MOST_VOXELS = 4_000_000_000
 # A slice is held in memory, at about ten bytes per voxel while it is computed.
 MOST_VOXELS_IN_SLICE = 100_000_000
-# 5 GB; the file itself counts its faces with 32 bits.
+# So many faces take 5 GB; the file itself counts its faces with 32 bits.
 MOST_FACES = 100_000_000
 FACES_AT_ONCE = 200_000
 
-# Called with the number of slices that are done, and the number of all.
+# Such a function is called with the number of slices that are done, and the number of all.
 Progress = Callable[[int, int], None]
 ByteArray = NDArray[np.uint8]
 
-# A face of a binary STL file.
+# This is the layout of a face in a binary STL file.
 _FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 @dataclass(frozen=True)
 class VoxelImage:
-    """What a voxel image holds.
+    """The size of a voxel image, and how much of it is solid.
 
     Attributes
     ----------
@@ -88,6 +88,8 @@ def write_xyz(
     box : (3, 2), the container, length
     periodic : for each axis, whether the box is periodic; only said where there is a box
     step : time step
+
+    Raises InputError for another ending or arrays of other shapes, ExportError if writing fails.
     """
     target = _named(path, (".xyz", ".extxyz"))
     centres, radius = as_spheres(positions, radii)
@@ -103,7 +105,7 @@ def write_xyz(
     if step is not None:
         words.append(f"step={step}")
 
-    # Not by a library: MDAnalysis writes no radii, and ASE eight decimals.
+    # No library serves: MDAnalysis writes no radii, and ASE eight decimals.
     table = np.column_stack([centres, radius, *integers.values()])
     layout = " ".join(["X", *["%.17g"] * 4, *["%d"] * len(integers)])
     with _unfinished(target) as file:
@@ -133,6 +135,8 @@ def write_vtk(
     ids : (n,), of the spheres
     bodies : (n,), body of each sphere, 0 for a free sphere
     contacts : (n,), contacts of each sphere
+
+    Raises InputError for another ending or arrays of other shapes, ExportError if writing fails.
     """
     import meshio
 
@@ -159,12 +163,14 @@ def voxel_shape(box: ArrayLike, voxel: float) -> tuple[int, int, int]:
     ----------
     box : (3, 2), length
     voxel : edge of a voxel, length
+
+    Raises InputError for a voxel that is not positive or too large for the box, and for too many.
     """
     bounds = as_box(box)
     if not (voxel > 0 and math.isfinite(voxel)):
         raise InputError(f"the size of a voxel must be positive, not {voxel:g}")
     lengths = (bounds[:, 1] - bounds[:, 0]).tolist()
-    # Whatever is counted up to the bound here is refused below.
+    # A larger number is cut to this bound, which is refused below.
     columns, rows, slices = (
         math.floor(min(length / voxel + 0.5, 2 * MOST_VOXELS)) for length in lengths
     )
@@ -198,10 +204,12 @@ def voxel_slices(
     Returns
     -------
     (rows, columns) of uint8 for each slice; see `voxel_shape`. Row 0 is at ylo, column 0 at xlo
+
+    Raises InputError as `voxel_shape` does.
     """
     centres, radius = as_spheres(positions, radii)
     shape = voxel_shape(box, voxel)
-    # In voxels, from the centre of the first one: centres of voxels are whole numbers.
+    # Places are in voxels from the centre of the first one: centres of voxels are whole numbers.
     return _slices((centres - as_box(box)[:, 0]) / voxel - 0.5, radius / voxel, shape)
 
 
@@ -227,6 +235,8 @@ def write_tiff(
     box : (3, 2), length
     voxel : edge of a voxel, length
     progress : called for each slice
+
+    Raises InputError as `voxel_shape` does and for another ending, ExportError if writing fails.
     """
     import tifffile
 
@@ -280,6 +290,8 @@ def write_raw(
     box : (3, 2), length
     voxel : edge of a voxel, length
     progress : called for each slice
+
+    Raises InputError as `voxel_shape` does and for another ending, ExportError if writing fails.
     """
     target = _named(path, (".raw",))
     computed = _Counted(voxel_slices(positions, radii, box, voxel), voxel_shape(box, voxel))
@@ -290,12 +302,12 @@ def write_raw(
         "BinaryDataByteOrderMSB": False,
         "CompressedData": False,
         "TransformMatrix": "1 0 0 0 1 0 0 0 1",
-        # Of the centre of the first voxel.
+        # The offset is the place of the centre of the first voxel.
         "Offset": _numbers(as_box(box)[:, 0] + voxel / 2),
         "ElementSpacing": _numbers([voxel] * 3),
         "DimSize": " ".join(str(number) for number in reversed(computed.shape)),
         "ElementType": "MET_UCHAR",
-        # The last line: what follows it would be data.
+        # This line is the last one: data would follow it.
         "ElementDataFile": target.name,
     }
     lines = "".join(f"{name} = {value}\n" for name, value in header.items())
@@ -304,7 +316,7 @@ def write_raw(
         head.write_text(lines, encoding="utf-8")
         with _unfinished(target) as file, file.open("wb") as raw:
             for image in computed.slices(progress):
-                # Not by `tofile`, which does not tell that a disk is full.
+                # `tofile` would not tell that a disk is full.
                 raw.write(image.data)
     return VoxelImage(computed.shape, voxel, computed.solid)
 
@@ -331,6 +343,8 @@ def write_stl(
     positions : (n, 3), length
     radii : (n,), length
     subdivisions : how often the faces are divided
+
+    Raises InputError for another ending or too many faces, ExportError if writing fails.
     """
     import trimesh
 
@@ -373,7 +387,7 @@ class _Counted:
     def slices(self, progress: Progress | None) -> Iterator[ByteArray]:
         for done, image in enumerate(self._images, start=1):
             self.solid += int(np.count_nonzero(image))
-            # Before the slice is given away: a writer does not come back after the last one.
+            # This comes before the slice is given away: a writer does not ask again after the last.
             if progress is not None:
                 progress(done, self.shape[0])
             yield image
@@ -408,7 +422,7 @@ def _slices(
 
 
 def _next_above(values: FloatArray, count: int) -> IntArray:
-    """Return the first voxels beyond some places, 0 to count: what is on a surface is outside."""
+    """Return the first voxels beyond some places, 0 to count: a surface itself is outside."""
     voxels: IntArray = np.clip(np.floor(values) + 1, 0, count).astype(np.int64)
     return voxels
 
@@ -455,6 +469,6 @@ def _unfinished(target: Path) -> Iterator[Path]:
     except OSError as error:
         raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from None
     finally:
-        # What is still there could not be written to its end, or not be renamed.
+        # A file that is still there could not be written to its end, or not be renamed.
         with suppress(OSError):
             file.unlink()

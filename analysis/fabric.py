@@ -12,13 +12,15 @@ from .geometry import FloatArray
 def fabric_tensor(normals: ArrayLike, weights: ArrayLike | None = None) -> FloatArray:
     """Return the fabric tensor, (3, 3): the mean of n n^T over contacts; its trace is 1.
 
-    A third of the unit matrix where no direction is preferred. M. Oda, Soils and Foundations 12
-    (1972) 17; weighted with the forces it shows where these go.
+    The tensor is a third of the unit matrix if no direction is preferred; weighted with the forces
+    it shows where these go. It is that of M. Oda, Soils and Foundations 12 (1972) 17.
 
     Parameters
     ----------
     normals : (m, 3), unit vectors, m >= 1
     weights : (m,), positive, such as the forces; None: every contact counts the same
+
+    Raises InputError for arrays of other shapes, and for weights that are not positive.
     """
     vectors = np.asarray(normals, dtype=np.float64)
     if vectors.ndim != 2 or vectors.shape[1] != 3 or len(vectors) == 0:
@@ -26,7 +28,7 @@ def fabric_tensor(normals: ArrayLike, weights: ArrayLike | None = None) -> Float
     weight = np.ones(len(vectors)) if weights is None else np.asarray(weights, dtype=np.float64)
     if weight.shape != (len(vectors),):
         raise InputError(f"weights must have shape ({len(vectors)},), not {weight.shape}")
-    # Written so that NaN fails too.
+    # This condition is written so that NaN fails too.
     if not (weight > 0).all():
         raise InputError("weights must be positive")
     tensor: FloatArray = np.einsum("c,ci,cj->ij", weight, vectors, vectors) / weight.sum()

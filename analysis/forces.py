@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .bodies import Particles
-from .coordination import contact_sides
+from .coordination import contact_sides, number_of_particles
 from .errors import InputError
 from .geometry import BoolArray, FloatArray
 from .plots import error_lengths
@@ -58,10 +58,12 @@ def contacts_of(
     sphere_ids : (n,), ids of the spheres, in any order
     particles : which spheres make up which particle; None: all are free
     walls : whether contacts with walls are among them
+
+    Raises InputError as `contact_sides` does, and for a choice of another shape.
     """
     sides = contact_sides(contact_ids, sphere_ids, particles)
     mask = np.asarray(chosen, dtype=np.bool_)
-    count = len(np.asarray(sphere_ids)) if particles is None else len(particles)
+    count = number_of_particles(sphere_ids, particles)
     if mask.shape != (count,):
         raise InputError(f"chosen must have shape ({count},), not {mask.shape}")
     at_wall = sides[:, 1] < 0
@@ -81,6 +83,8 @@ def force_distribution(
         frames one after the other, force
     bins : number of bins of the same width, from 0
     largest : upper edge of the last bin, in mean forces
+
+    Raises InputError for forces that are negative, not finite or all 0, and without any bin.
     """
     strength = np.asarray(forces, dtype=np.float64)
     if strength.ndim != 1 or len(strength) == 0:
@@ -106,7 +110,10 @@ def force_distribution(
 def plot_force_distribution(
     ax: Axes, distribution: ForceDistribution, *, label: str | None = None
 ) -> Axes:
-    """Plot P(f / <f>) over f / <f>, on a logarithmic scale; empty bins are left out."""
+    """Plot P(f / <f>) over f / <f>, on a logarithmic scale; empty bins are left out.
+
+    The axes are returned.
+    """
     filled = distribution.density > 0
     density = distribution.density[filled]
     middles = (distribution.edges[:-1] + distribution.edges[1:]) / 2

@@ -16,7 +16,7 @@ BoolArray = NDArray[np.bool_]
 
 
 def as_positions(positions: ArrayLike) -> FloatArray:
-    """Return positions as an (n, 3) array of finite numbers, n >= 1."""
+    """Return positions as an (n, 3) array of finite numbers, n >= 1; raise InputError otherwise."""
     array = np.asarray(positions, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
         raise InputError(f"positions must have shape (n, 3) with n >= 1, not {array.shape}")
@@ -26,19 +26,19 @@ def as_positions(positions: ArrayLike) -> FloatArray:
 
 
 def as_spheres(positions: ArrayLike, radii: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return positions (n, 3) and radii (n,), checked against each other; radii are positive."""
+    """Return positions (n, 3) and positive radii (n,); raise InputError if they are not that."""
     centres = as_positions(positions)
     array = np.asarray(radii, dtype=np.float64)
     if array.shape != (len(centres),):
         raise InputError(f"radii must have shape ({len(centres)},), not {array.shape}")
-    # Written so that NaN fails too.
+    # This condition is written so that NaN fails too.
     if not ((array > 0) & np.isfinite(array)).all():
         raise InputError("radii must be positive and finite")
     return centres, array
 
 
 def as_box(box: ArrayLike) -> FloatArray:
-    """Return a box as a (3, 2) array with lower < upper on every axis."""
+    """Return a box as a (3, 2) array; raise InputError unless lower < upper on every axis."""
     array = np.asarray(box, dtype=np.float64)
     if array.shape != (3, 2):
         raise InputError(f"a box must have shape (3, 2), not {array.shape}")
@@ -59,6 +59,8 @@ def particles_inside(positions: ArrayLike, box: ArrayLike) -> BoolArray:
     Returns
     -------
     (n,) of bool
+
+    Raises InputError for arrays of other shapes.
     """
     centres, bounds = as_positions(positions), as_box(box)
     inside: BoolArray = np.all((centres >= bounds[:, 0]) & (centres <= bounds[:, 1]), axis=1)

@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 from scipy.special import spherical_jn
 
-from .bodies import Particles
+from .bodies import Particles, dimer_spheres
 from .errors import InputError
-from .geometry import BoolArray, FloatArray, IntArray, as_box, as_spheres
-from .packing import Cover, PackingFraction, share_of_points
-from .volumes import dimer_spheres, require_dimers
+from .geometry import BoolArray, FloatArray, IntArray
+from .packing import Cover, PackingFraction, as_measurable_by_points, share_of_points
+from .volumes import require_dimers
 
-# Positions in a dump are rounded: two spheres that touch may seem a little apart, and two equal
-# radii may differ. Relative.
+# Positions in a dump are rounded: two spheres that touch may seem apart by this share of a radius,
+# and two equal radii may differ by it.
 TOLERANCE = 1e-6
 
 
@@ -33,6 +33,8 @@ def dimer_volume(radius: float, distance: float) -> float:
     ----------
     radius : of both spheres, length
     distance : of their centres, 0 < distance <= 2 radius, length
+
+    Raises InputError for a radius or a distance out of its range.
     """
     _check(radius, distance)
     overlap = max(2 * radius - distance, 0)
@@ -52,24 +54,29 @@ def neck_volume(radius: float, distance: float) -> float:
     ----------
     radius : r, of both spheres, length
     distance : D, of their centres, 0 < distance <= 2 radius, length
+
+    Raises InputError for a radius or a distance out of its range.
     """
     _check(radius, distance)
     angle = math.asin(min(distance / (4 * radius), 0.5))
-    # sin(b) - b cos(b), without cancellation where the angle is small.
+    # This form of sin(b) - b cos(b) has no cancellation where the angle is small.
     return float(4 * math.pi * radius**3 * angle**2 * spherical_jn(1, angle))
 
 
 def with_scaled_necks(value: float, radius: float, distance: float) -> float:
     """Return the packing fraction of equal dimers scaled as if each was as large as with its neck.
 
-    value (V + V_neck) / V. Necks of different dimers may overlap, and then count twice here; also,
-    this says nothing of what the box cuts. `packing_fraction_with_necks` measures both.
+    The result is value (V + V_neck) / V. Necks of different dimers may overlap, and then count
+    twice here; also, nothing is said of the necks that the box cuts. `packing_fraction_with_necks`
+    measures both.
 
     Parameters
     ----------
     value : packing fraction of the dimers
     radius : of all spheres, length
     distance : of the two centres of each dimer, 0 < distance <= 2 radius, length
+
+    Raises InputError for a radius or a distance out of its range.
     """
     return value * (1 + neck_volume(radius, distance) / dimer_volume(radius, distance))
 
@@ -97,26 +104,12 @@ def packing_fraction_with_necks(
     particles : which spheres make up which particle
     points : number of random points
     seed : of numpy's default generator
+
+    Raises InputError for arrays of other shapes, for fewer points than one, and for bodies without
+    a neck.
     """
-    centres, radius = as_spheres(positions, radii)
-    bounds = as_box(box)
-    if points < 1:
-        raise InputError(f"at least one point is needed, not {points}")
-    particles.checked(centres)
-    require_dimers(particles)
-    one, other = dimer_spheres(particles)
-    unequal = np.flatnonzero(abs(radius[one] - radius[other]) > TOLERANCE * radius[one])
-    if len(unequal):
-        raise InputError(
-            "only a dimer of two equal spheres has a neck: the radii in body "
-            f"{particles.bodies[particles.index[one[unequal[0]]]]} are "
-            f"{radius[one[unequal[0]]]:g} and {radius[other[unequal[0]]]:g}"
-        )
-    distance = np.linalg.norm(centres[other] - centres[one], axis=1)
-    for extreme in (np.argmin, np.argmax):
-        if len(distance):
-            dimer = extreme(distance / radius[one])
-            _check(float(radius[one[dimer]]), float(distance[dimer]))
+    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points)
+    one, other = _dimers_with_necks(centres, radius, particles)
     cover = Cover(centres, radius)
     necks = _Necks(centres, radius, one, other)
 
@@ -127,6 +120,31 @@ def packing_fraction_with_necks(
         return inside
 
     return share_of_points(holds, bounds, points, seed)
+
+
+def _dimers_with_necks(
+    centres: FloatArray, radii: FloatArray, particles: Particles
+) -> tuple[IntArray, IntArray]:
+    """Return the indices of the first and of the second sphere of each dimer, both (k,).
+
+    Raises InputError where a body has no neck that is known.
+    """
+    particles.checked(centres)
+    require_dimers(particles)
+    one, other = dimer_spheres(particles)
+    unequal = np.flatnonzero(abs(radii[one] - radii[other]) > TOLERANCE * radii[one])
+    if len(unequal):
+        raise InputError(
+            "only a dimer of two equal spheres has a neck: the radii in body "
+            f"{particles.bodies[particles.index[one[unequal[0]]]]} are "
+            f"{radii[one[unequal[0]]]:g} and {radii[other[unequal[0]]]:g}"
+        )
+    distance = np.linalg.norm(centres[other] - centres[one], axis=1)
+    for extreme in (np.argmin, np.argmax):
+        if len(distance):
+            dimer = extreme(distance / radii[one])
+            _check(float(radii[one[dimer]]), float(distance[dimer]))
+    return one, other
 
 
 class _Necks:
@@ -163,7 +181,7 @@ class _Necks:
 
 
 def _check(radius: float, distance: float) -> None:
-    # Written so that NaN fails too.
+    # This condition is written so that NaN fails too.
     if not 0 < radius < math.inf:
         raise InputError(f"a radius must be positive and finite, not {radius:g}")
     if not 0 < distance <= 2 * radius * (1 + TOLERANCE):

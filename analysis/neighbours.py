@@ -18,7 +18,7 @@ from .bodies import Particles
 from .errors import InputError
 from .geometry import FloatArray, IntArray, as_box, as_spheres
 
-# Up to this ratio of the largest to the smallest radius one reach for all spheres is the fastest.
+# One reach for all spheres is the fastest up to this ratio of the largest to the smallest radius.
 SIMILAR_RADII = 1.5
 
 
@@ -29,7 +29,7 @@ class DistanceContacts:
     Attributes
     ----------
     sides : (m, 2), indices of the spheres on both sides; the second is -k for wall k, k >= 1.
-        Goes for contact ids where the spheres' ids are 0 to n - 1
+        These are contact ids if the spheres' ids are 0 to n - 1
     points : (m, 3), in the middle of the gap between two spheres, on the wall for a wall, length
     normals : (m, 3), unit vector from side 2 to side 1
     gaps : (m,), negative where the two overlap, length
@@ -77,15 +77,17 @@ def contacts_by_distance(
     particles : which spheres make up which particle; None: all spheres are free
     walls : (3, 2), a box around the spheres: its faces xlo, xhi, ylo, ... are the walls 1 to 6,
         length; None: no walls
+
+    Raises InputError for arrays of other shapes, for a criterion that is negative or not finite,
+    and for two centres in one place.
     """
     centres, radius = as_spheres(positions, radii)
     if not (criterion >= 0 and math.isfinite(criterion)):
         raise InputError(f"the gap of a contact must not be negative, and finite: {criterion:g}")
     pairs = near_pairs(centres, radius, criterion)
     if particles is not None:
+        particles.checked(centres)
         owner = particles.index
-        if len(owner) != len(centres):
-            raise InputError(f"{len(centres)} positions, but {len(owner)} spheres in particles")
         pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
     apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]
     distance = np.linalg.norm(apart, axis=1)
@@ -109,7 +111,7 @@ def contacts_by_distance(
 def near_pairs(centres: FloatArray, radii: FloatArray, gap: float) -> IntArray:
     """Return all pairs of spheres whose gap is at most `gap` >= 0, and some others, (m, 2).
 
-    Indices (i, j) with i < j, each pair once, in ascending order.
+    A pair is a row of indices (i, j) with i < j; each is there once, in ascending order.
     """
     tree = KDTree(centres)
     largest = float(radii.max())

@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 PALETTE = "viridis"
-# Of the line of the mean force, in points.
+# The thickness of the line of the mean force, in points.
 MEAN_WIDTH = 0.8
-# The thickest line, in mean forces: few contacts carry more.
+# The force of the thickest line, in mean forces: few contacts carry more.
 LARGEST_SHOWN = 4.0
 
 
 @dataclass(frozen=True)
 class NetworkDifference:
-    """How far two contact networks of the same spheres differ.
+    """The difference of two contact networks of the same spheres.
 
     Attributes
     ----------
@@ -53,6 +53,8 @@ def network_difference(
         k. A contact that is there several times counts with the sum of its forces
     forces : (m,), not negative, of a positive sum
     reference_ids, reference_forces : (r, 2) and (r,), likewise
+
+    Raises InputError for arrays of other shapes, and for forces that are negative or all 0.
     """
     one = _shares(contact_ids, forces)
     other = _shares(reference_ids, reference_forces)
@@ -70,7 +72,7 @@ def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], 
             f"contact ids and forces must have shape (m, 2) and (m,), not {ids.shape} and "
             f"{strength.shape}"
         )
-    # Written so that NaN fails too.
+    # This condition is written so that NaN fails too.
     if not ((strength >= 0).all() and 0 < strength.sum() < np.inf):
         raise InputError("forces must not be negative, and their sum must be positive and finite")
     shares: dict[tuple[int, int], float] = {}
@@ -104,6 +106,8 @@ def contact_graph(
     forces : (m,), strength of each contact, force; None: unknown, edges have no `force`
     particles : which spheres make up which particle; None: all are free
     walls : whether walls are nodes too; else contacts with walls are left out
+
+    Raises InputError as `contact_sides` does, and for forces of another shape.
     """
     sides = contact_sides(contact_ids, sphere_ids, particles)
     if particles is None:
@@ -155,40 +159,27 @@ def draw_network(
     lower_half : only edges whose particles are both in the lower half of the packing's height, as
         in the paper
     palette : name of a colour map of matplotlib
+
+    Raises InputError for axes that are not two of x, y and z.
     """
-    # Here and not above: what draws takes a second to import, which counting need not wait for.
+    # These take a second to import, and those who only count contacts need not wait for them.
     from matplotlib.collections import LineCollection
     from mpl_toolkits.mplot3d import Axes3D
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     if not (up in (0, 1, 2) and across in (0, 1, 2) and up != across):
         raise InputError(f"up and across must be two of the axes 0, 1, 2, not {up} and {across}")
-    nodes = [node for node in graph if node >= 0]
-    place = {node: index for index, node in enumerate(nodes)}
-    centres = as_positions([graph.nodes[node]["position"] for node in nodes])
-    edges = [
-        (one, other, data) for one, other, data in graph.edges(data=True) if min(one, other) >= 0
-    ]
-    ends = np.array([(place[one], place[other]) for one, other, _ in edges], dtype=np.int64)
-    ends = ends.reshape(-1, 2)
-    has_forces = bool(edges) and all("force" in data for *_, data in edges)
-    force = np.array([data["force"] if has_forces else 1.0 for *_, data in edges])
-    if lower_half:
-        height = centres[:, up]
-        below = height <= (height.min() + height.max()) / 2
-        shown = below[ends].all(axis=1)
-        ends, force = ends[shown], force[shown]
-
+    ends, force = _edges(graph, up if lower_half else None)
     depth = 3 - up - across
     order = [across, depth, up] if isinstance(ax, Axes3D) else [across, up]
     # The strongest are drawn last, on top of the others.
-    rank = np.argsort(force, kind="stable")
-    lines: FloatArray = centres[ends[rank]][:, :, order]
-    share = np.zeros(len(force))
-    if has_forces and len(force):
+    rank = np.arange(len(ends)) if force is None else np.argsort(force, kind="stable")
+    lines: FloatArray = ends[rank][:, :, order]
+    share = np.zeros(len(lines))
+    if force is not None and len(force):
         share = np.minimum(force[rank] / force.mean(), LARGEST_SHOWN)
     style: dict[str, Any] = {
-        "linewidths": np.maximum(share, 0.15) * MEAN_WIDTH if has_forces else MEAN_WIDTH,
+        "linewidths": MEAN_WIDTH if force is None else np.maximum(share, 0.15) * MEAN_WIDTH,
         "cmap": palette,
     }
     collection: LineCollection
@@ -205,18 +196,60 @@ def draw_network(
     collection.set_clim(0, LARGEST_SHOWN)
     ax.set_xlabel("xyz"[across])
     if len(lines):
-        spans = np.ptp(lines.reshape(-1, len(order)), axis=0)
-        starts = lines.reshape(-1, len(order)).min(axis=0)
-        margin = 0.02 * float(spans.max())
-        limits = np.column_stack([starts - margin, starts + spans + margin]).tolist()
-        ax.set_xlim(*limits[0])
-        ax.set_ylim(*limits[1])
-        if isinstance(ax, Axes3D):
-            ax.set_zlim(*limits[2])
-            # Depth runs away from the viewer: where that would mirror the packing it is turned.
-            if (across, depth, up) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
-                ax.invert_yaxis()
-            ax.set_box_aspect(tuple((spans + 2 * margin).tolist()))
-        else:
-            ax.set_aspect("equal")
+        # Depth runs away from the viewer: an order that would mirror the packing is turned.
+        _fit_axes(ax, lines, mirrored=(across, depth, up) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)))
     return ax
+
+
+def _edges(graph: networkx.Graph, lower_half: int | None) -> tuple[FloatArray, FloatArray | None]:
+    """Return the ends of the edges between particles, (m, 2, 3), and their forces, (m,).
+
+    Parameters
+    ----------
+    graph : from `contact_graph`; the forces are None if an edge has none
+    lower_half : the axis up, if only the edges in the lower half of the height are wanted
+    """
+    nodes = [node for node in graph if node >= 0]
+    place = {node: index for index, node in enumerate(nodes)}
+    centres = as_positions([graph.nodes[node]["position"] for node in nodes])
+    edges = [
+        (one, other, data) for one, other, data in graph.edges(data=True) if min(one, other) >= 0
+    ]
+    pairs = np.array([(place[one], place[other]) for one, other, _ in edges], dtype=np.int64)
+    pairs = pairs.reshape(-1, 2)
+    force: FloatArray | None = None
+    if edges and all("force" in data for *_, data in edges):
+        force = np.array([data["force"] for *_, data in edges], dtype=np.float64)
+    if lower_half is not None:
+        height = centres[:, lower_half]
+        below = height <= (height.min() + height.max()) / 2
+        shown = below[pairs].all(axis=1)
+        pairs, force = pairs[shown], None if force is None else force[shown]
+    return centres[pairs], force
+
+
+def _fit_axes(ax: Axes, lines: FloatArray, *, mirrored: bool) -> None:
+    """Make axes end a little beyond some lines, with one scale for all directions.
+
+    Parameters
+    ----------
+    ax : flat or 3-D axes
+    lines : (m, 2, 2) or (m, 2, 3), ends of the lines, m >= 1
+    mirrored : whether the second axis of 3-D axes is turned
+    """
+    from mpl_toolkits.mplot3d import Axes3D
+
+    ends = lines.reshape(-1, lines.shape[2])
+    spans = np.ptp(ends, axis=0)
+    starts = ends.min(axis=0)
+    margin = 0.02 * float(spans.max())
+    limits = np.column_stack([starts - margin, starts + spans + margin]).tolist()
+    ax.set_xlim(*limits[0])
+    ax.set_ylim(*limits[1])
+    if isinstance(ax, Axes3D):
+        ax.set_zlim(*limits[2])
+        if mirrored:
+            ax.invert_yaxis()
+        ax.set_box_aspect(tuple((spans + 2 * margin).tolist()))
+    else:
+        ax.set_aspect("equal")

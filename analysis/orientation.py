@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .bodies import Particles
+from .bodies import Particles, dimer_spheres
 from .errors import InputError
 from .geometry import FloatArray, particles_inside
 
@@ -30,9 +30,9 @@ class Orientation:
 
     @property
     def isotropic(self) -> float:
-        """What each component would be if no direction was preferred, length.
+        """The value of each component if no direction was preferred, length.
 
-        The root mean square distance of the two centres over sqrt(3).
+        It is the root mean square distance of the two centres over sqrt(3).
         """
         return math.sqrt(float((self.components**2).mean()))
 
@@ -55,6 +55,8 @@ def dimer_orientation(positions: ArrayLike, particles: Particles, box: ArrayLike
     positions : (n, 3), of the spheres, length
     particles : which spheres make up which particle
     box : (3, 2), lower and upper bound per axis, length
+
+    Raises InputError for a body that is no dimer, and for a box without a dimer's centre.
     """
     spheres = particles.checked(positions)
     is_body = particles.bodies > 0
@@ -69,10 +71,9 @@ def dimer_orientation(positions: ArrayLike, particles: Particles, box: ArrayLike
     if dimers == 0:
         raise InputError("no dimer's centre lies in the box: the mean over none does not exist")
 
-    # Ordered by particle, the two spheres of each dimer follow each other.
-    order = np.argsort(particles.index, kind="stable")
-    one, other = order[chosen[particles.index[order]]].reshape(-1, 2).T
-    squares = (spheres[one] - spheres[other]) ** 2
+    one, other = dimer_spheres(particles)
+    inside = chosen[particles.index[one]]
+    squares = (spheres[one[inside]] - spheres[other[inside]]) ** 2
     components = np.sqrt(squares.mean(axis=0))
     errors: FloatArray | None = None
     if dimers > 1:

@@ -57,6 +57,8 @@ def largest_pair_overlap(
     positions : (n, 3), length
     radii : (n,), length
     bodies : (n,), body of each sphere, 0 for none; spheres of one body may overlap freely
+
+    Raises InputError for arrays of other shapes.
     """
     centres, radius = as_spheres(positions, radii)
     count = len(radius)
@@ -85,11 +87,13 @@ def largest_wall_overlap(
     positions : (n, 3), length
     radii : (n,), length
     container : (3, 2), lower and upper plane per axis, length; the spheres belong between them
+
+    Raises InputError for arrays of other shapes.
     """
     centres, radius = as_spheres(positions, radii)
     planes = as_box(container)
     size = radius[:, None]
-    # (n, 3, 2): the last two axes run in the order of FACES.
+    # The depths have the shape (n, 3, 2); the last two axes run in the order of FACES.
     depth = np.stack([size - (centres - planes[:, 0]), size - (planes[:, 1] - centres)], axis=2)
     particle, face = divmod(int(np.argmax(depth)), len(FACES))
     deepest = float(depth.max())

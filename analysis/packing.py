@@ -59,9 +59,10 @@ class MeasuredPackingFraction:
 
     Attributes
     ----------
-    value : exact where all particles are free spheres and dimers, else that of random points
-    exact : the exact one; None where there are other bodies
-    drawn : the one by random points, for every kind of particle
+    value : the exact packing fraction if all particles are free spheres and dimers, else that of
+        random points
+    exact : the exact packing fraction; None if there are other bodies
+    drawn : the packing fraction by random points, for every kind of particle
     """
 
     value: float
@@ -80,7 +81,7 @@ def measure_packing_fraction(
 ) -> MeasuredPackingFraction:
     """Measure the packing fraction in a box, exactly where that is possible, and by random points.
 
-    Parameters as for `exact_packing_fraction` and `packing_fraction`.
+    The parameters are those of `exact_packing_fraction` and `packing_fraction`.
     """
     drawn = packing_fraction(positions, radii, box, points=points, seed=seed)
     if not particles.exactly_measurable:
@@ -128,12 +129,10 @@ def packing_fraction(
     box : (3, 2), lower and upper bound per axis, length
     points : number of random points
     seed : of numpy's default generator
-    """
-    centres, radius = as_spheres(positions, radii)
-    bounds = as_box(box)
-    if points < 1:
-        raise InputError(f"at least one point is needed, not {points}")
 
+    Raises InputError for arrays of other shapes, and for fewer points than one.
+    """
+    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points)
     size = radius[:, None]
     reaches_box = np.all(
         (centres + size > bounds[:, 0]) & (centres - size < bounds[:, 1]),
@@ -163,6 +162,8 @@ def exact_packing_fraction(
     radii : (n,), of the spheres, length
     box : (3, 2), lower and upper bound per axis, length
     particles : which spheres make up which particle; without, every sphere is one
+
+    Raises InputError for arrays of other shapes, and for a body of three or more spheres.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
@@ -179,7 +180,7 @@ def exact_packing_fraction(
             apart = particles.index[one] != particles.index[other]
             one, other = one[apart], other[apart]
         for part in split(centres, radius, one, other):
-            # The common part of two balls is what each one's part of the union leaves out.
+            # The common part of two balls is made of what the parts of the union leave out of each.
             rest = Pieces(part.centres, part.radii, -part.normals, -part.offsets, part.particles)
             rest = rest[rest.offsets > -np.inf]
             common += float(rest.volumes_in(lower, upper).sum())
@@ -187,10 +188,32 @@ def exact_packing_fraction(
     return ExactPackingFraction(volume / size_of_box, common / size_of_box)
 
 
+def as_measurable_by_points(
+    positions: ArrayLike, radii: ArrayLike, box: ArrayLike, points: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return positions (n, 3), radii (n,) and a box (3, 2), checked for a count of random points.
+
+    Raises InputError where these have other shapes or values, and for fewer points than one.
+    """
+    centres, radius = as_spheres(positions, radii)
+    bounds = as_box(box)
+    if points < 1:
+        raise InputError(f"at least one point is needed, not {points}")
+    return centres, radius, bounds
+
+
 def share_of_points(
     holds: Callable[[FloatArray], BoolArray], bounds: FloatArray, points: int, seed: int
 ) -> PackingFraction:
-    """Count the uniform random points in a box, (k, 3) at a time, that `holds` says yes to."""
+    """Return the share of uniform random points in a box that lie in some volume.
+
+    Parameters
+    ----------
+    holds : says of points, (k, 3), which ones lie in the volume, (k,)
+    bounds : (3, 2), the box, length
+    points : number of points
+    seed : of numpy's default generator
+    """
     generator = np.random.default_rng(seed)
     inside = 0
     for start in range(0, points, BATCH):

@@ -1,6 +1,6 @@
 """Particle frames: LAMMPS's custom text dump of spheres, read through MDAnalysis.
 
-Needed are the columns `id`, positions and, unless the reader gives a radius, `radius` or
+A dump must have the columns `id`, positions and, unless the reader gives a radius, `radius` or
 `diameter`. Positions may be as they are (x, xu) or in shares of the box (xs, xsu).
 """
 
@@ -31,12 +31,12 @@ from .dump_text import (
 from .errors import DumpError, InputError
 from .geometry import FloatArray, IntArray
 
-# The first of these that a dump has whole are read: those in the box before those that left it
-# through a periodic face, lengths before shares of the box, which have lost digits.
+# The first three of these columns that a dump has are read: positions in the box come before those
+# that left it through a periodic face, lengths before shares of the box, which have lost digits.
 POSITIONS = (("x", "y", "z"), ("xu", "yu", "zu"), ("xs", "ys", "zs"), ("xsu", "ysu", "zsu"))
 SCALED = POSITIONS[2:]
 VELOCITIES = ("vx", "vy", "vz")
-# What the whole numbers of a column are, for errors.
+# Errors say that a column holds these whole numbers.
 WHOLE_NUMBERS = {"mol": "a body's number or 0", "contacts": "a number of contacts"}
 
 
@@ -70,13 +70,13 @@ class ParticleFrame:
 
     @cached_property
     def particles(self) -> Particles:
-        """Which spheres make up which particle; all are free where the dump has no `mol`."""
+        """The particles that the spheres make up; all are free if the dump has no `mol`."""
         return group_spheres(np.zeros_like(self.ids) if self.bodies is None else self.bodies)
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """Which columns of a dump are read.
+    """The columns of a dump that are read.
 
     Attributes
     ----------
@@ -111,6 +111,9 @@ class ParticleDump:
         ----------
         path : of the dump, plain text or compressed by gzip
         radius : of all spheres, length, where the dump has neither `radius` nor `diameter`
+
+        Raises InputError for a radius that is not positive, and DumpError for a file that is not
+        whole or lacks a column.
         """
         if radius is not None and not (radius > 0 and math.isfinite(radius)):
             raise InputError(f"a radius must be positive and finite, not {radius:g}")
@@ -135,7 +138,10 @@ class ParticleDump:
         return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> ParticleFrame:
-        """Read one frame; negative indices count from the end."""
+        """Read one frame; negative indices count from the end.
+
+        Raises IndexError for a frame that is not there, and DumpError for a row that is wrong.
+        """
         if not -len(self) <= index < len(self):
             raise IndexError(f"{self.path}: no frame {index}, there are {len(self)}")
         header, layout = self._headers[index], self._layout
@@ -170,12 +176,12 @@ class ParticleDump:
                 # float32 and shifts them to the box's origin. dt only silences its warning.
                 self._reader = DumpReader(str(self.path), additional_columns=[*columns], dt=1.0)
             values = self._reader[index].data
-        # An id of twenty digits is an OverflowError.
+        # An id of twenty digits makes an OverflowError.
         except (ValueError, IndexError, OverflowError) as error:
             self._reader = None
             mistake = self._malformed() or self._mistake(self._headers[index])
             raise mistake or DumpError(self.path, f"cannot be read: {error}") from None
-        # Copies: MDAnalysis reads the next frame into the same arrays.
+        # These are copies, since MDAnalysis reads the next frame into the same arrays.
         return {name: np.array(values[name], dtype=np.float64) for name in columns}
 
     def _malformed(self) -> DumpError | None:
@@ -246,6 +252,8 @@ def read_particle_frame(
     path : of the dump, plain text or compressed by gzip
     index : of the frame; negative indices count from the end
     radius : of all spheres, length, where the dump has neither `radius` nor `diameter`
+
+    Raises what `ParticleDump` raises.
     """
     return ParticleDump(path, radius=radius)[index]
 

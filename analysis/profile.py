@@ -1,7 +1,7 @@
 """Packing fraction against the distance from a wall, in slabs parallel to it.
 
-The paper's Figures 6 and 12: boxes [l, l + delta] x [0.25, 0.75] x [0.25, 0.75], with delta a tenth
-of the diameter and l from 0 to 0.25.
+The paper's Figures 6 and 12 show it in boxes [l, l + delta] x [0.25, 0.75] x [0.25, 0.75], with
+delta a tenth of the diameter and l from 0 to 0.25.
 """
 
 from __future__ import annotations
@@ -55,8 +55,9 @@ def wall_profile(
 ) -> WallProfile:
     """Compute the packing fraction of spheres and dimers in slabs parallel to a wall.
 
-    From exact volumes, as `exact_packing_fraction`: within a dimer, what both spheres cover counts
-    once, between different particles twice. Bodies of three or more spheres are refused.
+    The volumes are exact, as those of `exact_packing_fraction`: the volume that both spheres of a
+    dimer cover counts once, that of different particles twice. Bodies of three or more spheres are
+    refused.
 
     Parameters
     ----------
@@ -67,13 +68,16 @@ def wall_profile(
     thickness : of the slabs, length; what is left of the box after the last whole slab is not used
     particles : which spheres make up which particle; without, every sphere is one
     diameter : to scale the distances with, length; by default that of the spheres, if all are equal
+
+    Raises InputError for a face that does not exist, for slabs that do not fit into the box, and
+    for spheres of several sizes without a diameter.
     """
     centres, radius = as_spheres(positions, radii)
     slabs = _Slabs(box, wall, thickness)
     scale = _diameter(radius, diameter)
     pieces = pieces_of(centres, radius, particles)
 
-    # Slabs that each piece may reach: the range of their numbers, as the wall sees them.
+    # Each piece may reach the slabs from `first` up to, but not with, `last`.
     inwards = slabs.distance_from_wall(pieces.centres)
     first = np.floor((inwards - pieces.radii) / thickness).clip(0, slabs.count).astype(np.int64)
     last = np.ceil((inwards + pieces.radii) / thickness).clip(0, slabs.count).astype(np.int64)
@@ -108,7 +112,8 @@ def wall_profile_monte_carlo(
 ) -> WallProfile:
     """Measure the packing fraction in slabs parallel to a wall with random points.
 
-    As `packing_fraction`, slab by slab: overlaps count once, of whatever the spheres are part.
+    Each slab is measured as by `packing_fraction`: overlaps count once, whatever particles the
+    spheres are part of.
 
     Parameters
     ----------
@@ -120,6 +125,8 @@ def wall_profile_monte_carlo(
     diameter : to scale the distances with, length; by default that of the spheres, if all are equal
     points : number of random points in each slab
     seed : each slab's points have a seed of their own, drawn from this one
+
+    Raises InputError as `wall_profile` does.
     """
     centres, radius = as_spheres(positions, radii)
     slabs = _Slabs(box, wall, thickness)
@@ -160,9 +167,11 @@ def mueller_packing_fraction(scaled_distances: ArrayLike, width: float | None = 
     ----------
     scaled_distances : from the wall, over the diameter of the spheres, any shape, >= 0
     width : D / d, at least 2.02; None for an infinitely wide container
+
+    Raises InputError for a negative distance, and for a narrower container.
     """
     distance = np.asarray(scaled_distances, dtype=np.float64)
-    # Written so that NaN fails too.
+    # This condition is written so that NaN fails too.
     if not (distance >= 0).all():
         raise InputError("distances from the wall must not be negative or NaN")
     if width is not None and not width >= 2.02:
@@ -185,13 +194,13 @@ class _Slabs:
         self._axis, self._upper = divmod(FACES.index(wall), 2)
         self._thickness = thickness
         extent = float(self.box[self._axis, 1] - self.box[self._axis, 0])
-        # Written so that NaN fails too.
+        # This condition is written so that NaN fails too.
         if not 0 < thickness <= extent * (1 + 1e-9):
             raise InputError(
                 f"slabs must be thicker than 0 and fit into the box's {extent:g} along "
                 f"{'xyz'[self._axis]}, not {thickness:g}"
             )
-        # 0.25 / 0.005 may be a little less than 50.
+        # A quotient such as 0.25 / 0.005 may be a little less than 50.
         self.count = math.floor(extent / thickness * (1 + 1e-9))
         self.middles: FloatArray = np.linspace(0.5, self.count - 0.5, self.count) * thickness
         self.volume = float(thickness * np.prod(np.delete(np.diff(self.box), self._axis)))

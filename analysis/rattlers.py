@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .bodies import Particles
-from .coordination import ContactCounts, contact_counts, contact_sides
+from .coordination import ContactCounts, contact_counts, contact_sides, number_of_particles
 from .errors import InputError
 from .geometry import BoolArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
 class Backbone:
-    """Which particles are rattlers, and the contacts that the others have with one another.
+    """The rattlers of a packing, and the contacts that the others have with one another.
 
     The coordination number without rattlers is that of `counts.particles` over `~rattlers`.
 
@@ -66,10 +66,12 @@ def backbone(
         free
     fewest : contacts that a particle must have to stay, one number or (p,); None: the numbers of
         `contacts_to_hold`
+
+    Raises InputError as `contact_sides` does, and for `fewest` of another shape.
     """
     contacts = np.asarray(contact_ids, dtype=np.int64)
     sides = contact_sides(contacts, sphere_ids, particles)
-    count = len(np.asarray(sphere_ids)) if particles is None else len(particles)
+    count = number_of_particles(sphere_ids, particles)
     if fewest is None:
         fewest = 4 if particles is None else contacts_to_hold(particles)
     needed = np.asarray(fewest, dtype=np.int64)

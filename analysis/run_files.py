@@ -1,4 +1,4 @@
-"""Whether the files of a run belong together: its log, its particle dump and its contact dump.
+"""A run's log, particle dump and contact dump, and whether they belong together.
 
 A dump that has lost whole frames is still a dump, and every number that comes from it looks fine.
 Here the steps of the frames are compared with those that the log tells of, and the contacts with
@@ -21,7 +21,7 @@ from .errors import DumpError, RunFilesError, UnfinishedRunError
 from .particles import ParticleDump, ParticleFrame
 from .run_log import RunLog, Written
 
-# Steps that are named where frames are missing.
+# An error names so many steps whose frames are missing.
 STEPS_SHOWN = 4
 AGAIN = "run it again"
 
@@ -116,7 +116,7 @@ def open_run(
 ) -> RunFiles:
     """Compare the frames of a run's dumps with each other and with its log.
 
-    What a log does not tell of cannot be compared with it: a dump of another name, one that is
+    A dump that a log does not tell of cannot be compared with it: one of another name, one that is
     written at the steps of a variable. Then frames must be in their order, and the contact dump
     must end at the step of the particle dump.
 
@@ -217,7 +217,7 @@ def _check_end(log: RunLog, paths: Sequence[Path]) -> None:
 def _check_steps(path: Path, steps: Sequence[int], log: RunLog | None, *, repeats: bool) -> None:
     """Compare the steps of a dump's frames with those that the log tells of.
 
-    Without a log: a run that goes on from a restart file may repeat the step at which it began.
+    A run without a log that goes on from a restart file may repeat the step at which it began.
     """
     written = None if log is None else log.written(path)
     wanted = [] if written is None else written.steps.tolist()
@@ -241,7 +241,7 @@ def _check_steps(path: Path, steps: Sequence[int], log: RunLog | None, *, repeat
             f"{path}: {_frames(missing)} that {log.path.name} tells of {_are(missing)} missing; "
             f"{AGAIN}"
         )
-    # Of a run that goes on, the log is behind the dump.
+    # While a run goes on, its log is behind its dump.
     more = [step for step in more if log.complete or step <= log.runs[-1].known]
     if more:
         raise RunFilesError(

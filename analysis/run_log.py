@@ -21,15 +21,15 @@ from .geometry import FloatArray, IntArray
 
 _LOOP = re.compile(r"Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) atoms")
 _COUNT = re.compile(r"f_(\w+)\[(5|6)\]")
-# Commands after which the step is another one, without a run.
+# After these commands the step is another one, without a run.
 _NEW_STEP = ("read_restart", "read_data", "read_dump", "clear", "rerun", "tad", "prd", "hyper")
-# With which a deck begins.
+# A deck begins with one of these words.
 _ANEW = ("LAMMPS", "units", "atom_style", "read_restart", "read_data", "clear")
-# What LAMMPS takes for the same time, in shares of a step.
+# LAMMPS takes two times for the same that differ by less than this share of a step.
 _SAME_TIME = 1e-6
-# Relative; thermo output has eight digits.
+# Thermo output has eight digits: this is its relative rounding.
 _DIGITS = 1e-8
-# Beyond so many steps, frames that are written at times are not predicted.
+# In longer runs, the frames that are written at times are not predicted.
 _MOST_STEPS = 50_000_000
 
 
@@ -70,7 +70,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What a dump file must hold, as a log tells it.
+    """The frames that a dump file must hold, as a log tells it.
 
     Attributes
     ----------
@@ -114,11 +114,11 @@ class RunLog:
 
     @property
     def complete(self) -> bool:
-        """Whether its last run has ended."""
+        """Whether the last run has ended."""
         return not self.runs or self.runs[-1].steps is not None
 
     def names(self, path: Path) -> bool:
-        """Whether it tells that a dump of this file's name was written."""
+        """Say whether the log tells that a dump of this file's name was written."""
         return any(PurePosixPath(name).name == path.name for name in self.dumps)
 
     def written(self, path: Path) -> Written | None:
@@ -164,7 +164,7 @@ class _Dump:
 
 @dataclass
 class _File:
-    """What a dump file holds; nothing is known of a file that had something in it before."""
+    """The frames of a dump file; nothing is known of a file that had something in it before."""
 
     known: bool = True
     steps: list[int] = field(default_factory=list)
@@ -175,7 +175,7 @@ class _File:
 
 
 class _Reader:
-    """Goes through the lines of a log."""
+    """A reader that goes through the lines of a log, and what it has found so far."""
 
     def __init__(self, path: Path) -> None:
         self.runs: list[Run] = []
@@ -208,7 +208,7 @@ class _Reader:
         elif self._names and (row := _numbers(words, len(self._names))) is not None:
             self._rows.append(row)
         elif _LOOP.match(line):
-            # Of a run whose thermo output has another style: nobody knows where it ended.
+            # This run has thermo output of another style: nobody knows where it ended.
             self._step = None
             self._forget()
         elif words and not self._names:
@@ -287,7 +287,7 @@ class _Reader:
             self.ended = True
             return
         if any("$" in word for word in words):
-            # It comes again, with the values in place.
+            # The line comes again, with the values in place.
             return
         name, *rest = [word for word in words[: _comment(words)]] or [""]
         self.ended = name in ("quit", "log")
@@ -338,7 +338,7 @@ class _Reader:
                 file.known = False
 
     def _forget(self) -> None:
-        """Take nothing for known of what the dumps write now."""
+        """Take nothing for known that the dumps write now."""
         for dump in self._dumps.values():
             self.files[dump.path].known = False
 
@@ -392,7 +392,7 @@ def _steps_at_times(run: Run, interval: float) -> list[int] | None:
     near = (_SAME_TIME * length + _DIGITS * np.abs(times)) / interval
     passed = np.floor(times / interval + near)
     written = np.diff(passed, prepend=passed[0]) > 0
-    # The first one is on time, or is passed already.
+    # The first time is a multiple of the interval, or lies beyond one already.
     written[0] = abs(times[0] / interval - passed[0]) <= near[0]
     return [int(step) for step in steps[written]]
 
@@ -400,7 +400,7 @@ def _steps_at_times(run: Run, interval: float) -> list[int] | None:
 def at_steps(wanted: ArrayLike, steps: FloatArray, values: FloatArray) -> FloatArray:
     """Return what a column was at some steps: linear between two lines, and after the last one.
 
-    A run that a fix has ended has no line of its last step.
+    The log has no line of the last step of a run that a fix has ended.
 
     Parameters
     ----------

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 Q4_OF_CRYSTALS = {"fcc": 0.1909, "hcp": 0.0972}
 Q6_OF_CRYSTALS = {"fcc": 0.5745, "hcp": 0.4848}
 NEIGHBOURS = 12
-# A bond is crystalline where the order of its ends agrees by more than this, a particle where so
-# many of its bonds are: ten Wolde, Ruiz-Montero and Frenkel, Faraday Discussions 104 (1996) 93.
+# A bond is crystalline if the order of its ends agrees by more than this, a particle if so many of
+# its bonds are: ten Wolde, Ruiz-Montero and Frenkel, Faraday Discussions 104 (1996) 93.
 ALIGNED = 0.7
 CRYSTALLINE_BONDS = 8
 
@@ -77,7 +77,7 @@ class BondOrder:
 
     @property
     def crystalline(self) -> BoolArray:
-        """Which particles are in a crystal: eight crystalline bonds or more, (c,)."""
+        """Whether each particle is in a crystal, with eight crystalline bonds or more, (c,)."""
         crystalline: BoolArray = self.crystalline_bonds >= CRYSTALLINE_BONDS
         return crystalline
 
@@ -95,7 +95,7 @@ class BondOrder:
     def shares(self) -> dict[str, float]:
         """Shares of particles that are fcc, hcp and disordered; they add up to 1.
 
-        Those in a crystal are what they are nearer to in q4 and q6.
+        A particle in a crystal is taken for the one that is nearer in q4 and q6.
         """
         distance = np.array(
             [
@@ -133,8 +133,10 @@ def radial_distribution(
     box : (3, 2), length
     largest : upper edge of the last shell, length
     bins : number of shells of the same thickness, from 0
+
+    Raises InputError for a box that is too near to the outermost centres or holds none.
     """
-    # Here and not above: freud takes half a second to import, which most uses need not wait for.
+    # freud takes half a second to import, which most uses need not wait for.
     import freud
 
     centres, bounds = as_positions(positions), as_box(box)
@@ -150,7 +152,7 @@ def radial_distribution(
         )
     system, points = _system(centres, largest)
     counter: Any = freud.density.RDF(bins=bins, r_max=largest)
-    # Above 0, so that no particle counts itself.
+    # This distance is above 0, so that no particle counts itself.
     smallest = 1e-6 * largest
     query = {"mode": "ball", "r_max": largest, "r_min": smallest, "exclude_ii": False}
     counter.compute((system, points), query_points=points[chosen], neighbors=query)
@@ -177,6 +179,8 @@ def bond_order(positions: ArrayLike, box: ArrayLike) -> BondOrder:
     ----------
     positions : (n, 3), centres of all spheres, n >= 13, length
     box : (3, 2), length
+
+    Raises InputError for too few particles, and for a box without a centre.
     """
     import freud
 
@@ -184,7 +188,7 @@ def bond_order(positions: ArrayLike, box: ArrayLike) -> BondOrder:
     if len(centres) <= NEIGHBOURS:
         raise InputError(f"more than {NEIGHBOURS} particles are needed, not {len(centres)}")
     chosen = _chosen(centres, bounds)
-    # Wider than the packing: images are far away.
+    # The box is wider than the packing, so that images are far away.
     system, points = _system(centres, float(np.ptp(centres, axis=0).max()))
     # freud's own search took eight times as long. The nearest one of each particle is itself.
     _, nearest = KDTree(centres).query(centres, k=NEIGHBOURS + 1)
@@ -218,7 +222,7 @@ def bond_order(positions: ArrayLike, box: ArrayLike) -> BondOrder:
 def plot_radial_distribution(
     ax: Axes, distribution: RadialDistribution, *, diameter: float = 1.0, label: str | None = None
 ) -> Axes:
-    """Plot g(r) over r / diameter."""
+    """Plot g(r) over r / diameter; the axes are returned."""
     ax.plot(distribution.middles / diameter, distribution.values, linewidth=1, label=label)
     ax.axhline(1.0, color="0.7", linewidth=0.8)
     ax.set_xlabel("r" if diameter == 1.0 else "r / d")

@@ -18,7 +18,7 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .bodies import Particles
+from .bodies import Particles, dimer_spheres
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray, as_box, as_spheres
 
@@ -77,7 +77,7 @@ class Pieces:
         low = np.broadcast_to(lower, shape) - self.centres
         high = np.broadcast_to(upper, shape) - self.centres
         size = self.radii[:, None]
-        # What is exactly nothing, a whole piece or the whole box is not left to rounding.
+        # A volume that is exactly nothing, the piece or the box is not left to rounding.
         nearest = np.maximum(np.maximum(low, -high), 0)
         farthest = np.maximum(-low, high)
         squared = self.radii**2
@@ -93,8 +93,8 @@ class Pieces:
             for start in range(0, len(rows), BLOCK):
                 block = rows[start : start + BLOCK]
                 radius = self.radii[block]
-                # Beyond its radius a box cannot cut the ball: the faces may come closer. With
-                # this, rounding is that of lengths up to the radius, however large the box is.
+                # A face beyond the radius cannot cut the ball: it may come closer. With this,
+                # rounding is that of lengths up to the radius, however large the box is.
                 bounds = (
                     np.clip(low[block].T, -radius, radius),
                     np.clip(high[block].T, -radius, radius),
@@ -104,7 +104,7 @@ class Pieces:
                 else:
                     plane = self.normals[block].T, self.offsets[block]
                     volumes[block] = _cut_balls_in_boxes(radius, *bounds, *plane)
-        # Rounding may leave what is nothing, or all, a little outside its range.
+        # Rounding may leave a volume a little below zero or above the whole.
         largest = np.minimum(self.volumes(), (high - low).prod(axis=1))
         clipped: FloatArray = np.clip(volumes, 0, largest)
         return clipped
@@ -113,13 +113,16 @@ class Pieces:
 def sphere_volumes_in_box(positions: ArrayLike, radii: ArrayLike, box: ArrayLike) -> FloatArray:
     """Return the volume of each sphere's part in a box, (n,), length^3.
 
-    Exact up to rounding, about 1e-15 r^3, however the box cuts the spheres. Nothing is periodic.
+    The volumes are exact up to rounding, about 1e-15 r^3, however the box cuts the spheres. Nothing
+    is periodic.
 
     Parameters
     ----------
     positions : (n, 3), length
     radii : (n,), length
     box : (3, 2), lower and upper bound per axis, length
+
+    Raises InputError for arrays of other shapes.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
@@ -131,8 +134,9 @@ def particle_volumes_in_box(
 ) -> FloatArray:
     """Return the volume of each particle's part in a box, (p,), length^3.
 
-    Of a dimer, what both spheres cover counts once. Exact up to rounding, about 1e-15 r^3. Bodies
-    of three or more spheres are refused: `packing_fraction` measures these. Nothing is periodic.
+    The volume that both spheres of a dimer cover counts once. The volumes are exact up to rounding,
+    about 1e-15 r^3. Bodies of three or more spheres are refused: `packing_fraction` measures these.
+    Nothing is periodic.
 
     Parameters
     ----------
@@ -140,6 +144,8 @@ def particle_volumes_in_box(
     radii : (n,), of the spheres, length
     box : (3, 2), lower and upper bound per axis, length
     particles : which spheres make up which particle
+
+    Raises InputError for arrays of other shapes, and for a body of three or more spheres.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
@@ -186,7 +192,7 @@ def pieces_of(centres: FloatArray, radii: FloatArray, particles: Particles | Non
 
 
 def require_dimers(particles: Particles) -> None:
-    """Refuse bodies of three or more spheres."""
+    """Raise InputError if there are bodies of three or more spheres."""
     large = np.flatnonzero(particles.sizes > 2)
     if len(large):
         raise InputError(
@@ -196,22 +202,14 @@ def require_dimers(particles: Particles) -> None:
         )
 
 
-def dimer_spheres(particles: Particles) -> tuple[IntArray, IntArray]:
-    """Return the indices of the first and of the second sphere of each dimer, both (k,)."""
-    # Ordered by particle, the two spheres of each dimer follow each other.
-    order = np.argsort(particles.index, kind="stable")
-    pairs = order[particles.sizes[particles.index[order]] == 2].reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1]
-
-
 def split(
     centres: FloatArray, radii: FloatArray, one: IntArray, other: IntArray
 ) -> tuple[Pieces, Pieces]:
     """Return the two parts of the union of two balls, for each of k pairs.
 
-    The plane on which the two spheres meet parts them: of each ball, the part on its own side.
-    Balls that do not meet are whole. Where one lies in the other, its offset is minus infinity and
-    the other is whole.
+    The plane on which the two spheres meet parts them: each ball keeps the part on its own side.
+    Balls that do not meet are whole. If one lies in the other, its offset is minus infinity and the
+    other is whole.
 
     Parameters
     ----------
@@ -223,13 +221,14 @@ def split(
     distance = np.linalg.norm(between, axis=1)
     first, second = radii[one], radii[other]
     axis = between / np.where(distance > 0, distance, 1)[:, None]
-    # From r1^2 - o^2 = r2^2 - (D - o)^2, the squared radius of the circle on which they meet.
+    # The offset o follows from r1^2 - o^2 = r2^2 - (D - o)^2, the squared radius of the circle on
+    # which they meet.
     excess = (first - second) * (first + second) / np.where(distance > 0, 2 * distance, 1)
     offset = np.clip(distance / 2 + excess, -first, first)
     rest = np.clip(distance / 2 - excess, -second, second)
     meet = (distance > abs(first - second)) & (distance < first + second)
     apart = distance >= first + second
-    # Two equal balls in one place: the first stays.
+    # The first of two equal balls in one place stays.
     stays = apart | (first >= second)
     offset = np.where(meet, offset, np.where(stays, np.inf, -np.inf))
     rest = np.where(meet, rest, np.where(apart | ~stays, np.inf, -np.inf))
@@ -249,7 +248,7 @@ def _balls_in_boxes(radius: FloatArray, low: FloatArray, high: FloatArray) -> Fl
     radius : (m,)
     low, high : (3, m), bounds of the boxes from the centres, -radius to radius
     """
-    # (3, 2, m): distances of the faces, positive where the centre is on the inner side.
+    # The distances of the faces, (3, 2, m), are positive where the centre is on the inner side.
     faces = np.stack([-low, high], axis=1)
     total = np.zeros_like(radius)
     for face, edge, end in permutations(faces):
@@ -279,16 +278,41 @@ def _cut_balls_in_boxes(
     """
     bounds = np.stack([low, high], axis=1)
     outward = np.stack([-low, high], axis=1)
-    # (2, 2, 2, m), distance of each corner in front of the plane. Floating point sums are
-    # monotone, so that no face can have both ends of one diagonal kept and of the other one lost:
-    # each face has no crossed edge or two.
+    # `height`, (2, 2, 2, m), is the distance of each corner in front of the plane. Sums of floats
+    # are monotone, so that no face can have both ends of one diagonal kept and of the other one
+    # lost: each face has no crossed edge or two.
     x, y, z = normal[:, None] * bounds
     height = (x - offset)[:, None, None] + y[None, :, None] + z[None, None]
-    kept = height <= 0
-
     total = np.zeros_like(radius)
-    # Ends of the chord of each face: where its boundary, counterclockwise seen along the axis,
-    # leaves what is kept and where it comes back. (axis, side, coordinate, m)
+    leaves, returns = _add_box_edges(total, radius, bounds, outward, height)
+    _add_chords(total, radius, outward, normal, offset, leaves, returns)
+    return total
+
+
+def _add_box_edges(
+    total: FloatArray,
+    radius: FloatArray,
+    bounds: FloatArray,
+    outward: FloatArray,
+    height: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Add the pieces over the parts of the boxes' edges that are kept; return the chords' ends.
+
+    Parameters
+    ----------
+    total : (m,), the volumes to which the pieces are added
+    radius : (m,)
+    bounds : (3, 2, m), lower and upper bounds of the boxes from the centres
+    outward : (3, 2, m), distances of the faces, positive where the centre is on the inner side
+    height : (2, 2, 2, m), distance of each corner in front of the plane; a corner is kept at <= 0
+
+    Returns
+    -------
+    Two arrays (3, 2, 3, m), by axis and side of a face and by coordinate: the points where the
+    boundary of the face, counterclockwise seen along the axis, leaves what is kept, and where it
+    comes back
+    """
+    kept = height <= 0
     leaves = np.zeros((3, 2, 3, len(radius)))
     returns = np.zeros_like(leaves)
     for along in range(3):
@@ -322,7 +346,27 @@ def _cut_balls_in_boxes(
             for axis, side, up in ((other, j, i == 0), (one, i, j == 1)):
                 leaves[axis, side] += np.where(out if up else back, point, 0)
                 returns[axis, side] += np.where(back if up else out, point, 0)
+    return leaves, returns
 
+
+def _add_chords(
+    total: FloatArray,
+    radius: FloatArray,
+    outward: FloatArray,
+    normal: FloatArray,
+    offset: FloatArray,
+    leaves: FloatArray,
+    returns: FloatArray,
+) -> None:
+    """Add the pieces over the chords that the planes cut into the faces of the boxes.
+
+    Parameters
+    ----------
+    total : (m,), the volumes to which the pieces are added
+    radius, outward : as for `_add_box_edges`
+    normal, offset : (3, m) and (m,), as for `_cut_balls_in_boxes`
+    leaves, returns : ends of the chords, as `_add_box_edges` returns them
+    """
     for axis, side in product(range(3), range(2)):
         # On a lower side, counterclockwise is seen from the other side.
         ends = (leaves, returns) if side else (returns, leaves)
@@ -340,7 +384,6 @@ def _cut_balls_in_boxes(
         ):
             total += _ball_in_tetrahedra(face, edge, to_end, radius)
             total -= _ball_in_tetrahedra(face, edge, from_start, radius)
-    return total
 
 
 def _ball_in_tetrahedra(

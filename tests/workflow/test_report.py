@@ -23,15 +23,15 @@ from lammps_inelastic.analysis.plots import (
     plot_wall_profile,
 )
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.report.blocks import Comparison, Table, as_short, as_text
+from lammps_inelastic.workflow.report.blocks import Cell, Comparison, Table
+from lammps_inelastic.workflow.report.columns import Column, table
+from lammps_inelastic.workflow.report.contents import all_sections
 from lammps_inelastic.workflow.report.data import Data, paper_numbers, read_data
 from lammps_inelastic.workflow.report.figures import Figure, Panel, curve
 from lammps_inelastic.workflow.report.page import summarise
-from lammps_inelastic.workflow.report.paper import all_sections
 from lammps_inelastic.workflow.report.statistics import (
     Sample,
     Stated,
-    as_value,
     difference_in_errors,
     mean_curve,
     mean_distribution,
@@ -40,6 +40,7 @@ from lammps_inelastic.workflow.report.statistics import (
     root_mean_square_difference,
     sample,
 )
+from lammps_inelastic.workflow.report.text import as_short, as_stated, as_text, as_value
 from lammps_inelastic.workflow.shipped import STUDIES
 from lammps_inelastic.workflow.store import Result, StoredStudy, write_studies
 
@@ -632,6 +633,29 @@ def test_numbers_as_text():
     assert as_text(-1.5, 1) == "\N{MINUS SIGN}1.5"
     assert as_text(math.nan, 2) == "\N{EN DASH}"
     assert [as_short(v) for v in (5e-05, 0.11, 12345.0, 0.0)] == ["0.00005", "0.11", "12345", "0"]
+
+
+def test_numbers_of_the_paper_have_as_many_decimals_as_their_error():
+    stated = Stated(63.7, 0.2), Stated(6, 0.05), Stated(1.0833, 0.0123), Stated(3, 0), Stated(0.5)
+    assert [as_stated(one) for one in stated] == [
+        "63.7 ± 0.2",
+        "6.00 ± 0.05",
+        "1.083 ± 0.012",
+        "3 ± 0",
+        "0.5",
+    ]
+    assert as_stated(Stated.of_series(63.39, 0.41, 9)) == "63.39 ± 0.41"
+
+
+def test_a_column_has_its_heading_and_its_cells():
+    columns = [
+        Column("length", lambda row: as_text(row, 1), "d"),
+        Column("is long", lambda row: Cell("yes" if row > 1 else "no", marked=row > 1)),
+    ]
+    made = table("Lengths", columns, [0.5, 2.0])
+    assert made.head == ["length [d]", "is long"]
+    assert [[cell.text for cell in row] for row in made.rows] == [["0.5", "no"], ["2.0", "yes"]]
+    assert [row[1].marked for row in made.rows] == [False, True]
 
 
 def test_parameters_as_text():

@@ -1,14 +1,18 @@
-"""What the report is made of, beside figures: text, tables, comparisons, sections."""
+"""The parts of a report beside its figures: text, tables, comparisons, sections."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from .figures import Figure, Pictures
 from .statistics import LARGE, Sample, Stated, difference_in_errors
+from .text import NOT_RUN
+
+# A column with a word of three letters in it is set as text, not as numbers.
+_WORD = re.compile(r"[A-Za-z]{3}")
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,7 @@ class Text:
 
     @property
     def kind(self) -> str:
-        """For the template."""
+        """The name by which the template tells blocks apart."""
         return "text"
 
 
@@ -33,13 +37,20 @@ class Listing:
 
     @property
     def kind(self) -> str:
-        """For the template."""
+        """The name by which the template tells blocks apart."""
         return "listing"
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry of a table; `marked` where it calls for attention."""
+    """One entry of a table.
+
+    Attributes
+    ----------
+    text : what is written
+    marked : whether it calls for attention
+    link : the anchor of the section to which it leads; empty for none
+    """
 
     text: str
     marked: bool = False
@@ -48,14 +59,14 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table; `columns.table` makes one.
 
     Attributes
     ----------
-    caption : above it
+    caption : the line above the table
     head : names of the columns, with units
     rows : one cell for each column
-    notes : below it
+    notes : lines below the table
     """
 
     caption: str
@@ -65,7 +76,7 @@ class Table:
 
     @property
     def kind(self) -> str:
-        """For the template."""
+        """The name by which the template tells blocks apart."""
         return "table"
 
     @property
@@ -77,12 +88,6 @@ class Table:
         ]
 
 
-# What stands where nothing is known, and before negative numbers.
-NOT_RUN = "not run yet"
-DASH, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
-
-_WORD = re.compile(r"[A-Za-z]{3}")
-
 Block = Text | Listing | Table | Figure | Pictures
 
 
@@ -92,12 +97,12 @@ class Comparison:
 
     Attributes
     ----------
-    what : is compared
-    stated : the paper's
-    ours : over our runs
-    decimals : that are shown
-    unit : behind both; empty for a pure number
-    note : what is not as in the paper
+    what : the name of the number, with the case that it belongs to
+    stated : the paper's number
+    ours : mean and scatter over our runs
+    decimals : how many decimals of ours are shown
+    unit : the unit of both; empty for a pure number
+    note : what of our runs is not as in the paper
     why : where a large difference comes from, as far as it is known
     """
 
@@ -111,8 +116,13 @@ class Comparison:
 
     @property
     def difference(self) -> float:
-        """In standard errors; NaN where none is known."""
+        """The difference in standard errors; NaN where none is known."""
         return difference_in_errors(self.ours, self.stated)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the difference can be told in standard errors."""
+        return not math.isnan(self.difference)
 
     @property
     def is_large(self) -> bool:
@@ -121,71 +131,49 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Content:
+    """The content of a section, without its title.
+
+    Attributes
+    ----------
+    blocks : from top to bottom; none where nothing has been run
+    comparisons : the section's rows of the summary
+    """
+
+    blocks: Sequence[Block] = ()
+    comparisons: Sequence[Comparison] = ()
+
+
+@dataclass(frozen=True)
 class Section:
     """One section of the report.
 
     Attributes
     ----------
-    anchor : its name in links
-    title : its heading
-    blocks : its content
-    comparisons : its rows of the summary
-    studies : names of the studies that it needs
+    anchor : the section's name in links
+    title : the section's heading
+    blocks : from top to bottom
+    comparisons : the section's rows of the summary
+    studies : names of the studies that the section needs
     """
 
     anchor: str
     title: str
     blocks: Sequence[Block]
-    comparisons: Sequence[Comparison] = field(default=())
+    comparisons: Sequence[Comparison] = ()
     studies: Sequence[str] = ()
 
     @property
     def is_missing(self) -> bool:
-        """Whether it only says that nothing has been run."""
+        """Whether the section only says that nothing has been run."""
         return all(isinstance(block, Text) and block.missing for block in self.blocks)
 
 
-def cells(*values: str | int | Cell) -> list[Cell]:
-    """Return a row of cells."""
-    return [value if isinstance(value, Cell) else Cell(str(value)) for value in values]
+def missing(study: str) -> Text:
+    """Return the note of a study that has no results."""
+    return Text(f"Not run yet. To make it: inelastic run {study} --out DIR", missing=True)
 
 
-def as_text(value: float, decimals: int) -> str:
-    """Write a number, a dash where it is not known."""
-    if math.isnan(value):
-        return DASH
-    text = f"{value:.{decimals}f}"
-    # Not -0.00.
-    return text.replace("-", MINUS) if float(text) else text.removeprefix("-")
-
-
-def as_short(value: float) -> str:
-    """Write a number in as few digits as it needs, at most four."""
-    if math.isnan(value) or value == 0:
-        return DASH if math.isnan(value) else "0"
-    # Fixed notation, which is read more easily, for all that occurs here.
-    decimals = 3 - math.floor(math.log10(abs(value)))
-    text = f"{value:.{max(decimals, 0)}f}" if decimals < 12 else f"{value:.4g}"
-    return (text.rstrip("0").rstrip(".") if "." in text else text).replace("-", MINUS)
-
-
-def as_sample(ours: Sample, decimals: int) -> str:
-    """Write mean ± standard deviation (standard error)."""
-    text = as_text(ours.mean, decimals)
-    if math.isnan(ours.std):
-        return text
-    return f"{text} ± {as_text(ours.std, decimals)} ({as_text(ours.error, decimals + 1)})"
-
-
-def as_difference(value: float) -> Cell:
-    """Write a difference in standard errors, marked where it is large."""
-    if math.isnan(value):
-        return Cell(DASH)
-    sign = "+" if value > 0 else ""
-    return Cell(f"{sign}{as_text(value, 1)}", marked=abs(value) > LARGE)
-
-
-def missing(study: str, what: str = "") -> Text:
-    """Return the note of a study, or a part of it, that has no results."""
-    part = f"{what}: not run yet. " if what else "Not run yet. "
-    return Text(f"{part}To make it: inelastic run {study} --out DIR", missing=True)
+def nothing_run() -> Text:
+    """Return the note of a section that shows any study, where there is none."""
+    return Text("No study has results.", missing=True)

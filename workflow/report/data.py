@@ -1,9 +1,9 @@
-"""What a report is made from: the results in the files, and the numbers of the paper."""
+"""The results in the files and the numbers of the paper: a report is made from these alone."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
@@ -17,14 +17,10 @@ from ..errors import WorkflowError
 from ..shipped import DECKS
 from ..shipped import STUDIES as OF_THE_PAPER
 from ..store import Result, StoredStudy, read_studies
-from .statistics import FloatArray, grouped, matching
+from .statistics import FloatArray
 
-# Decks in whose results a particle is a sphere.
+# This deck pours free spheres: its particles are spheres.
 SPHERES = "spheres"
-# The decks' words for the solvers: our own, and the paper's.
-OUR_SOLVER, PAPER_SOLVER = "apgd", "uzawa"
-# Of the paper where it states no other, radii.
-USUAL_TOLERANCE = 0.0005
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +47,8 @@ def paper_numbers() -> dict[str, Any]:
 def read_data(paths: Iterable[Path]) -> Data:
     """Read files of studies; parts of one study that lie in several files are put together.
 
-    Raises WorkflowError for a file that is none, and where two different studies have one name.
+    Raises WorkflowError for a file that holds no studies, and for two different studies of one
+    name.
     """
     studies: dict[str, StoredStudy] = {}
     for path in paths:
@@ -69,7 +66,7 @@ def read_data(paths: Iterable[Path]) -> Data:
             studies[study.name] = replace(known, results=list(cases.values()))
     for name, study in studies.items():
         studies[name] = replace(study, results=[_completed(result) for result in study.results])
-    # Those of the paper first, in its order: a file has them in that of the alphabet.
+    # The studies of the paper come first, in its order: a file has them by the alphabet.
     order = [name for name in OF_THE_PAPER if name in studies]
     order += [name for name in studies if name not in OF_THE_PAPER]
     return Data({name: studies[name] for name in order}, paper_numbers())
@@ -94,9 +91,10 @@ def deck_defaults(deck: str) -> Mapping[str, Value]:
 
 
 def profile(result: Result) -> tuple[FloatArray, FloatArray] | None:
-    """Return a wall profile: distance over the diameter, packing fraction; None if there is none.
+    """Return a wall profile: distance over the diameter (s,), packing fraction (s,), or None.
 
-    From exact volumes where there are such, else from random points.
+    The packing fraction is that of exact volumes where it was measured, else of random points.
+    None stands for a result without a profile.
     """
     distance = result.values.get("profile/distance")
     values = result.values.get("profile/packing_fraction", result.values.get("profile/monte_carlo"))
@@ -106,7 +104,7 @@ def profile(result: Result) -> tuple[FloatArray, FloatArray] | None:
 
 
 def profiles(results: Iterable[Result]) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the wall profiles that there are."""
+    """Return the wall profiles of those results that have one."""
     return [found for result in results if (found := profile(result)) is not None]
 
 
@@ -116,54 +114,16 @@ def series(result: Result, name: str) -> FloatArray | None:
     return None if values is None or len(values) == 0 else np.asarray(values, dtype=np.float64)
 
 
-def by_size(results: Iterable[Result]) -> dict[tuple[float, float], list[Result]]:
-    """Return results by number of particles and diameter, from few particles to many."""
-    groups = grouped(
-        results,
-        lambda result: (
-            float(result.variables.get("particles", result.number("particles"))),
-            float(result.variables.get("diameter", 1.0)),
-        ),
-    )
-    return dict(sorted(groups.items()))
+def arrays_of(results: Iterable[Result], name: str) -> list[FloatArray]:
+    """Return an array of those results that have it."""
+    return [
+        np.asarray(result.values[name], dtype=np.float64)
+        for result in results
+        if name in result.values
+    ]
 
 
-def nearest_size(results: Sequence[Result], wanted: int) -> list[Result]:
-    """Return the results of so many particles; of the most if there are none of so many.
-
-    Those of the paper's usual tolerance only, where there are such.
-    """
-    groups = by_size(matching(results, tolerance=USUAL_TOLERANCE) or results)
-    if not groups:
-        return []
-    for (particles, _), group in groups.items():
-        if particles == wanted:
-            return group
-    return list(groups.values())[-1]
-
-
-def count_of(results: Sequence[Result]) -> int:
-    """Return the number of particles that the results were asked to have."""
-    return int(results[0].variables.get("particles", results[0].number("particles")))
-
-
-def solver_of(result: Result) -> str:
-    """Return the solver of a run; a deck that does not say it uses our own."""
-    return str(result.variables.get("solver", OUR_SOLVER))
-
-
-def unlike(results: Sequence[Result], particles: int, runs: int = 0) -> str:
-    """Say what of number of particles and number of runs is not as in the paper; empty if all is.
-
-    Parameters
-    ----------
-    results : of one group
-    particles : in the paper
-    runs : in the paper; 0 if this is not compared
-    """
-    parts = []
-    if results and count_of(results) != particles:
-        parts.append(f"{count_of(results):,} particles, not {particles:,}")
-    if results and runs and len(results) != runs:
-        parts.append(f"{len(results)} run{'s' if len(results) > 1 else ''}, not {runs}")
-    return "; ".join(parts)
+def curves_of(results: Iterable[Result], x: str, y: str) -> list[tuple[FloatArray, FloatArray]]:
+    """Return two arrays, (k,) both, of those results that have the first."""
+    known = [result for result in results if x in result.values]
+    return list(zip(arrays_of(known, x), arrays_of(known, y), strict=True))

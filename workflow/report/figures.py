@@ -20,7 +20,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from PIL import Image, ImageOps
 
 from lammps_inelastic.analysis.plots import (
@@ -34,18 +34,18 @@ from lammps_inelastic.analysis.plots import (
 )
 
 from ..files import whole
+from .statistics import FloatArray, Sample
 
-FloatArray = NDArray[np.float64]
 Kind = Literal["curve", "points", "apart", "distribution", "profile"]
 
-# Of one panel, inches; the text has about the size of the page's.
+# The size of one panel in inches; the text has about the size of the page's.
 WIDTH, HEIGHT = 4.6, 3.4
 DPI = 200
-# A legend of more entries, or longer ones, stands below the axes: rows of so many inches, and so
-# many letters a panel.
+# A legend of more entries, or longer ones, stands below the axes: its rows are so many inches high
+# and hold so many letters a panel.
 MOST_INSIDE, LONGEST_INSIDE = 6, 26
 LEGEND_ROW, LINE = 0.19, 62
-# Left around a picture whose margins are cut off, pixels.
+# So many pixels are left around a picture whose margins are cut off.
 MARGIN = 10
 RC: Any = {
     "font.family": "DejaVu Sans",
@@ -57,7 +57,7 @@ RC: Any = {
     "legend.fontsize": "small",
     "xtick.direction": "out",
     "ytick.direction": "out",
-    # Outlines: the page needs no font of the reader's.
+    # Letters are drawn as outlines: the page needs no font of the reader's.
     "svg.fonttype": "path",
     # The same numbers give the same file.
     "svg.hashsalt": "inelastic",
@@ -71,7 +71,7 @@ class Curve:
 
     Attributes
     ----------
-    label : for the legend and the CSV file
+    label : the name in the legend and the CSV file
     x, y : (k,)
     error : (k,), standard error of y; None where there is none
     kind : how it is drawn; `apart`: points that no line joins
@@ -95,6 +95,20 @@ def curve(
         None if error is None else np.asarray(error, dtype=np.float64),
         kind,
     )
+
+
+def points(label: str, x: ArrayLike, samples: Iterable[Sample], kind: Kind = "points") -> Curve:
+    """Return means over runs as points with their standard errors as error bars.
+
+    Parameters
+    ----------
+    label : for the legend and the CSV file
+    x : (k,)
+    samples : k of them
+    kind : how they are drawn
+    """
+    known = list(samples)
+    return curve(label, x, [one.mean for one in known], [one.error for one in known], kind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +146,7 @@ class Figure:
 
     Attributes
     ----------
-    name : of its files
+    name : the name of its files
     caption : what is seen
     panels : from left to right
     drawing : draws on a panel's axis in its stead; such a figure has no numbers
@@ -145,7 +159,7 @@ class Figure:
 
     @property
     def kind(self) -> str:
-        """For the template."""
+        """The name by which the template tells blocks apart."""
         return "figure"
 
     @property
@@ -156,7 +170,7 @@ class Figure:
         return f"data:image/svg+xml;base64,{base64.b64encode(buffer.getvalue()).decode()}"
 
     def write(self, folder: Path) -> None:
-        """Write it as PDF, PNG and CSV into a folder that is there."""
+        """Write the figure as PDF, PNG and CSV into a folder that is there."""
         for form in ("pdf", "png"):
             with whole(folder / f"{self.name}.{form}") as temporary:
                 self._save(temporary, form)
@@ -179,12 +193,12 @@ class Figure:
                     row = {"curve": label, panel.x: tick, panel.y: _word(value)}
                     row[f"standard error of {panel.y}"] = _word(error)
                     rows.append([row.get(name, "") for name in names])
-        # A column in which nothing stands says nothing.
+        # A column without any entry is left out.
         filled = [any(row[i] for row in rows[1:]) for i in range(len(names))]
         return [[cell for cell, kept in zip(row, filled, strict=True) if kept] for row in rows]
 
     def _save(self, target: Any, form: str) -> None:
-        # The text of an SVG file holds the date otherwise, and a PDF file too.
+        # Without these an SVG file and a PDF file hold the date.
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}[form]
         with matplotlib.rc_context(RC):
             self._canvas.savefig(target, format=form, dpi=DPI, metadata=metadata)
@@ -225,7 +239,7 @@ class Pictures:
 
     Attributes
     ----------
-    name : of their files
+    name : the name of their files
     caption : what is seen
     pictures : PNG files by what is written below each
     trimmed : whether white margins are cut off
@@ -238,12 +252,12 @@ class Pictures:
 
     @property
     def kind(self) -> str:
-        """For the template."""
+        """The name by which the template tells blocks apart."""
         return "pictures"
 
     @property
     def sources(self) -> list[tuple[str, str]]:
-        """What is written below each picture, and the picture as a data URI."""
+        """The text below each picture, and the picture as a data URI."""
         return [
             (label, f"data:image/png;base64,{base64.b64encode(data).decode()}")
             for label, data in self._shown()
@@ -256,7 +270,7 @@ class Pictures:
         ]
 
     def write(self, folder: Path) -> None:
-        """Write them side by side as PDF and PNG, and as CSV what each one shows."""
+        """Write the pictures side by side as PDF and PNG, and as CSV what each one shows."""
         images = [Image.open(io.BytesIO(data)).convert("RGB") for _, data in self._shown()]
         height = max(image.height for image in images)
         joined = Image.new("RGB", (sum(image.width for image in images), height), "white")
@@ -326,7 +340,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
         plot_bounds(ax, low, high, label=label)
     for number, (label, value) in enumerate(panel.references):
         plot_reference(ax, value, label=label, number=number)
-    # The lower end of a logarithmic axis: not down to where an error band meets 0.
+    # A logarithmic axis ends below the smallest value, not where an error band meets 0.
     bottom = 0.5 * min(float(one.y[one.y > 0].min()) for one in panel.curves) if panel.log else None
     for number, one in enumerate(panel.curves):
         _draw_curve(ax, one, number, bottom)
@@ -348,7 +362,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
 
 def _draw_curve(ax: Axes, one: Curve, number: int, bottom: float | None) -> None:
     """Draw a curve; `bottom` is the lower end of a logarithmic axis."""
-    # Beyond the lower end of the axis, so that a band is cut there and does not seem to end.
+    # A band reaches beyond the lower end of the axis: it is cut there and does not seem to end.
     least = None if bottom is None else bottom / 10
     how: Any = {"errors": one.error, "label": one.label, "number": number, "least": least}
     if one.kind == "distribution":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,36 +11,74 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined, select_autoescape
 
-from .blocks import (
-    DASH,
-    Cell,
-    Comparison,
-    Section,
-    Table,
-    as_difference,
-    as_sample,
-    as_short,
-    as_text,
-    cells,
-)
+from .blocks import Cell, Comparison, Section, Table
+from .columns import Column, difference_cell, ours_text, table
 from .data import Data
-from .provenance import as_time, commands
-from .statistics import LARGE, computing_seconds
+from .sections.provenance import commands
+from .statistics import LARGE, SHARE_ABOVE_LARGE, computing_seconds
+from .text import as_short, as_stated, as_text, as_time
 
 TEMPLATE = "template.html.j2"
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The table at the top, and what it amounts to."""
+    """The table at the top of a report, and its sum.
+
+    Attributes
+    ----------
+    table : all comparisons with the paper
+    compared : how many of them have a difference in standard errors
+    large : how many of these differences are large
+    """
 
     table: Table
     compared: int
     large: int
 
+    @property
+    def large_by_chance(self) -> str:
+        """How many differences would be large if nothing but chance made them."""
+        return as_text(SHARE_ABOVE_LARGE * self.compared, 1)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A comparison and the section that it stands in."""
+
+    section: Section
+    comparison: Comparison
+
+    def with_unit(self, text: str) -> str:
+        """Write the unit of the comparison behind a number."""
+        unit = self.comparison.unit
+        return f"{text} {unit}" if unit else text
+
+    @property
+    def remarks(self) -> str:
+        """The differences from the paper's case, and why a large difference is large."""
+        one = self.comparison
+        return "; ".join(text for text in (one.note, one.why if one.is_large else "") if text)
+
+
+COLUMNS: Sequence[Column[_Row]] = (
+    Column("number", lambda row: Cell(row.comparison.what, link=row.section.anchor)),
+    Column("paper", lambda row: row.with_unit(as_stated(row.comparison.stated))),
+    Column("ours", lambda row: row.with_unit(ours_text(row.comparison))),
+    Column("runs", lambda row: row.comparison.ours.n),
+    Column("difference", lambda row: difference_cell(row.comparison.difference), "SE"),
+    Column("not as in the paper, and why", lambda row: row.remarks),
+)
+
 
 def render(data: Data, sections: Sequence[Section]) -> str:
-    """Return the page."""
+    """Return the page.
+
+    Parameters
+    ----------
+    data : what the files hold
+    sections : made from that data, from top to bottom
+    """
     environment = Environment(
         autoescape=select_autoescape(default_for_string=True),
         undefined=StrictUndefined,
@@ -67,47 +104,22 @@ def render(data: Data, sections: Sequence[Section]) -> str:
 
 def summarise(sections: Sequence[Section]) -> Summary | None:
     """Return the table of all comparisons; None if there are none."""
-    rows: list[list[Cell]] = []
-    compared: list[Comparison] = []
-    for section in sections:
-        for one in section.comparisons:
-            rows.append(_row(section, one))
-            if as_difference(one.difference).text != DASH:
-                compared.append(one)
+    rows = [_Row(section, one) for section in sections for one in section.comparisons]
     if not rows:
         return None
+    compared = [row.comparison for row in rows if row.comparison.is_known]
     return Summary(
-        Table(
+        table(
             "Paper and ours",
-            ("number", "paper", "ours", "runs", "difference [SE]", "not as in the paper, and why"),
+            COLUMNS,
             rows,
             (
                 "Ours: mean ± standard deviation (standard error). SE: standard errors, "
                 "sqrt(ours² + the paper's²); a ± that the paper states as such is taken for its "
                 "standard error. Where it states no scatter, ours alone. Marked: more than "
-                f"{LARGE:g}. Dash: a single run has no standard error.",
+                f"{as_short(LARGE)}. Dash: a single run has no standard error.",
             ),
         ),
         len(compared),
         sum(one.is_large for one in compared),
     )
-
-
-def _row(section: Section, one: Comparison) -> list[Cell]:
-    stated = one.stated
-    if stated.n:
-        paper = f"{as_text(stated.value, 2)} ± {stated.std:g}"
-    elif not math.isnan(stated.error):
-        # As many decimals as the error has.
-        error = f"{stated.error:.2g}"
-        decimals = len(error.partition(".")[2])
-        paper = f"{as_text(stated.value, decimals)} ± {error}"
-    else:
-        paper = as_short(stated.value)
-    unit = f" {one.unit}" if one.unit else ""
-    return [
-        Cell(one.what, link=section.anchor),
-        *cells(paper + unit, as_sample(one.ours, one.decimals) + unit, one.ours.n),
-        as_difference(one.difference),
-        Cell("; ".join(text for text in (one.note, one.why if one.is_large else "") if text)),
-    ]

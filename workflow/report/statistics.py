@@ -1,11 +1,11 @@
-"""From the cases of a study to means over seeds, and from two numbers to a difference."""
+"""Means over runs with their scatter, means of curves, and differences in standard errors."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,14 @@ from ..store import Result
 
 FloatArray = NDArray[np.float64]
 Key = TypeVar("Key", bound=Hashable)
+# A mean curve is x, mean y and its standard error, (k,) each; a single curve has no error.
+MeanCurve = tuple[FloatArray, FloatArray, FloatArray | None]
 
-# Parameters that do not change the packing but by chance: cases that differ in these alone are
-# repeats.
-REPEATS = frozenset({"seed", "dump_every"})
 # Samples of fewer values get the scatter of all samples of their kind.
 FEW = 4
-# Above this many standard errors a difference is marked.
-LARGE = 2.0
+# Above this many standard errors a difference is marked. Chance alone makes about this share of all
+# differences so large (Gauss: 4.6 %).
+LARGE, SHARE_ABOVE_LARGE = 2.0, 0.05
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Sample:
 
     Attributes
     ----------
-    mean : NaN of no values
-    std : standard deviation, with n - 1 in its denominator; NaN of fewer than two values
+    mean : NaN without any value
+    std : standard deviation, with n - 1 in its denominator; NaN for fewer than two values
     n : number of values
     """
 
@@ -41,11 +41,11 @@ class Sample:
 
     @property
     def error(self) -> float:
-        """Standard error of the mean; NaN of fewer than two values."""
+        """Standard error of the mean; NaN for fewer than two values."""
         return self.std / math.sqrt(self.n) if self.n else math.nan
 
     def scaled(self, factor: float) -> Sample:
-        """Return the same in another unit."""
+        """Return the sample with its values multiplied by a factor, as in another unit."""
         return Sample(self.mean * factor, self.std * abs(factor), self.n)
 
 
@@ -67,8 +67,8 @@ def pooled(samples: Mapping[Key, Sample]) -> dict[Key, Sample]:
     """Give samples of few values the scatter that all samples share.
 
     The standard deviation of two or three values is itself uncertain by half and more, and near
-    zero by chance in some of many samples. Where the scatter can be taken to be the same in all,
-    sqrt(sum of (n - 1) s^2 / sum of (n - 1)) is a better one.
+    zero by chance in some of many samples. If the scatter can be taken to be the same in all, the
+    pooled one, sqrt(sum of (n - 1) s^2 / sum of (n - 1)), is better.
     """
     freedom = sum(one.n - 1 for one in samples.values() if one.n > 1)
     if not freedom:
@@ -111,94 +111,23 @@ class Stated:
 def difference_in_errors(ours: Sample, stated: Stated) -> float:
     """Return ours - the paper's, over the standard error of that difference.
 
-    Where the paper tells no scatter, over our own standard error alone; NaN where there is none,
-    as of a single run.
+    The standard error is our own alone if the paper tells no scatter. The result is NaN if we have
+    none, as for a single run.
     """
     squares = [error**2 for error in (ours.error, stated.error) if not math.isnan(error)]
-    # One run beside a paper's range: how far it would fall from it by chance is not known.
+    # It is not known how far a single run would fall from the paper's range by chance.
     if math.isnan(ours.error) or sum(squares) == 0:
         return math.nan
     return (ours.mean - stated.value) / math.sqrt(sum(squares))
 
 
-def grouped(
-    results: Iterable[Result], key: Callable[[Result], Hashable]
-) -> dict[Any, list[Result]]:
-    """Return the results by a key, in the order in which the keys first appear."""
-    groups: dict[Any, list[Result]] = {}
-    for result in results:
-        groups.setdefault(key(result), []).append(result)
-    return groups
-
-
-def by_variables(names: Sequence[str]) -> Callable[[Result], tuple[Any, ...]]:
-    """Return a key: a result's deck and its values of some variables."""
-    return lambda result: (result.record["deck"], *map(result.variables.get, names))
-
-
-def by_value(name: str) -> Callable[[Result], float]:
-    """Return a key: a result's value of a variable that is a number."""
-    return lambda result: float(result.variables[name])
-
-
-def varying(results: Sequence[Result]) -> list[str]:
-    """Return the parameters, other than repeats, that are not the same in all results."""
-    names = dict.fromkeys(name for result in results for name in result.variables)
-    return [
-        name
-        for name in names
-        if name not in REPEATS and len({result.variables.get(name) for result in results}) > 1
-    ]
-
-
-def as_value(value: object) -> str:
-    """Write a parameter: a number with its own digits, or a word."""
-    if not isinstance(value, int | float):
-        return str(value)
-    # Not 5e-05.
-    small = 0 < abs(value) < 1e-3
-    return f"{value:.10f}".rstrip("0") if small else f"{value:,.10g}"
-
-
-def labelled(results: Sequence[Result]) -> dict[str, list[Result]]:
-    """Return the results of the same parameters together, by what is not the same in all.
-
-    The label names the deck, where there are several, and what varies among the runs of that deck.
-    """
-    decks = grouped(results, lambda result: str(result.record["deck"]))
-    groups: dict[str, list[Result]] = {}
-    for deck, runs in decks.items():
-        names = varying(runs)
-        for (_, *values), group in grouped(runs, by_variables(names)).items():
-            words = [f"{n} = {as_value(v)}" for n, v in zip(names, values, strict=True)]
-            if len(decks) > 1 or not words:
-                words.insert(0, deck)
-            groups[", ".join(words)] = group
-    return groups
-
-
-def matching(results: Iterable[Result], **wanted: float | str) -> list[Result]:
-    """Return the results whose variables have these values, numbers up to round-off."""
-    return [
-        result
-        for result in results
-        if all(_equal(result.variables.get(name), value) for name, value in wanted.items())
-    ]
-
-
-def _equal(value: object, wanted: float | str) -> bool:
-    if isinstance(value, int | float) and isinstance(wanted, int | float):
-        return math.isclose(value, wanted, rel_tol=1e-9)
-    return value == wanted
-
-
 def mean_curve(
     curves: Sequence[tuple[FloatArray, FloatArray]],
-) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Return the mean of curves: x, mean y, and its standard error; None of a single curve.
+) -> MeanCurve:
+    """Return the mean of curves (x, y): x, mean y, and its standard error, None for a single curve.
 
-    Others than the first are read at the x of the first by linear interpolation, NaN beyond their
-    ends.
+    The curves after the first are read at the x of the first by linear interpolation; they are NaN
+    beyond their ends.
     """
     x = curves[0][0]
     rows = np.array([np.interp(x, *curve, left=np.nan, right=np.nan) for curve in curves])
@@ -211,9 +140,9 @@ def mean_curve(
 def root_mean_square_difference(
     one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray]
 ) -> float:
-    """Return that of two curves (x, y) where they overlap, at the x of the first; NaN if nowhere.
+    """Return the root mean square difference of two curves (x, y) at the x of the first.
 
-    The second is read by linear interpolation.
+    The second is read by linear interpolation, and only where it is known: NaN if nowhere.
     """
     x, y = one
     apart = y - np.interp(x, *other, left=np.nan, right=np.nan)
@@ -222,7 +151,10 @@ def root_mean_square_difference(
 
 
 def mean_distribution(distributions: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray | None]:
-    """Return the mean share of each number and its standard error; short ones end with zeros."""
+    """Return the mean share of each number and its standard error, (k,) both.
+
+    Shorter distributions go on with zeros. A single one has no standard error: None.
+    """
     length = max(len(one) for one in distributions)
     rows = np.array([np.pad(one, (0, length - len(one))) for one in distributions])
     mean: FloatArray = rows.mean(axis=0)
@@ -242,16 +174,16 @@ def peak(
     """Return where a parabola near the largest value is largest, and its standard error.
 
     The parabola is fitted to the largest value and those up to `reach` places to either side; the
-    error is what the errors of these values make of its top (linear propagation). The x of the
-    largest value, and NaN, where that one is too near to either end or the parabola has no top.
+    error is what the errors of these values make of its top (linear propagation). The result is the
+    x of the largest value, and NaN, if that is too near to either end or the parabola has no top.
     """
     best = int(np.argmax(y))
     if not reach <= best < len(y) - reach:
         return float(x[best]), math.nan
     near = slice(best - reach, best + reach + 1)
-    # About the middle one, which keeps the numbers small.
+    # Places are counted from the largest value, which keeps the numbers small.
     apart = np.asarray(x[near]) - x[best]
-    # Rows of the pseudo-inverse: how much of each value is in the coefficients a and b.
+    # These rows of the pseudo-inverse say how much of each value is in the coefficients a and b.
     of_a, of_b, _ = np.linalg.pinv(np.vander(apart, 3))
     values = np.asarray(y[near])
     a, b = float(of_a @ values), float(of_b @ values)

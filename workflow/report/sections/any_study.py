@@ -1,0 +1,156 @@
+"""A section for any study: its cases over their seeds, and plots against what varies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...store import Result, StoredStudy
+from ..blocks import Block, Section, Table, missing
+from ..columns import RUNS, Case, Column, table
+from ..data import arrays_of, profiles, series
+from ..figures import Curve, Figure, Panel, curve, points
+from ..groups import by_value, by_variables, grouped, labelled, varying
+from ..quantities import OF_ANY_STUDY
+from ..statistics import mean_curve, mean_distribution, numbers
+from ..text import as_value
+from .pictures import network_picture, step_pictures
+
+# One plot has at most so many curves: more cannot be told apart.
+MOST_CURVES = 7
+# The numbers that are plotted, with the labels of their axes.
+PLOTTED = {"packing_fraction": "packing fraction", "coordination_number": "coordination number"}
+
+Groups = Mapping[str, Sequence[Result]]
+
+
+def study_section(study: StoredStudy) -> Section:
+    """Return the section of a study that is none of the paper's."""
+    groups = labelled(study.results)
+    anchor = f"study-{re.sub(r'[^a-z0-9]+', '-', study.name.lower())}"
+    blocks: list[Block] = []
+    if groups:
+        blocks.append(_table(groups))
+        blocks += _against(study, varying(study.results), anchor)
+        blocks += _evolution(groups, anchor)
+        blocks += _distributions(groups, anchor)
+        blocks += _profiles(groups, anchor)
+        for number, (label, group) in enumerate(groups.items(), 1):
+            blocks += step_pictures(group, f"{anchor}-pictures-{number}", label)
+            caption = f"Network of contacts: {label}"
+            blocks += network_picture(group, f"{anchor}-network-{number}", caption)
+    return Section(
+        anchor,
+        f"{study.title} ({study.name})",
+        blocks or [missing(f"{study.name}.toml")],
+        studies=(study.name,),
+    )
+
+
+def _table(groups: Groups) -> Table:
+    known = [
+        quantity
+        for quantity in OF_ANY_STUDY
+        if any(quantity.over(group).n for group in groups.values())
+    ]
+    columns: list[Column[Case]] = [Column("case", lambda case: case.label), RUNS]
+    columns += [quantity.column() for quantity in known]
+    return table(
+        "All cases, means over seeds",
+        columns,
+        [Case(label, group) for label, group in groups.items()],
+        ("Mean ± standard deviation (standard error); what all cases have alike is not named.",),
+    )
+
+
+def _against(study: StoredStudy, names: Sequence[str], anchor: str) -> list[Block]:
+    """Return a figure for each parameter that varies as a number."""
+    figures: list[Block] = []
+    for name in names:
+        others = [other for other in names if other != name]
+        drawn = _curves_against(study.results, name, others)
+        panels = [
+            Panel(name, text, drawn[number][:MOST_CURVES])
+            for number, text in PLOTTED.items()
+            if drawn[number]
+        ]
+        if panels:
+            caption = f"Packing fraction and coordination number against {name}; error bars: "
+            caption += f"standard error over the runs.{_left_out(drawn['packing_fraction'])}"
+            figures.append(Figure(f"{anchor}-{name}", caption, panels))
+    return figures
+
+
+def _curves_against(
+    results: Sequence[Result], name: str, others: Sequence[str]
+) -> dict[str, list[Curve]]:
+    """Return curves of each plotted number, one for each choice of what else varies."""
+    drawn: dict[str, list[Curve]] = {number: [] for number in PLOTTED}
+    with_it = [r for r in results if isinstance(r.variables.get(name), int | float)]
+    for key, group in grouped(with_it, by_variables(others)).items():
+        places = dict(sorted(grouped(group, by_value(name)).items()))
+        if len(places) < 2:
+            continue
+        deck, *values = key
+        words = [
+            f"{other} = {as_value(value)}"
+            for other, value in zip(others, values, strict=True)
+            if value is not None
+        ]
+        for number, curves in drawn.items():
+            found = [numbers(runs, number) for runs in places.values()]
+            if any(one.n for one in found):
+                curves.append(points(", ".join([deck, *words]), list(places), found))
+    return drawn
+
+
+def _evolution(groups: Groups, anchor: str) -> list[Block]:
+    drawn: dict[str, list[Curve]] = {number: [] for number in PLOTTED}
+    for label, group in groups.items():
+        # A mean over seeds would hide how a packing comes to rest: the first run is shown.
+        first = group[0]
+        steps = series(first, "evolution/step")
+        for number, curves in drawn.items():
+            values = series(first, f"evolution/{number}")
+            if steps is not None and values is not None:
+                curves.append(curve(label, steps, values))
+    if not drawn["packing_fraction"]:
+        return []
+    caption = "Packing fraction and coordination number in the box against the step, the first run "
+    caption += f"of each.{_left_out(drawn['packing_fraction'])}"
+    panels = [Panel("step", text, drawn[number][:MOST_CURVES]) for number, text in PLOTTED.items()]
+    return [Figure(f"{anchor}-evolution", caption, panels)]
+
+
+def _distributions(groups: Groups, anchor: str) -> list[Block]:
+    curves = []
+    for label, group in groups.items():
+        found = arrays_of(group, "distribution/contacts")
+        if found:
+            mean, error = mean_distribution(found)
+            curves.append(curve(label, np.arange(len(mean)), mean, error, "distribution"))
+    if not curves:
+        return []
+    caption = f"Share of the particles in the box with so many contacts.{_left_out(curves)}"
+    panel = Panel("number of contacts", "share of particles", curves[:MOST_CURVES])
+    return [Figure(f"{anchor}-contacts", caption, [panel])]
+
+
+def _profiles(groups: Groups, anchor: str) -> list[Block]:
+    curves = [
+        curve(label, *mean_curve(found), kind="profile")
+        for label, group in groups.items()
+        if (found := profiles(group))
+    ]
+    if not curves:
+        return []
+    caption = f"Packing fraction against the distance from a wall.{_left_out(curves)}"
+    panel = Panel("distance from the wall / d", "packing fraction", curves[:MOST_CURVES])
+    return [Figure(f"{anchor}-profile", caption, [panel])]
+
+
+def _left_out(curves: Sequence[Curve]) -> str:
+    more = len(curves) - MOST_CURVES
+    return f" {more} more cases are in the table only." if more > 0 else ""

@@ -1,0 +1,107 @@
+"""Checks of every case of every study: the largest overlap, and how well contacts are resolved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...store import Result
+from ..blocks import Cell, Content
+from ..columns import RUNS, Column, table
+from ..data import SPHERES, Data
+from ..groups import labelled
+from ..quantities import COORDINATION_NUMBER, RESOLUTION
+from ..text import as_short, as_text
+
+# Two bodies that turn may overlap by two tolerances; spheres by one.
+ALLOWED_OF_BODIES, ALLOWED_OF_SPHERES = 2.0, 1.0
+# Overlap and tolerance are rounded numbers of different programs: so much more is the same.
+ROUNDING = 1e-6
+# A contact is told from a gap well up to a resolution of 0.01; the rest is rounding.
+WORST_RESOLUTION = 0.0101
+
+
+@dataclass(frozen=True)
+class _Row:
+    """The runs of one case of a study."""
+
+    study: str
+    label: str
+    group: Sequence[Result]
+
+    @property
+    def tolerance(self) -> float:
+        """The loosest tolerance of a run, radii; NaN if the deck has none."""
+        names = ("tolerance", "tolerance_agitated", "tolerance_measuring")
+        variables = self.group[0].variables
+        return max(
+            (float(variables[name]) for name in names if name in variables), default=math.nan
+        )
+
+    @property
+    def overlap(self) -> float:
+        """The largest overlap of the runs, radii."""
+        return max((_overlap(result) for result in self.group), default=math.nan)
+
+    @property
+    def allowed(self) -> float:
+        """The allowed overlap, tolerances."""
+        deck = str(self.group[0].record["deck"])
+        of_spheres = deck == SPHERES or "response" in deck
+        return ALLOWED_OF_SPHERES if of_spheres else ALLOWED_OF_BODIES
+
+    @property
+    def resolution(self) -> float:
+        """The mean resolution of the runs."""
+        return RESOLUTION.over(self.group).mean
+
+
+def _overlap(result: Result) -> float:
+    """Return the largest overlap of all steps; of the last frame where that is not known."""
+    whole = result.number("largest_overlap_of_all_steps")
+    return whole if not math.isnan(whole) else result.number("largest_overlap")
+
+
+def _overlap_cell(row: _Row) -> Cell:
+    ratio = row.overlap / row.tolerance
+    return Cell(as_text(ratio, 3), marked=ratio > row.allowed * (1 + ROUNDING))
+
+
+COLUMNS: Sequence[Column[_Row]] = (
+    Column("study", lambda row: row.study),
+    Column("case", lambda row: row.label),
+    RUNS,
+    Column("ε / r", lambda row: as_short(row.tolerance)),
+    Column("largest overlap / r", lambda row: as_short(row.overlap)),
+    Column("overlap / ε", _overlap_cell),
+    COORDINATION_NUMBER.column(),
+    Column(
+        RESOLUTION.heading,
+        lambda row: Cell(as_short(row.resolution), marked=row.resolution > WORST_RESOLUTION),
+    ),
+)
+
+
+def checks(data: Data) -> Content:
+    """Show overlap and resolution of every case."""
+    rows = [
+        _Row(study.name, label, group)
+        for study in data.studies.values()
+        for label, group in labelled(study.results).items()
+    ]
+    if not rows:
+        return Content()
+    return Content(
+        [
+            table(
+                "Largest overlap at any step of any run, and how well contacts are resolved",
+                COLUMNS,
+                rows,
+                (
+                    "ε: the loosest of a run. Marked: an overlap of more than ε (2 ε for bodies "
+                    "that turn), or a count whose ε / (g h²) is above 0.01.",
+                ),
+            )
+        ]
+    )

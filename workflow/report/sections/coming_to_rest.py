@@ -1,0 +1,137 @@
+"""The paper's Figure 5: packing fraction and coordination number until the packing is at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lammps_inelastic.analysis import AnalysisError, Plateau, plateau
+
+from ...store import Result
+from ..blocks import Content, Text
+from ..columns import Column, table
+from ..data import Data, series
+from ..figures import Curve, Figure, Panel, curve
+from ..groups import count_of, nearest_size, seed_label
+from ..quantities import COORDINATION_NUMBER, PACKING_FRACTION, Quantity
+from ..statistics import FloatArray
+from ..text import DASH, as_count, as_text
+
+# The paper calls its two curves constant within these shares of the final mean.
+BAND_OF_PHI, BAND_OF_Z = 0.001, 0.0005
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A row of the table; a plateau is None where the box was empty."""
+
+    particles: int
+    label: str
+    phi: Plateau | None
+    z: Plateau | None
+
+
+COLUMNS: Sequence[Column[_Run]] = (
+    Column("spheres", lambda run: as_count(run.particles)),
+    Column("run", lambda run: run.label),
+    Column(f"φ within ±{as_text(100 * BAND_OF_PHI, 1)}% from step", lambda run: _step(run.phi)),
+    Column("mean φ", lambda run: _mean(run.phi, PACKING_FRACTION), "%"),
+    Column(f"z within ±{as_text(100 * BAND_OF_Z, 2)}% from step", lambda run: _step(run.z)),
+    Column("mean z", lambda run: _mean(run.z, COORDINATION_NUMBER)),
+)
+
+
+def coming_to_rest(data: Data) -> Content:
+    """Show both numbers against the step, and from which step on they stay as they are."""
+    with_frames = [r for r in data.results("table-2") if series(r, "evolution/step") is not None]
+    results = nearest_size(with_frames, 10_000)
+    if not results:
+        return Content()
+    stated = data.paper["protocol"]
+    moments = _moments(results[0], stated)
+    return Content(
+        [
+            Figure(
+                "figure-5",
+                f"Packing fraction and coordination number in the box against the step, "
+                f"{as_count(count_of(results))} spheres. The two steps that the paper names are "
+                "those of its own code.",
+                [
+                    Panel("step", text, _curves(results, quantity), moments=moments)
+                    for text, quantity in (
+                        ("packing fraction", PACKING_FRACTION),
+                        ("coordination number", COORDINATION_NUMBER),
+                    )
+                ],
+            ),
+            table(
+                "From which step on the packing stays as it is",
+                COLUMNS,
+                [
+                    _Run(
+                        count_of([result]),
+                        seed_label(result),
+                        _plateau(result, PACKING_FRACTION, BAND_OF_PHI),
+                        _plateau(result, COORDINATION_NUMBER, BAND_OF_Z),
+                    )
+                    for result in results
+                ],
+                (
+                    "The mean is that of the last quarter of the frames. Dash: not even the last "
+                    "frame.",
+                ),
+            ),
+            Text(
+                f"Paper: a plateau after about {stated['plateau_reached_at_step']} steps; from "
+                f"step {stated['plateau_step']} on φ is constant within 0.1 % and z within 0.05 %. "
+                "A step of the paper's code and one of ours need not last the same time, and "
+                "nothing states how long the paper's is: the shapes can be compared, the numbers "
+                "of steps cannot. z is that of single frames, and until the count it is taken with "
+                "the larger ε, with which single frames scatter."
+            ),
+        ]
+    )
+
+
+def _curves(results: Sequence[Result], quantity: Quantity) -> list[Curve]:
+    return [curve(seed_label(result), *_evolution(result, quantity)) for result in results]
+
+
+def _moments(result: Result, stated: Mapping[str, Any]) -> list[tuple[str, float]]:
+    """Return the steps at which something happens, in the paper and in our runs."""
+    moments = [
+        ("paper: plateau", float(stated["plateau_reached_at_step"])),
+        ("paper: constant", float(stated["plateau_step"])),
+    ]
+    off = result.variables.get("steps_agitated")
+    if off is not None:
+        moments.append(("random force off", float(off)))
+        if "steps_settling" in result.variables:
+            count = off + result.variables["steps_settling"]
+            moments.append(("smaller ε, count", float(count)))
+    return moments
+
+
+def _evolution(result: Result, quantity: Quantity) -> tuple[FloatArray, FloatArray]:
+    """Return the steps of the frames and a number in each, (f,) both."""
+    steps, values = series(result, "evolution/step"), series(result, f"evolution/{quantity.name}")
+    assert steps is not None
+    assert values is not None
+    return steps, values
+
+
+def _plateau(result: Result, quantity: Quantity, band: float) -> Plateau | None:
+    steps, values = _evolution(result, quantity)
+    try:
+        return plateau(steps, values, band=band)
+    except AnalysisError:  # NaN at the end: an empty box
+        return None
+
+
+def _step(found: Plateau | None) -> str:
+    return DASH if found is None or found.step is None else as_count(found.step)
+
+
+def _mean(found: Plateau | None, quantity: Quantity) -> str:
+    return DASH if found is None else as_text(found.mean * quantity.factor, quantity.decimals)

@@ -1,0 +1,98 @@
+"""Sections that show pictures alone: the paper's Figures 4, 8, 9 and 10."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from lammps_inelastic.analysis.plots import draw_dimer, draw_dimer_section
+
+from ...store import Result
+from ..blocks import Block, Content, Text
+from ..data import Data
+from ..figures import Figure, Pictures
+from ..groups import count_of, value_of
+from ..text import as_count, as_short
+
+# The dimer that is drawn has this aspect ratio.
+DRAWN = 1.8
+
+
+def falling_spheres(data: Data) -> Content:
+    """Show the steps of a packing of spheres, as the paper's Figure 4 does."""
+    results = data.results("figure-4")
+    if not results:
+        return Content()
+    return Content(
+        step_pictures(
+            results,
+            "figure-4",
+            f"{as_count(count_of(results))} spheres fall; the colour is the number of contacts. "
+            "The paper shows four steps of 100,000 spheres and does not say which.",
+        )
+    )
+
+
+def network(data: Data) -> Content:
+    """Show the network of contacts, as the paper's Figure 8 does."""
+    drawn = [result for result in data.results("figure-8") if "network" in result.pictures]
+    if not drawn:
+        return Content()
+    caption = (
+        f"Contacts of {as_count(count_of(drawn))} spheres, lower half of the packing; width and "
+        "colour grow with the force."
+    )
+    return Content(network_picture(drawn, "figure-8", caption))
+
+
+def one_dimer(_: Data) -> Content:
+    """Draw a dimer and its neck, as the paper's Figure 9 does."""
+    return Content(
+        [
+            Figure(
+                "figure-9",
+                f"A dimer of aspect ratio L/d = {DRAWN}: two overlapping spheres of diameter d, L "
+                "long. Right: its section, with the neck (hatched), the volume at the waist that "
+                "no sphere of the same size (dashed) can reach.",
+                drawing=[
+                    partial(draw_dimer, aspect_ratio=DRAWN),
+                    partial(draw_dimer_section, aspect_ratio=DRAWN),
+                ],
+            ),
+            Text("Drawn from the formulas; no run is needed."),
+        ]
+    )
+
+
+def falling_dimers(data: Data) -> Content:
+    """Show the steps of a packing of dimers, as the paper's Figure 10 does."""
+    results = data.results("figure-10")
+    if not results:
+        return Content()
+    return Content(
+        step_pictures(
+            results,
+            "figure-10",
+            f"{as_count(count_of(results))} dimers of L/d = "
+            f"{as_short(value_of(results[0], 'aspect_ratio'))} fall; the colour is the number "
+            "of contacts. The paper shows four steps and does not say which.",
+        )
+    )
+
+
+def step_pictures(results: Sequence[Result], name: str, caption: str) -> list[Block]:
+    """Return the pictures of the first result that has any, in the order of their steps."""
+    for result in results:
+        steps = sorted(step for step in result.pictures if step.isdigit())
+        if steps:
+            shown = {f"step {as_count(int(step))}": result.pictures[step] for step in steps}
+            return [Pictures(name, caption, shown)]
+    return []
+
+
+def network_picture(results: Sequence[Result], name: str, caption: str) -> list[Block]:
+    """Return the network of contacts of the first result that has a picture of it."""
+    for result in results:
+        if "network" in result.pictures:
+            return [Pictures(name, caption, {"": result.pictures["network"]}, trimmed=True)]
+    return []

@@ -1,0 +1,216 @@
+"""How the numbers of a report were made, and how to make them again."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...shipped import QUICK_FOLDER, STUDIES_FOLDER
+from ...store import Result, StoredStudy
+from ..blocks import Block, Listing, Section, Table, Text, nothing_run
+from ..columns import Column, table
+from ..data import Data
+from ..statistics import computing_seconds
+from ..text import DASH, as_runs, as_short, as_time
+
+_GRAVITY = re.compile(r"^variable\s+gravity\s+equal\s+(\S+)", re.MULTILINE)
+
+# The paper does not state these variables of the decks: name, meaning, unit.
+NOT_STATED = (
+    ("dt", "time step h", "time"),
+    ("random_force", "largest random acceleration, per direction", "length/time²"),
+    ("drag", "drag per mass, after the random force", "1/time"),
+    ("steps_agitated", "steps with random force", "steps"),
+    ("steps_settling", "steps with drag", "steps"),
+    ("tolerance_measuring", "ε / r while contacts are counted", "1"),
+)
+
+
+def commands(data: Data, name: str) -> list[str]:
+    """Return the commands that make a study's part of a report."""
+    report = f"inelastic report DIR/{name}.h5"
+    study = data.studies.get(name)
+    if study is not None and not _is_shipped(study, STUDIES_FOLDER):
+        if _is_shipped(study, QUICK_FOLDER):
+            return ["inelastic reproduce --quick --out DIR"]
+        return [f"inelastic run {name}.toml --out DIR", report]
+    return [f"inelastic run {name} --out DIR", report]
+
+
+def _is_shipped(study: StoredStudy, folder: Path) -> bool:
+    path = folder / f"{study.name}.toml"
+    return path.is_file() and path.read_text(encoding="utf-8") == study.text
+
+
+def provenance_section(data: Data, files: Sequence[str]) -> Section:
+    """Return the section on what was run when, with what, and what the paper does not state.
+
+    Parameters
+    ----------
+    data : what the files hold
+    files : names of the files
+    """
+    blocks: list[Block] = []
+    results = [result for study in data.studies.values() for result in study.results]
+    if data.studies:
+        lines = [line for name in data.studies for line in commands(data, name)]
+        blocks.append(_runs_table(data.studies.values()))
+        blocks.append(Listing("\n".join(dict.fromkeys(lines))))
+    else:
+        blocks.append(nothing_run())
+    blocks.append(
+        Text(f"Everything in this report is drawn from these files alone: {', '.join(files)}.")
+    )
+    if results:
+        blocks += [_not_stated_table(results), _versions_table(results), *_decks(results)]
+    blocks += [
+        Listing(study.text.strip(), f"Study {study.name}") for study in data.studies.values()
+    ]
+    return Section("provenance", "How to repeat all of it", blocks)
+
+
+@dataclass(frozen=True)
+class _StudyRuns:
+    """The runs of one study, or of all.
+
+    Attributes
+    ----------
+    study, title : of the study
+    cases : number of cases
+    dates : first and last day, or one of both, or none
+    seconds : computing time
+    """
+
+    study: str
+    title: str
+    cases: int
+    dates: str
+    seconds: float
+
+
+RUNS_COLUMNS: Sequence[Column[_StudyRuns]] = (
+    Column("study", lambda runs: runs.study),
+    Column("title", lambda runs: runs.title),
+    Column("cases", lambda runs: runs.cases),
+    Column("run on", lambda runs: runs.dates),
+    Column("computing time", lambda runs: as_time(runs.seconds)),
+)
+
+
+def _runs_table(studies: Iterable[StoredStudy]) -> Table:
+    rows = [
+        _StudyRuns(
+            study.name,
+            study.title,
+            len(study.results),
+            _dates(study.results),
+            computing_seconds(study.results),
+        )
+        for study in studies
+    ]
+    total = sum((row.seconds for row in rows), 0.0)
+    return table(
+        "Runs",
+        RUNS_COLUMNS,
+        [*rows, _StudyRuns("all", "", sum(row.cases for row in rows), "", total)],
+        (
+            "Computing time: wall time of LAMMPS times its ranks; measuring is not in it. A case "
+            "that is in several studies is run once, and its time stands in each of them.",
+        ),
+    )
+
+
+def _dates(results: Sequence[Result]) -> str:
+    days = sorted(str(result.record["started"])[:10] for result in results)
+    if not days:
+        return DASH
+    return days[0] if days[-1] == days[0] else f"{days[0]} to {days[-1]}"
+
+
+@dataclass(frozen=True)
+class _NotStated:
+    """A quantity that the paper does not state, and its values in some results."""
+
+    what: str
+    unit: str
+    values: Sequence[float]
+
+
+NOT_STATED_COLUMNS: Sequence[Column[_NotStated]] = (
+    Column("what", lambda one: one.what),
+    Column("unit", lambda one: one.unit),
+    Column("values in these results", lambda one: ", ".join(map(as_short, one.values)) or DASH),
+)
+
+
+def _not_stated_table(results: Sequence[Result]) -> Table:
+    gravity = [found for result in results if (found := _gravity(result)) is not None]
+    rows = [_NotStated("gravity g", "length/time²", sorted(set(gravity)))]
+    for name, meaning, unit in NOT_STATED:
+        known = [result.variables[name] for result in results if name in result.variables]
+        if known:
+            values = sorted({float(value) for value in known if isinstance(value, int | float)})
+            rows.append(_NotStated(f"{meaning} ({name})", unit, values))
+    return table(
+        "What the paper does not state: our values",
+        NOT_STATED_COLUMNS,
+        rows,
+        (
+            "Lengths are in widths of the container, and the spheres have density 1. A free fall "
+            "from the top takes about one unit of time. The paper does not state computing times "
+            "either.",
+        ),
+    )
+
+
+def _gravity(result: Result) -> float | None:
+    """Return the gravity that a result's decks set; None where it is a formula or not set."""
+    for stage in result.record["stages"]:
+        found = _GRAVITY.search(stage["text"])
+        if found is not None:
+            try:
+                return float(found.group(1))
+            except ValueError:
+                return None
+    return None
+
+
+@dataclass(frozen=True)
+class _Package:
+    """A package and its versions in some results."""
+
+    name: str
+    versions: Iterable[str]
+
+
+VERSIONS_COLUMNS: Sequence[Column[_Package]] = (
+    Column("package", lambda package: package.name),
+    Column("version", lambda package: ", ".join(package.versions)),
+)
+
+
+def _versions_table(results: Sequence[Result]) -> Table:
+    found: dict[str, dict[str, None]] = {}
+    for result in results:
+        for package, version in result.record["versions"].items():
+            found.setdefault(package, {})[str(version)] = None
+    return table(
+        "Versions that made and measured the packings",
+        VERSIONS_COLUMNS,
+        [_Package(name, versions) for name, versions in found.items()],
+    )
+
+
+def _decks(results: Sequence[Result]) -> list[Listing]:
+    """Return the decks that were run, each version once."""
+    decks: dict[tuple[str, str], int] = {}
+    for result in results:
+        for stage in result.record["stages"]:
+            key = stage["deck"], stage["text"]
+            decks[key] = decks.get(key, 0) + 1
+    return [
+        Listing(text.strip(), f"Deck {name}.in, of {as_runs(count)}")
+        for (name, text), count in decks.items()
+    ]

@@ -1,0 +1,204 @@
+"""The paper's Table 1: spheres with several tolerances, with and without a random force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ...store import Result
+from ..blocks import Comparison, Content, Table
+from ..columns import RUNS, RUNS_OF_PAPER, Column, table
+from ..data import Data
+from ..groups import (
+    OUR_SOLVER,
+    PAPER_SOLVER,
+    count_of,
+    grouped,
+    is_agitated,
+    matching,
+    solver_of,
+    unlike,
+    value_of,
+)
+from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION, compared
+from ..statistics import Stated
+from ..text import as_count, as_short
+
+# The paper's rows are of so many spheres and runs.
+SPHERES_OF_PAPER, RUNS_OF_EACH_ROW = 1000, 9
+# This is why a packing fraction of nine runs of 1,000 spheres may be far from ours.
+CHANCE = "chance in few runs: see Table 1 with more seeds"
+# Rows that the paper does not have hold this in place of its number.
+NOTHING_STATED = Stated(math.nan)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """The runs of one tolerance, random force and solver.
+
+    Attributes
+    ----------
+    tolerance : the allowed overlap over the radius
+    force : `yes` or `no` in rows of the paper, else the largest random acceleration
+    solver : as the deck names it
+    group : the runs; none for a row of the paper that has not been run
+    phi, z : packing fraction in % and coordination number, with those of the paper
+    """
+
+    tolerance: float
+    force: str
+    solver: str
+    group: Sequence[Result]
+    phi: Comparison
+    z: Comparison
+
+
+TOLERANCE: Column[_Row] = Column("ε / r", lambda row: as_short(row.tolerance))
+FORCE: Column[_Row] = Column("random force", lambda row: row.force)
+PHI: Sequence[Column[_Row]] = compared(PACKING_FRACTION, lambda row: row.phi)
+Z: Sequence[Column[_Row]] = compared(COORDINATION_NUMBER, lambda row: row.z)
+COLUMNS: Sequence[Column[_Row]] = (
+    TOLERANCE,
+    FORCE,
+    Column("solver", lambda row: row.solver),
+    RUNS_OF_PAPER,
+    *PHI,
+    *Z,
+    MEAN_RESOLUTION,
+)
+COLUMNS_OF_MORE_SEEDS: Sequence[Column[_Row]] = (TOLERANCE, FORCE, RUNS, *PHI, *Z)
+
+
+def tolerance_and_force(data: Data) -> Content:
+    """Compare packing fraction and coordination number with the paper's Table 1."""
+    results = data.results("table-1")
+    of_paper = _rows_of_paper(results, data.paper["table1"])
+    more = _rows_of_more_seeds(data)
+    tables: list[Table] = []
+    if results:
+        tables.append(_table(results, [*of_paper, *_other_rows(results, of_paper)]))
+    if more:
+        tables.append(
+            table(
+                "The same with more seeds",
+                COLUMNS_OF_MORE_SEEDS,
+                more,
+                ("The runs of the table above are among these.",),
+            )
+        )
+    run = [row for row in (*of_paper, *more) if row.group]
+    return Content(tables, [one for row in run for one in (row.phi, row.z)])
+
+
+def _table(results: Sequence[Result], rows: Sequence[_Row]) -> Table:
+    count = count_of(results)
+    return table(
+        "1,000 spheres, d = 0.11; mean ± standard deviation (standard error of our mean)"
+        if count == SPHERES_OF_PAPER
+        else f"{as_count(count)} spheres; the paper has {as_count(SPHERES_OF_PAPER)}",
+        COLUMNS,
+        rows,
+        (
+            "SE: standard errors, sqrt(ours² + the paper's²); the paper's is its standard "
+            f"deviation over the root of {RUNS_OF_EACH_ROW} runs. Marked: more than 2.",
+            f"Solver: {PAPER_SOLVER} is the paper's, {OUR_SOLVER} ours. Within a loose ε "
+            "they may leave different contacts.",
+            "ε / (g h²), with ε that of the count, says how well a contact is told from a "
+            "gap: in a step a free sphere falls g h². It should be at most 0.01; above it, "
+            "what counts as a contact depends on ε.",
+        ),
+    )
+
+
+def _rows_of_paper(
+    results: Sequence[Result], stated_rows: Sequence[Mapping[str, Any]]
+) -> list[_Row]:
+    """Return a row for each row of the paper and solver; our solver's where nothing was run."""
+    return [
+        _row(stated, solver, group)
+        for stated in stated_rows
+        for solver, group in (
+            grouped(_like(results, stated), solver_of) or {OUR_SOLVER: []}
+        ).items()
+    ]
+
+
+def _other_rows(results: Sequence[Result], of_paper: Sequence[_Row]) -> list[_Row]:
+    """Return a row for each tolerance, random force and solver that the paper does not have."""
+    seen = {result.case for row in of_paper for result in row.group}
+    others = [result for result in results if result.case not in seen]
+    groups = grouped(
+        others, lambda r: (value_of(r, "tolerance"), value_of(r, "random_force"), solver_of(r))
+    )
+    return [
+        _Row(
+            tolerance,
+            as_short(force),
+            solver,
+            group,
+            Comparison("φ", NOTHING_STATED, PACKING_FRACTION.over(group), 2),
+            Comparison("z", NOTHING_STATED, COORDINATION_NUMBER.over(group), 3),
+        )
+        for (tolerance, force, solver), group in groups.items()
+    ]
+
+
+def _rows_of_more_seeds(data: Data) -> list[_Row]:
+    """Compare rows of the paper's Table 1 with more runs of our own than it has."""
+    results = data.results("more-seeds")
+    return [
+        _row(stated, OUR_SOLVER, group, more_seeds=True)
+        for stated in data.paper["table1"]
+        if (group := _like(results, stated))
+    ]
+
+
+def _like(results: Sequence[Result], stated: Mapping[str, Any]) -> list[Result]:
+    """Return the results with the tolerance and the random force of a row of Table 1."""
+    return [
+        result
+        for result in matching(results, tolerance=stated["eps_over_r"])
+        if is_agitated(result) == stated["random_force"]
+    ]
+
+
+def _row(
+    stated: Mapping[str, Any], solver: str, group: Sequence[Result], more_seeds: bool = False
+) -> _Row:
+    """Compare packing fraction and coordination number with a row of the paper's Table 1."""
+    words = f"ε = {as_short(stated['eps_over_r'])} r, "
+    words += f"{'with' if stated['random_force'] else 'no'} random force"
+    if solver != OUR_SOLVER:
+        words += f", {solver}"
+    if more_seeds:
+        words += f", {len(group)} seeds"
+    phi, z = stated["phi_percent"], stated["z"]
+    note = unlike(group, SPHERES_OF_PAPER, 0 if more_seeds else RUNS_OF_EACH_ROW)
+    return _Row(
+        stated["eps_over_r"],
+        "yes" if stated["random_force"] else "no",
+        solver,
+        group,
+        Comparison(
+            f"φ, {words}",
+            Stated.of_series(phi["mean"], phi["std"], RUNS_OF_EACH_ROW),
+            PACKING_FRACTION.over(group),
+            PACKING_FRACTION.decimals,
+            PACKING_FRACTION.unit,
+            note,
+            "" if more_seeds else CHANCE,
+        ),
+        Comparison(
+            f"z, {words}",
+            Stated.of_series(z["mean"], z["std"], RUNS_OF_EACH_ROW),
+            COORDINATION_NUMBER.over(group),
+            COORDINATION_NUMBER.decimals,
+            COORDINATION_NUMBER.unit,
+            note,
+            f"at a loose ε the count is the solver's: {PAPER_SOLVER} is the paper's"
+            if solver == OUR_SOLVER
+            else "",
+        ),
+    )
