@@ -34,13 +34,13 @@ validate: setup
 	pytest -m validation -s --durations=0
 
 tables: setup
-	python tests/tables.py
+	python -m tests.tables
 
 bench: setup
-	PYTHONPATH=tests:tests/fix python tests/benchmark
+	python -m tests.benchmark
 
 bench-quick: setup
-	PYTHONPATH=tests:tests/fix python tests/benchmark --quick
+	python -m tests.benchmark --quick
 
 setup: $(VENV)/installed
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from written_dumps import CONTACT_COLUMNS, PARTICLE_COLUMNS, Rows, frame_text
+from tests.analysis.written_dumps import CONTACT_COLUMNS, PARTICLE_COLUMNS, Rows, frame_text
 
 Writer = Callable[..., Path]
 

@@ -9,13 +9,13 @@ import numpy as np
 import overlap
 import pytest
 
-from integration import ball_in_box, dimer_in_box, integrate
 from lammps_inelastic.analysis import (
     InputError,
     group_spheres,
     particle_volumes_in_box,
     sphere_volumes_in_box,
 )
+from tests.analysis.integration import ball_in_box, dimer_in_box, integrate
 
 UNIT = [[0, 1]] * 3
 BALL = 4 / 3 * np.pi

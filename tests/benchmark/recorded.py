@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lammps_inelastic import core
-from pouring import Recorded, read_record, recording, records, run_deck, shipped_deck
+from tests.pouring import Recorded, read_record, recording, records, run_deck, shipped_deck
 
 TOLERANCE = 0.0005  # of the runs that are recorded [radii]
 TOLERANCES = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from contact_problems import WALL, Floats, Problem, assert_within, in_bodies, no_bodies
-from reference_solver import NotSolvedError, reference
+from tests.core.contact_problems import WALL, Floats, Problem, assert_within, in_bodies, no_bodies
+from tests.core.reference_solver import NotSolvedError, reference
 
 # The same examples on every machine.
 RANDOM = settings(derandomize=True, deadline=None, max_examples=400)

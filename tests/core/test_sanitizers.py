@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from building import REPOSITORY, cmake, generator, run
+from tests.building import REPOSITORY, cmake, generator, run
 
 
 def test_core_is_clean_under_the_sanitizers(tmp_path: Path) -> None:

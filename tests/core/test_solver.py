@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import isotonic_regression
 
-from contact_problems import (
+from tests.core.contact_problems import (
     UP,
     WALL,
     Problem,

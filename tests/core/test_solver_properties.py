@@ -8,7 +8,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from contact_problems import (
+from lammps_inelastic import core
+from tests.core.contact_problems import (
     WALL,
     Problem,
     assert_within,
@@ -18,7 +19,6 @@ from contact_problems import (
     heap,
     no_bodies,
 )
-from lammps_inelastic import core
 
 # [diameters] One step's motion is 0.01.
 TOLERANCE = 1e-10

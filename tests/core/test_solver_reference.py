@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact_problems import (
+from lammps_inelastic import core
+from tests.core.contact_problems import (
     Problem,
     assert_within,
     bricks,
@@ -18,8 +19,7 @@ from contact_problems import (
     problem,
     row,
 )
-from lammps_inelastic import core
-from reference_solver import reference
+from tests.core.reference_solver import reference
 
 # [diameters] A ten-thousand-millionth of one step's motion, not far above what float64 resolves.
 TOLERANCE = 1e-13

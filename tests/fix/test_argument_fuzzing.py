@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lammps_run import OF_A_LAUNCHER
+from tests.fix.lammps_run import OF_A_LAUNCHER
 
 SERVER = Path(__file__).with_name("argument_server.py")
 # [s] An answer takes 0.01.

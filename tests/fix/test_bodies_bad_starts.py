@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     BENT,
     BODY_THERMO,
     DUMP_BODY_SPHERES,
@@ -19,8 +19,8 @@ from bodies import (
     placed,
     random_bodies,
 )
-from lammps_run import Runner
-from scenes import deepest_in_box, deepest_pair, mass, read_dump
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import deepest_in_box, deepest_pair, mass, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from bodies import (
+from tests.fix.bodies import (
     BENT,
     BODY_THERMO,
     DUMP_BODIES,
@@ -24,8 +24,16 @@ from bodies import (
     placed,
     rigid_velocities,
 )
-from lammps_run import Runner
-from scenes import DUMP_PARTICLES, GRAVITY, FloatArray, mass, random_points, read_dump, scene
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
+    DUMP_PARTICLES,
+    GRAVITY,
+    FloatArray,
+    mass,
+    random_points,
+    read_dump,
+    scene,
+)
 
 RADIUS = 0.055
 STEP = 0.005

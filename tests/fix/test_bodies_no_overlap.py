@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     DUMP_BODY_SPHERES,
     INERTIAS,
     ROD,
@@ -20,8 +20,8 @@ from bodies import (
     random_bodies,
     rigid_velocities,
 )
-from lammps_run import Runner
-from scenes import FloatArray, deepest_in_box, deepest_pair, read_dump
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import FloatArray, deepest_in_box, deepest_pair, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS

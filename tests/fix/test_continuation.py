@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from lammps_run import Runner, run_lmp
-from scenes import (
+from tests.fix.lammps_run import Runner, run_lmp
+from tests.fix.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     FloatArray,

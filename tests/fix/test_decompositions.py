@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from lammps_run import Runner
-from scenes import (
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DIVISIONS,
     DUMP_CONTACTS,
     DUMP_FORCES,
@@ -143,7 +143,7 @@ def test_atoms_outside_the_group_are_ignored(tmp_path: Path, lmp: Runner) -> Non
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
     """Return the bed's frames on one rank, with LAMMPS's defaults."""
-    from lammps_run import run_lmp
+    from tests.fix.lammps_run import run_lmp
 
     folder = tmp_path_factory.mktemp("reference")
     deck = scene(bed(), RADIUS, folder, tolerance=EXACT, box=BOX)

@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lammps_inelastic.analysis import largest_pair_overlap
-from lammps_run import Run, Runner
-from scenes import (
+from tests.fix.lammps_run import Run, Runner
+from tests.fix.scenes import (
     DUMP_CONTACTS,
     DUMP_PARTICLES,
     GRAVITY,

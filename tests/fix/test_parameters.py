@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from lammps_inelastic.workflow.decks import SHIPPED, Rule, as_value, find_deck, read_rule
-from lammps_run import OF_A_LAUNCHER, Runner, run_lmp
+from tests.fix.lammps_run import OF_A_LAUNCHER, Runner, run_lmp
 
 SERVER = Path(__file__).with_name("table_server.py")
 TABLE = re.compile(r'^parameters """\n(.*?)"""', re.MULTILINE | re.DOTALL)

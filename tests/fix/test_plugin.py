@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from lammps_run import Runner
+from tests.fix.lammps_run import Runner
 
 HERE = b"stable_22Jul2025_update4"
 ELSEWHERE = b"stable_22Jul2025_update2"

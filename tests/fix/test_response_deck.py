@@ -16,7 +16,7 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from lammps_run import Runner, run_lmp
+from tests.fix.lammps_run import Runner, run_lmp
 
 PARTICLES, RADIUS = 250, 0.055
 PACKING = {

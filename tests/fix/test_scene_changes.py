@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from lammps_run import Run, Runner
-from scenes import (
+from tests.fix.lammps_run import Run, Runner
+from tests.fix.scenes import (
     DUMP_CONTACTS,
     DUMP_PARTICLES,
     deepest_pair,

@@ -13,7 +13,7 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from lammps_run import Runner
+from tests.fix.lammps_run import Runner
 
 VARIABLES = {
     "steps_agitated": 300,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from lammps_run import Runner
-from scenes import (
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DEFAULT_BOX,
     DUMP_CONTACTS,
     DUMP_FORCES,

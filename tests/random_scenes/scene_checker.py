@@ -29,8 +29,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scene_generator import BODY_COLUMNS, CONTACTS, FROZEN, OUTSIDE
-from scene_walls import FloatArray, Shape, View, moves, turns, views
+from tests.random_scenes.scene_generator import BODY_COLUMNS, CONTACTS, FROZEN, OUTSIDE
+from tests.random_scenes.scene_walls import FloatArray, Shape, View, moves, turns, views
 
 # Of lengths and forces that are sums of some terms of that size; doubles have 1.1e-16.
 ROUND_OFF = 1e-12

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bodies import BENT, BODY_STYLE, ROD, TETRAHEDRON, dimer
-from scene_walls import AXES, FloatArray, Shape, moves, views
+from tests.fix.bodies import BENT, BODY_STYLE, ROD, TETRAHEDRON, dimer
+from tests.random_scenes.scene_walls import AXES, FloatArray, Shape, moves, views
 
 # Acceleration of a unit of mass by a unit of force, and pressure of a unit of energy per volume
 # (LAMMPS's update.cpp: ftm2v, nktv2p).

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     DUMP_BODY_SPHERES,
     INERTIAS,
     TETRAHEDRON,
@@ -25,8 +25,8 @@ from bodies import (
     placed,
     random_bodies,
 )
-from lammps_run import Run, run_lmp
-from scenes import (
+from tests.fix.lammps_run import Run, run_lmp
+from tests.fix.scenes import (
     DEFAULT_BOX,
     DUMP_CONTACTS,
     DUMP_PARTICLES,

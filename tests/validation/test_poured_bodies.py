@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
-from pouring import Packing, measure, run_deck, shipped_deck
+from tests.pouring import Packing, measure, run_deck, shipped_deck
 
 pytestmark = pytest.mark.validation
 

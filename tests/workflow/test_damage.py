@@ -9,11 +9,11 @@ import shutil
 
 import pytest
 
-from few_spheres import TINY
 from lammps_inelastic.workflow.folder import FAILED, FINISHED, Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.study import read_study
-from study_run import inelastic, numbers_of, same
+from tests.workflow.few_spheres import TINY
+from tests.workflow.study_run import inelastic, numbers_of, same
 
 
 @pytest.fixture(scope="module")

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import pytest
 
-from few_spheres import TINY
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.store import read_studies
-from small_disk import mounted
-from study_run import inelastic
+from tests.small_disk import mounted
+from tests.workflow.few_spheres import TINY
+from tests.workflow.study_run import inelastic
 
 EXPORTS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
 # What each of them needs to be small: 30 spheres, and no more than 27,000 voxels.

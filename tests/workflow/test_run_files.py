@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from few_spheres import TINY
 from lammps_inelastic.analysis import AnalysisError, ParticleDump, open_run, read_run_log
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.measure import measure_case
 from lammps_inelastic.workflow.study import Outputs, read_study
-from study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same
+from tests.workflow.few_spheres import TINY
+from tests.workflow.study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same
 
 PARTICLES, CONTACTS, LOG = "particles.lammpsdump", "contacts.lammpsdump", "log.lammps"
 BOX = ["--box", "0", "1", "0", "0.5", "0", "1"]

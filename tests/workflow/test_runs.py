@@ -13,12 +13,12 @@ import h5py
 import numpy as np
 import pytest
 
-from few_spheres import TINY, write_data
 from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.schema import SCHEMA
 from lammps_inelastic.workflow.study import read_study
-from study_run import (
+from tests.workflow.few_spheres import TINY, write_data
+from tests.workflow.study_run import (
     ENVIRONMENT,
     PATIENCE,
     command,

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from few_spheres import write_data
 from lammps_inelastic.analysis import (
     InputError,
     ParticleFrame,
@@ -30,7 +29,8 @@ from lammps_inelastic.workflow.tradeoff import (
     recommendations,
     reference_of,
 )
-from study_run import killed_when, numbers_of, same
+from tests.workflow.few_spheres import write_data
+from tests.workflow.study_run import killed_when, numbers_of, same
 
 # Deep enough to fill the measuring box, few enough for a second a run.
 FEW = ["--particles", "60", "--diameter", "0.3"]
