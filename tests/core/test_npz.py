@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import resource
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lammps_inelastic import core
+from tests.core.contact_problems import Floats
 
 ARRAYS = {
     "empty": np.zeros((0, 3)),
@@ -19,7 +21,7 @@ ARRAYS = {
 }
 
 
-def test_reads_back_identical(tmp_path):
+def test_reads_back_identical(tmp_path: Path) -> None:
     core.write_npz(str(tmp_path / "some.npz"), ARRAYS)
     with np.load(tmp_path / "some.npz") as loaded:
         assert loaded.files == list(ARRAYS)
@@ -29,7 +31,7 @@ def test_reads_back_identical(tmp_path):
             assert loaded[name].tobytes() == values.tobytes()
 
 
-def test_is_a_sound_archive(tmp_path):
+def test_is_a_sound_archive(tmp_path: Path) -> None:
     core.write_npz(str(tmp_path / "some.npz"), ARRAYS)
     with zipfile.ZipFile(tmp_path / "some.npz") as archive:
         assert archive.testzip() is None
@@ -38,19 +40,19 @@ def test_is_a_sound_archive(tmp_path):
             assert (10 + header_length) % 64 == 0  # the format's alignment of the data
 
 
-def test_no_arrays(tmp_path):
+def test_no_arrays(tmp_path: Path) -> None:
     core.write_npz(str(tmp_path / "none.npz"), {})
     with np.load(tmp_path / "none.npz") as loaded:
         assert loaded.files == []
 
 
-def test_equal_arrays_give_equal_files(tmp_path):
+def test_equal_arrays_give_equal_files(tmp_path: Path) -> None:
     for name in ("one", "other"):
         core.write_npz(str(tmp_path / name), ARRAYS)
     assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
 
 
-def test_replaces_a_file_at_once(tmp_path):
+def test_replaces_a_file_at_once(tmp_path: Path) -> None:
     path = tmp_path / "some.npz"
     core.write_npz(str(path), {"old": np.zeros((5, 3))})
     with path.open("rb") as opened_before, np.load(opened_before) as before:
@@ -62,13 +64,13 @@ def test_replaces_a_file_at_once(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_unwritable_folder(tmp_path):
+def test_unwritable_folder(tmp_path: Path) -> None:
     path = tmp_path / "missing" / "some.npz"
     with pytest.raises(RuntimeError, match=r"cannot write .*some\.npz: No such file"):
         core.write_npz(str(path), ARRAYS)
 
 
-def test_path_is_a_folder(tmp_path):
+def test_path_is_a_folder(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
     with pytest.raises(RuntimeError, match=r"cannot write .*folder: Is a directory"):
         core.write_npz(str(tmp_path / "folder"), ARRAYS)
@@ -76,7 +78,7 @@ def test_path_is_a_folder(tmp_path):
 
 
 @pytest.mark.parametrize("rows", [10, 10_000], ids=["while closing", "while writing"])
-def test_no_space_left(tmp_path, rows):
+def test_no_space_left(tmp_path: Path, rows: int) -> None:
     path = tmp_path / "some.npz"
     core.write_npz(str(path), {"old": np.zeros((1, 3))})
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -92,7 +94,7 @@ def test_no_space_left(tmp_path, rows):
 
 
 @pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((3, 2)), np.zeros((1, 1, 3))])
-def test_wrong_shape(tmp_path, wrong):
+def test_wrong_shape(tmp_path: Path, wrong: Floats) -> None:
     with pytest.raises(RuntimeError):
         core.write_npz(str(tmp_path / "some.npz"), {"wrong": wrong})
     assert list(tmp_path.iterdir()) == []

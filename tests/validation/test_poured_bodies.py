@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -23,9 +24,12 @@ PAPER_Z, PAPER_Z_TOLERANCE = 10.0, 0.2
 FAR = 3.0
 SLACK = 1 + 1e-6  # round-off of positions and of the dump
 
+# Aspect ratio, start and seed to the packing.
+Poured = Callable[[float, str, int], Packing]
+
 
 @pytest.fixture(scope="module")
-def poured(tmp_path_factory: pytest.TempPathFactory):
+def poured(tmp_path_factory: pytest.TempPathFactory) -> Poured:
     """Pour dimers of an aspect ratio once for each start and seed."""
 
     @cache
@@ -39,7 +43,7 @@ def poured(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.mark.parametrize("aspect_ratio", [1.01, 1.5, 1.95])
-def test_contacts_and_neighbours_of_dimers(aspect_ratio: float, poured) -> None:
+def test_contacts_and_neighbours_of_dimers(aspect_ratio: float, poured: Poured) -> None:
     """2,000 dimers: ten contacts each, and fewer neighbours, at every aspect ratio."""
     packings = [poured(aspect_ratio, "random", seed) for seed in SEEDS]
     contacts = [packing.coordination_number.mean for packing in packings]
@@ -52,7 +56,7 @@ def test_contacts_and_neighbours_of_dimers(aspect_ratio: float, poured) -> None:
     assert max(neighbours) < PAPER_Z
 
 
-def test_no_memory_of_the_start(poured) -> None:
+def test_no_memory_of_the_start(poured: Poured) -> None:
     """Dimers that all start along x end as those that start anyhow, and x and z are alike."""
     directions = {}
     for start in ("random", "regular"):
