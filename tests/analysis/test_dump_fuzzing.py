@@ -111,6 +111,7 @@ def line_named(said: str) -> int:
     return int(found.group(1))
 
 
+@pytest.mark.slow
 def test_cut_off_anywhere(kind: str, tmp_path: Path) -> None:
     """After every single byte."""
     path, whole = tmp_path / "cut.dump", text_of(kind)

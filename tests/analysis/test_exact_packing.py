@@ -50,6 +50,7 @@ def test_spheres_and_random_points(box: ArrayLike) -> None:
     assert exact.overlap == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("box", BOXES)
 @pytest.mark.parametrize(("distance", "radius"), [(0.02, 0.07), (0.06, 0.05), (0.08, 0.04)])
 def test_dimers_and_random_points(distance: float, radius: float, box: ArrayLike) -> None:

@@ -295,6 +295,7 @@ def test_stl(tmp_path: Path, subdivisions: int, share: float) -> None:
     assert written == pytest.approx(outwards, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_stl_of_many_spheres_is_written_in_parts(tmp_path: Path) -> None:
     # 20 faces each: 10,000 spheres are written at once.
     centres = np.random.default_rng(6).uniform(0, 1, (20_001, 3))

@@ -297,6 +297,7 @@ def test_colours_are_the_contacts_of_bodies(dimers: Path, monkeypatch: pytest.Mo
     assert drawn == {"contacts": [4, 7, 7, 4] * 2, "contacts_per_colour": 2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bodies", "dimers_in_box"),
     [
@@ -361,6 +362,7 @@ def test_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "no such file" in failure_of(["look", str(tmp_path / "nowhere")], capsys)
 
 
+@pytest.mark.slow
 def test_a_dump_stands_for_its_folder(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     dump = str(run / "particles.lammpsdump")
     numbers_of_folder = [main(["look", str(run), "--json"]), capsys.readouterr().out]
@@ -369,6 +371,7 @@ def test_a_dump_stands_for_its_folder(run: Path, capsys: pytest.CaptureFixture[s
     assert "is a file" in failure_of(["look", dump, "--dump", "other"], capsys)
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_gone(run: Path) -> None:
     """Such as `| head -1`: no message."""
     reader, writer = os.pipe()

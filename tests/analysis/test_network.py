@@ -97,6 +97,7 @@ def test_drawing_in_space_is_no_mirror_image() -> None:
     assert not ax.zaxis_inverted()
 
 
+@pytest.mark.slow
 def test_ten_thousand_spheres_are_drawn_in_seconds(tmp_path: Path) -> None:
     places = np.indices((22, 22, 22)).reshape(3, -1).T[:10_000]
     contacts = contacts_by_distance(places, np.full(10_000, 0.5), 0.1)

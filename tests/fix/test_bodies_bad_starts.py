@@ -38,6 +38,7 @@ ENERGY = (
 AT_REST = 20 * EPS / STEP
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize(
     "shapes",
@@ -197,6 +198,7 @@ def fix_first(deck: str) -> str:
     return "".join([before, scene, fix, options, end, run, diameters, deleted, after])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_from_a_file_written_while_a_run_pushes_apart(

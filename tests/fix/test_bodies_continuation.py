@@ -159,6 +159,7 @@ def test_from_a_file(
     assert_same(last_positions(tmp_path), undisturbed[inertia])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "inertia"),
     [("runs", "point"), ("runs", "solid"), ("restart", "point"), ("data", "solid")],
@@ -200,6 +201,7 @@ def test_a_tumbling_body_goes_on_tumbling(
     assert last_positions(tmp_path) == pytest.approx(expected, abs=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DIVISIONS)
 def test_the_division_does_not_matter(
     name: str, undisturbed: dict[str, FloatArray], tmp_path: Path, lmp: Runner
@@ -240,6 +242,7 @@ def drifting(folder: Path, inertia: str, eps: float, setup: str) -> tuple[str, B
     return deck, bodies
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize("newton", ["on", "off"])
 def test_periodic_sides(inertia: str, newton: str, tmp_path: Path, lmp: Runner) -> None:

@@ -118,6 +118,7 @@ def test_what_a_collision_conserves(
     assert energy[-1] < 0.9 * energy[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 def test_bodies_stay_rigid(inertia: str, tmp_path: Path, lmp: Runner) -> None:
     both, velocities, spins = about_to_collide("rod-and-tetrahedron", 1)
@@ -225,6 +226,7 @@ def sliding(
     return positions, np.array([forces(state)[2] for state in solution.y.T])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 def test_a_body_that_slides_on_the_floor_converges(
     inertia: str, tmp_path: Path, lmp: Runner

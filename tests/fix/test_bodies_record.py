@@ -240,6 +240,7 @@ def test_what_a_record_holds(name: str, ranks: int, tmp_path: Path, lmp: Runner)
 PHASES = {"falling": 10, "impact": 50, "rest": 300}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_an_independent_solver_agrees(name: str, tmp_path: Path, lmp: Runner) -> None:
     """Falling, on impact and at rest, to 1e-6 of the largest predicted velocity."""

@@ -240,6 +240,7 @@ def test_a_restart_in_the_midst_of_pushing_apart_keeps_no_speed(
     assert result.thermo["f_contact[4]"][-1] <= 1e-5 * (1 + 1e-6)  # round-off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("step", [1, 2, 3])
 def test_from_a_file_written_while_a_run_pushes_apart(

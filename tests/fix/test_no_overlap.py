@@ -196,7 +196,9 @@ def points_in_container(name: str, number: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("name", CONTAINERS)
-@pytest.mark.parametrize("speed", [0, 20, 80])
+@pytest.mark.parametrize(
+    "speed", [0, pytest.param(20, marks=pytest.mark.slow), pytest.param(80, marks=pytest.mark.slow)]
+)
 def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
     regions, names, depth = CONTAINERS[name]
     random = np.random.default_rng(7)
@@ -223,6 +225,7 @@ def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runn
     assert result.thermo["KinEng"].max() <= result.thermo["KinEng"][0] + potential
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CONTAINERS)
 def test_concave_walls_only_take_energy(name: str, tmp_path: Path, lmp: Runner) -> None:
     regions, names, _ = CONTAINERS[name]
@@ -320,6 +323,7 @@ def test_flat_faces_hold_a_sphere(
     assert contact.vectors("nx ny nz")[0] == pytest.approx(-pull, abs=1e-15)  # round-off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("region", "wall", "axis", "sign", "distance"), FACES)
 def test_faces_of_a_turned_region(
     region: str, wall: int, axis: int, sign: int, distance: float, tmp_path: Path, lmp: Runner
@@ -550,7 +554,7 @@ OBSTACLES = {
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-@pytest.mark.parametrize("speed", [0, 60])
+@pytest.mark.parametrize("speed", [0, pytest.param(60, marks=pytest.mark.slow)])
 def test_convex_obstacles(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
     region, depth = OBSTACLES[name]
     deck = scene(

@@ -294,6 +294,7 @@ def test_collect_replaces_hdf5_files_only(study: Path, capsys: pytest.CaptureFix
     assert path.read_text() == text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [0, 1])
 def test_measuring_takes_too_long(study: Path, ranks: int) -> None:
     """What was run stays, and is measured when there is more time."""

@@ -84,6 +84,7 @@ def test_every_dataset_is_in_the_schema(undisturbed: Path) -> None:
             assert record["stages"][0]["variables"]["seed"] in (1, 2)
 
 
+@pytest.mark.slow
 def test_what_is_measured_of_dimers(tmp_path: Path, write_study: Callable[..., Path]) -> None:
     dimers = TINY.replace('deck = "spheres"', 'deck = "dimers"').replace("{seeds}", "1")
     # Long enough to land on one another
@@ -136,7 +137,15 @@ def test_status_tells_whole_names(undisturbed: Path, capsys: pytest.CaptureFixtu
     assert "few: 2 measured" in output
 
 
-@pytest.mark.parametrize("moment", ["part", "dump", "finished", "result"])
+@pytest.mark.parametrize(
+    "moment",
+    [
+        pytest.param("part", marks=pytest.mark.slow),
+        "dump",
+        pytest.param("finished", marks=pytest.mark.slow),
+        "result",
+    ],
+)
 def test_killed_and_run_again(
     undisturbed: Path, tmp_path: Path, moment: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -314,6 +323,7 @@ def test_groups_of_one_rank_give_the_same_numbers(undisturbed: Path, tmp_path: P
     assert same(numbers_of(out / "few.h5"), numbers_of(undisturbed / "out" / "few.h5"))
 
 
+@pytest.mark.slow
 def test_a_group_of_two_ranks(undisturbed: Path, tmp_path: Path) -> None:
     path, out = one_case(tmp_path), tmp_path / "out"
     done = inelastic("run", path, "--out", out, "--mpi", "--ranks", 2, ranks=2)
@@ -341,6 +351,7 @@ def test_an_error_on_one_rank_ends_the_job(tmp_path: Path) -> None:
     assert time.monotonic() - start < 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timeout", ["0.3", "1.4"])
 def test_in_a_job_a_run_that_is_cut_short_is_late(tmp_path: Path, timeout: float) -> None:
     path = one_case(tmp_path)

@@ -409,6 +409,7 @@ def test_nothing_is_left_to_do(
     assert before[1] == (out / "tradeoff.csv").read_text()
 
 
+@pytest.mark.slow
 def test_killed_and_run_again(
     finished: tuple[list[str], Path],
     again: tuple[list[str], Path],
@@ -432,6 +433,7 @@ def test_killed_and_run_again(
     assert one == other
 
 
+@pytest.mark.slow
 def test_a_failed_run_is_left_out_and_said(
     again: tuple[list[str], Path],
     capsys: pytest.CaptureFixture[str],
@@ -456,6 +458,7 @@ def test_a_failed_run_is_left_out_and_said(
     assert "left out: " in (out / "tradeoff.md").read_text()
 
 
+@pytest.mark.slow
 def test_dimers_and_time_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--particle", "dimers", "--particles", "30", "--diameter", "0.3", "--seeds", "1"]
     arguments += ["--tolerances", "0.005", "--dts", "0.01,0.005", "--soft-tolerances", "0.05"]
@@ -470,6 +473,7 @@ def test_dimers_and_time_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "cannot be judged by one start" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_starts_from_data_files(tmp_path: Path) -> None:
     for name in ("a.data", "b.data"):
         write_data(tmp_path / name, diameter=0.28)
@@ -482,6 +486,7 @@ def test_starts_from_data_files(tmp_path: Path) -> None:
     assert (out / "tradeoff.png").stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_two_ranks_are_kept_apart(tmp_path: Path) -> None:
     if tradeoff_command.cores() < 2:
         # The command refuses more ranks than cores, whose times would say nothing.
@@ -494,6 +499,7 @@ def test_two_ranks_are_kept_apart(tmp_path: Path) -> None:
     assert [study.name for study in read_studies(out / "tradeoff.h5")] == ["ranks-1", "ranks-2"]
 
 
+@pytest.mark.slow
 def test_settling_in_a_study(write_study: Callable[..., Path], tmp_path: Path) -> None:
     study = write_study(
         'title = "t"\ndeck = ["spheres", "settling"]\n[parameters]\nparticles = 60\n'
