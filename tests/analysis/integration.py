@@ -142,4 +142,5 @@ def dimer_in_box(centres: ArrayLike, radii: Sequence[float], box: ArrayLike) -> 
 
         return integrate(length, y0, y1, bounds)
 
-    return integrate(lambda x: [area(one) for one in x], *box[0], breaks)
+    low, high = box[0]
+    return integrate(lambda x: [area(one) for one in x], low, high, breaks)

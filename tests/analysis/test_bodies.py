@@ -104,7 +104,7 @@ def test_same_counts_as_by_looking_at_every_contact(seed: int) -> None:
     # A particle is named by its body, a free sphere by minus its id.
     name_of = {a: b if b else -a for a, b in zip(ids.tolist(), bodies.tolist(), strict=True)}
     names = list(dict.fromkeys(name_of.values()))
-    touched = {name: [] for name in names}
+    touched: dict[str, Any] = {name: [] for name in names}
     walls = dict.fromkeys(names, 0)
     for first, second in contacts.tolist():
         if second < 0:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import Any
 
 import networkx
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lammps_inelastic.analysis import (
@@ -61,7 +61,7 @@ def test_no_contacts() -> None:
     assert draw_network(ax, graph) is ax
 
 
-def lines_of(ax: Axes) -> set[tuple[tuple[float, ...], ...]]:
+def lines_of(ax: Any) -> set[tuple[tuple[float, ...], ...]]:
     return {
         tuple(map(tuple, np.round(path.vertices, 12))) for path in ax.collections[0].get_paths()
     }

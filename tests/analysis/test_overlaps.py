@@ -51,7 +51,8 @@ def test_same_pair_as_by_looking_at_all(seed: int) -> None:
     distances = np.linalg.norm(centres[:, None] - centres, axis=2)
     depths = np.triu(radii[:, None] + radii - distances, k=1)
     found = largest_pair_overlap(centres, radii)
-    assert found.pair == np.unravel_index(np.argmax(depths), depths.shape)
+    deepest: object = np.unravel_index(np.argmax(depths), depths.shape)
+    assert found.pair == deepest
     assert found.depth == pytest.approx(depths.max(), abs=ROUNDING)
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from PIL import Image
 
 from lammps_inelastic.analysis import InputError, PictureError, draw_packing
@@ -17,7 +17,7 @@ CONTAINER = [[0, 1], [0, 5], [0, 1]]
 CENTRES, RADII = [[0.5, 0.9, 0.5], [0.5, 0.2, 0.5]], [0.2, 0.2]
 
 
-def pixels_of(path: Path) -> NDArray[np.int64]:
+def pixels_of(path: Path) -> Any:
     return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
 

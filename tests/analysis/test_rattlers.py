@@ -70,7 +70,7 @@ def test_contacts_to_hold() -> None:
 
 
 @pytest.mark.parametrize(("walls", "rattles"), [(5, True), (6, False)])
-def test_a_dimer_is_held_by_six(walls: list[int], rattles: bool) -> None:
+def test_a_dimer_is_held_by_six(walls: int, rattles: bool) -> None:
     particles = group_spheres([1, 1])
     contacts = [(1 + wall % 2, -1 - wall) for wall in range(walls)]
     assert backbone(contacts, [1, 2], particles).rattlers.tolist() == [rattles]

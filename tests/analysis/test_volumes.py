@@ -85,7 +85,7 @@ def test_unit_ball_in_boxes(name: str) -> None:
     assert in_box([0, 0, 0], 1, BOXES[name]) == pytest.approx(expected, abs=1e-11)
 
 
-def hexahedron(box: ArrayLike) -> overlap.Hexahedron:
+def hexahedron(box: Any) -> overlap.Hexahedron:
     (x0, x1), (y0, y1), (z0, z1) = box
     base = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
     return overlap.Hexahedron([[x, y, z] for z in (z0, z1) for x, y in base])

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,15 +111,14 @@ class Solved:
     seconds: float
 
 
-def _solve(problem: Recorded, tolerance: float, **options: object) -> Solved | None:
+def _solve(problem: Recorded, tolerance: float, **options: Any) -> Solved | None:
     def once() -> core.Projection:
         return core.project(
             *problem.spheres,
-            **problem.bodies,
             timestep=problem.timestep,
             tolerance=tolerance,
             max_iterations=MOST_ITERATIONS,
-            **options,
+            **(problem.bodies | options),
         )
 
     result, seconds = _timed(once, 1 if options.get("solver") == "uzawa" else REPEATS)

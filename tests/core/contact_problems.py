@@ -99,8 +99,7 @@ class Problem:
             *self.arguments,
             timestep=self.timestep,
             tolerance=tolerance,
-            **self.body_arguments,
-            **options,
+            **(self.body_arguments | options),
         )
 
     def jacobian(self) -> Floats:
@@ -208,7 +207,10 @@ def problem(
 
 
 def in_bodies(
-    given: Problem, position: ArrayLike, groups: Sequence[Sequence[int]], radius: float = 0.0
+    given: Problem,
+    position: ArrayLike,
+    groups: Sequence[Sequence[int] | Indices],
+    radius: float = 0.0,
 ) -> Problem:
     """Join each group of particles, point masses or solid spheres of a radius, to a rigid body.
 
@@ -310,7 +312,7 @@ def cubic_crystal(side: int, seed: int, *, walls: int = 1) -> Problem:
     With six walls there are more contacts than degrees of freedom: the impulses are not unique.
     """
     index = np.arange(side**3).reshape(side, side, side)
-    contacts = []
+    contacts: list[Contact] = []
     for axis in range(3):
         normal = np.eye(3)[axis]
         layers = np.moveaxis(index, axis, 0)
@@ -320,7 +322,8 @@ def cubic_crystal(side: int, seed: int, *, walls: int = 1) -> Problem:
             contacts += [(i, WALL, -normal, 0.0) for i in layers[-1].ravel()]
         for below, above in pairwise(layers):
             contacts += [
-                (j, i, normal, 0.0) for i, j in zip(below.ravel(), above.ravel(), strict=True)
+                (j, i, normal, 0.0)
+                for i, j in zip(below.ravel().tolist(), above.ravel().tolist(), strict=True)
             ]
     velocity = np.random.default_rng(seed).uniform(-1, 1, (side**3, 3))
     return problem(velocity, np.ones(side**3), contacts)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 from scipy.optimize import isotonic_regression
 
 from lammps_inelastic import core
@@ -14,6 +14,7 @@ from tests.core.contact_problems import (
     UP,
     WALL,
     Contact,
+    Floats,
     Problem,
     assert_within,
     column,
@@ -113,7 +114,7 @@ def test_head_on_pair_uses_up_the_gap(solve: Solve) -> None:
 
 
 @pytest.mark.parametrize("mass", [np.ones(10), np.linspace(1, 4, 7), [1, 0.1, 5, 0.1, 1]])
-def test_column_carries_the_weight_above(solve: Solve, mass: Sequence[float]) -> None:
+def test_column_carries_the_weight_above(solve: Solve, mass: Floats) -> None:
     mass = np.array(mass)
     fall = 0.1  # g h
     projection, accuracy = solve(column(mass, [-fall] * mass.size))
@@ -141,11 +142,11 @@ def test_sphere_in_a_wedge(solve: Solve, slopes: tuple[float, float]) -> None:
         problem([(0, 0.3, -fall)], [mass], [(0, WALL, normal, 0) for normal in normals])
     )
     # Two relative velocities fix the two components across the wedge; no friction along it.
-    inverse_norm = np.linalg.norm(np.linalg.inv(normals[:, ::2]), np.inf)
+    inverse_norm = float(np.linalg.norm(np.linalg.inv(normals[:, ::2]), np.inf))
     assert_within(projection.velocity, [(0, 0.3, 0)], inverse_norm * accuracy)
     # Equilibrium of three forces: the law of sines.
     impulse = mass * fall * np.sin([right, left]) / np.sin(left + right)
-    inverse_norm_of_forces = np.linalg.norm(np.linalg.inv(normals[:, ::2].T), np.inf)
+    inverse_norm_of_forces = float(np.linalg.norm(np.linalg.inv(normals[:, ::2].T), np.inf))
     assert_within(
         projection.impulse, impulse, mass * inverse_norm_of_forces * inverse_norm * accuracy
     )
@@ -259,7 +260,7 @@ def rod(
     count: int,
     contacts: Sequence[Contact],
     *,
-    velocity: ArrayLike = (0, 0, -1),
+    velocity: Any = (0, 0, -1),
     radius: float = 0.0,
 ) -> Problem:
     """Unit masses on the x axis, one apart and joined, that move like one."""
@@ -328,7 +329,7 @@ def test_dimer_leans_on_a_wall_and_slides(solve: Solve, slope: float) -> None:
     given = in_bodies(ladder, [(cosine, 0, 0), (0, 0, sine)], [(0, 1)])
     projection, accuracy = solve(given)
     # Errors of two relative velocities, through the inverse of the matrix between the impulses.
-    masses = np.linalg.norm(np.linalg.inv(given.delassus() / given.timestep), np.inf)
+    masses = float(np.linalg.norm(np.linalg.inv(given.delassus() / given.timestep), np.inf))
     expected = [(sine * cosine, 0, 0), (0, 0, -(cosine**2))]
     assert_within(projection.velocity, expected, 2 * masses * accuracy)
     assert_within(projection.impulse, [1 + sine**2, sine * cosine], masses * accuracy)
@@ -349,7 +350,7 @@ def test_crossed_dimers_touch_at_their_ends(solve: Solve) -> None:
 TETRAHEDRON = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
 
 
-def tetrahedron(contacts: Sequence[Contact], velocity: ArrayLike) -> Problem:
+def tetrahedron(contacts: Sequence[Contact], velocity: Any) -> Problem:
     return in_bodies(problem([velocity] * 4, [1] * 4, contacts), TETRAHEDRON, [range(4)])
 
 

@@ -33,7 +33,7 @@ def project(**changes: Any) -> core.Projection:
     return core.project(**arguments(**changes))
 
 
-def residual(**changes: Any) -> tuple[float, float]:
+def residual(**changes: Any) -> Any:
     given = arguments(**{"impulse": np.zeros(2), **changes})
     del given["tolerance"]
     return core.residual(**given)

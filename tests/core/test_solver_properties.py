@@ -52,7 +52,7 @@ PROBLEMS = WITHOUT_BODIES | WITH_BODIES
 IN_FREE_SPACE = [name for name in PROBLEMS if "without a floor" in name]
 
 
-@pytest.fixture(params=PROBLEMS.values(), ids=PROBLEMS.keys())
+@pytest.fixture(params=list(PROBLEMS.values()), ids=list(PROBLEMS))
 def given(request: pytest.FixtureRequest) -> Problem:
     return request.param
 
@@ -109,7 +109,7 @@ def test_max_iterations(given: Problem, solver: str) -> None:
 @pytest.mark.parametrize("given", WITHOUT_BODIES.values(), ids=WITHOUT_BODIES)
 def test_no_bodies_change_no_bit(given: Problem, solver: str) -> None:
     nobody = no_bodies(given.inverse_mass.size)
-    nothing = {
+    nothing: dict[str, Any] = {
         "body": nobody.body,
         "arm": nobody.arm,
         "body_inverse_mass": nobody.inverse_mass,
@@ -120,12 +120,12 @@ def test_no_bodies_change_no_bit(given: Problem, solver: str) -> None:
     assert same.iterations == usual.iterations
     assert np.array_equal(same.velocity, usual.velocity)
     assert np.array_equal(same.impulse, usual.impulse)
-    rest = {"timestep": given.timestep}
-    assert core.residual(*given.arguments, usual.impulse, **rest, **nothing) == core.residual(
+    rest: dict[str, Any] = {"timestep": given.timestep}
+    assert core.residual(*given.arguments, usual.impulse, **(rest | nothing)) == core.residual(
         *given.arguments, usual.impulse, **rest
     )
     contacts = given.arguments[1:5]
-    assert core.largest_eigenvalue(*contacts, **rest, **nothing) == core.largest_eigenvalue(
+    assert core.largest_eigenvalue(*contacts, **(rest | nothing)) == core.largest_eigenvalue(
         *contacts, **rest
     )
 
@@ -151,7 +151,7 @@ def test_bodies_move_by_momentum_and_angular_momentum(given: Problem, solver: st
         turn = np.linalg.lstsq(cross, (moved - mass @ moved / mass.sum()).ravel(), rcond=1e-9)[0]
         inertia = np.linalg.pinv(given.bodies.inverse_inertia[b], rtol=1e-9, hermitian=True)
         assert_within(inertia @ turn, np.cross(arm, push).sum(axis=0), accuracy)
-        pushed += push.any()
+        pushed += int(push.any())
     assert pushed > given.bodies.inverse_mass.size / 2
 
 

@@ -650,7 +650,7 @@ def test_a_frozen_sphere_that_moves_pushes(tmp_path: Path, lmp: Runner) -> None:
         tmp_path,
         tolerance=EPS,
         gravity=False,
-        velocities=[[0.5, 0, 0], [0, 0, 0]],
+        velocities=[[0.5, 0.0, 0.0], [0.0, 0.0, 0.0]],
         options="region container frozen pusher",
         motion="group pusher id 1\ngroup free id 2\nfix push pusher move linear 0.5 0 0\n"
         "fix motion free nve",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -359,7 +360,7 @@ def test_a_union_seen_from_outside(ranks: int, tmp_path: Path, refused: Refused)
     assert "list the parts instead" in error, error
 
 
-MESSAGES = {
+MESSAGES: dict[str, tuple[dict[str, Any], list[str]]] = {
     "a force that is not finite": (
         {"fixes": "variable f atom (id==1)*1e305\nfix blow all addforce v_f 0 0"},
         ["the force on atom 1 is not a finite number"],

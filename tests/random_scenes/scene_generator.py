@@ -313,7 +313,7 @@ class _Draw:
             if self.flags[axis] == "f" and (self.open_sides or self.chance(0.15)):
                 self.flags[axis] = self.one("s", "m") if self.open_sides else "s"
                 self.note("shrink-wrapped")
-        self.random.shuffle(self.regions)  # type: ignore[arg-type]
+        self.random.shuffle(self.regions)
         # Numbers count on in the order of the list.
         at = 1
         for _, names in self.regions:

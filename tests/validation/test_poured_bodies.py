@@ -96,7 +96,7 @@ def thrown(deck: str) -> str:
     )
 
 
-SCENES = {
+SCENES: dict[str, tuple[str, dict[str, object]]] = {
     "dimers 1.05": (shipped_deck("dimers"), {"aspect_ratio": 1.05}),
     "dimers 1.5": (shipped_deck("dimers"), {"aspect_ratio": 1.5}),
     "solid dimers 2": (shipped_deck("dimers"), {"aspect_ratio": 2.0, "inertia": "solid"}),

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.folder import FAILED, FINISHED, Folder
+from lammps_inelastic.workflow.finished import FINISHED
+from lammps_inelastic.workflow.folder import FAILED, Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.study import read_study
 from tests.workflow.few_spheres import TINY

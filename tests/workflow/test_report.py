@@ -237,9 +237,15 @@ class Page(HTMLParser):
 
     def __init__(self, text: str) -> None:
         super().__init__()
-        self.ids, self.links, self.sources, self.opened, self.text = [], [], [], [], ""
+        self.ids: list[str | None] = []
+        self.links: list[str | None] = []
+        self.sources: list[str | None] = []
+        self.opened: list[str] = []
+        self.text = ""
         # The style sheet; of each table, listing and figure its own rule's name and its parents'.
-        self.text_of_style, self.wide, self._names = "", [], []
+        self.text_of_style = ""
+        self.wide: list[list[str]] = []
+        self._names: list[list[str]] = []
         self.feed(text)
         self.close()
         assert self.opened == []
@@ -616,7 +622,8 @@ def test_peak_of_a_parabola() -> None:
 
 def test_the_error_of_a_peak() -> None:
     """Beside what drawing the values again and again gives."""
-    x, errors = np.array([1.0, 1.2, 1.5, 1.6, 2.0]), np.array([1, 2, 1, 3, 1]) * 1e-3
+    x: Any = np.array([1.0, 1.2, 1.5, 1.6, 2.0])
+    errors: Any = np.array([1, 2, 1, 3, 1]) * 1e-3
     y = -((x - 1.42) ** 2)
     random = np.random.default_rng(1)
     drawn = [peak(x, y + random.normal(0, errors), errors, 2) for _ in range(4000)]
@@ -683,7 +690,7 @@ def test_plots_return_their_axis_and_name_it() -> None:
 
 
 @pytest.mark.parametrize("kind", ["curve", "profile", "points", "distribution"])
-def test_errors_on_a_logarithmic_axis_leave_no_wedge(kind: str) -> None:
+def test_errors_on_a_logarithmic_axis_leave_no_wedge(kind: Any) -> None:
     """A corner at 0 or below has no place there: others would be joined across the figure."""
     y = np.array([1, 0.1, 0.01, 0.002, 0.001])
     error = np.array([0.1, 0.05, 0.01, 0.003, math.nan])

@@ -69,7 +69,7 @@ def test_every_dataset_is_in_the_schema(undisturbed: Path) -> None:
         cases = file["few/cases"]
         assert len(cases) == 2
         for case in cases.values():
-            found = {}
+            found: dict[str, Any] = {}
             case.visititems(
                 lambda name, item, found=found: found.update(
                     {name: item} if isinstance(item, h5py.Dataset) else {}

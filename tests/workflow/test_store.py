@@ -94,7 +94,7 @@ def test_another_version_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("at", [0, 8, 60, 500, 2000, -200, -100, -40, -1])
-def test_one_changed_byte_is_noticed(tmp_path: Path, at: float) -> None:
+def test_one_changed_byte_is_noticed(tmp_path: Path, at: int) -> None:
     """Wherever it is: HDF5 itself does not look whether numbers are as they were written."""
     path = tmp_path / "a.h5"
     write_result(path, result_of("a"))

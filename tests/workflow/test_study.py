@@ -355,7 +355,7 @@ def test_a_deck_without_a_parameter(write_study: Callable[..., Path], tmp_path: 
     ],
 )
 def test_where_an_own_deck_writes(
-    write_study: Callable[..., Path], tmp_path: Path, text: str, given: str, fits: bool
+    write_study: Callable[..., Path], tmp_path: Path, text: str, given: bool, fits: bool
 ) -> None:
     (tmp_path / "own.in").write_text(text)
     (case,) = read_study(write_study('title="t"\ndeck="own.in"')).cases

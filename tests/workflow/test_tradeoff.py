@@ -6,7 +6,7 @@ import csv
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ TIMES = np.arange(41) * 0.05
 DIAMETER = 0.1
 
 
-def fallen_by(time: FloatArray) -> FloatArray:
+def fallen_by(time: Any) -> FloatArray:
     """Height of the centre of mass in a fall from 2.5 that a floor ends at 0.5."""
     return np.maximum(2.5 - 9.81 * time**2 / 2, 0.5)
 
@@ -167,7 +167,10 @@ def test_networks_that_cannot_be_compared(ids: Any, forces: Any, message: str) -
 
 
 def configuration(
-    contacts: str = "hard", tolerance: float = 0.005, dt: float = 0.01, ranks: int = 1
+    contacts: Literal["hard", "soft"] = "hard",
+    tolerance: float = 0.005,
+    dt: float = 0.01,
+    ranks: int = 1,
 ) -> Configuration:
     hard = contacts == "hard"
     return Configuration(contacts, tolerance, "apgd" if hard else None, dt if hard else None, ranks)
@@ -297,6 +300,7 @@ def test_the_reference_is_the_tightest_with_the_shortest_step() -> None:
 def test_bad_options(
     arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    status: object
     try:
         status = main(["tradeoff", "--out", str(tmp_path / "out"), *arguments])
     except SystemExit as end:  # argparse's own
@@ -390,7 +394,7 @@ def test_numbers_of_a_comparison(finished: tuple[list[str], Path]) -> None:
 def test_all_runs_of_a_seed_have_the_same_start(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     (study,) = read_studies(out / "tradeoff.h5")
-    heights = {}
+    heights: dict[object, set[float]] = {}
     for result in study.results:
         key = result.variables["seed"]
         heights.setdefault(key, set()).add(float(result.values["evolution/centre_height"][0]))
