@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 
+# Before pytest-xdist looks at the groups.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the tests of a file into one process, and all tests with a number of ranks into another.
 
