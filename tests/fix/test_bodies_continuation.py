@@ -80,7 +80,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, FloatArra
 
 
 def assert_same(positions: FloatArray, others: FloatArray) -> None:
-    """Compare within the design's equality."""
+    """Fail where a sphere is further than SAME from where it should be on an axis."""
     assert np.abs(positions - others).max() <= SAME
 
 

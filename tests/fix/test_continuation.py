@@ -60,7 +60,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> FloatArray:
 
 
 def assert_same(positions: FloatArray, others: FloatArray) -> None:
-    """Compare within the design's equality."""
+    """Fail where a sphere is further than SAME from where it should be on an axis."""
     assert np.abs(positions - others).max() <= SAME
 
 
@@ -109,7 +109,7 @@ def simulated(
     runs: list[tuple[int, float]],
     tolerance: float,
 ) -> list[FloatArray]:
-    """Return the positions at every step, computed with the scheme of the design alone.
+    """Return the positions at every step, computed by the equations of a step alone.
 
     Each run is a number of steps and a time step. LAMMPS holds whole-step velocities between runs.
     """

@@ -27,7 +27,7 @@ RADIUS = 0.06
 EPS = 0.0005 * RADIUS
 SLACK = 1 + 1e-6  # round-off of positions
 # Summation orders differ between decompositions; contacts amplify that. At this tolerance 80 steps
-# agree within SAME (the design's equality).
+# agree within SAME, the tolerance of a deck.
 EXACT = 5e-9 * RADIUS
 SAME = 0.0005 * RADIUS
 

@@ -26,7 +26,7 @@ from tests.fix.scenes import (
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS
-# Positions are doubles: the slack that the issue allows.
+# Positions are doubles: overlaps are as deep as the tolerance up to round-off.
 SLACK = 1 + 1e-6
 CENTRES = ((0.06, 0.94), (0.06, 4.9), (0.06, 0.94))
 
