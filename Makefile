@@ -18,8 +18,8 @@ SOURCES := $(shell find src_fix -type f -not -path '*/__pycache__/*' -not -path 
            CMakeLists.txt pyproject.toml
 # The environment's mpicxx and mpiexec come before any of the system's.
 export PATH := $(abspath $(BIN)):$(PATH)
-# Two processes; which tests may run at the same time is said in tests/conftest.py.
-PYTEST := pytest -n 2 --dist loadgroup
+# Two processes; the tests of a file stay together, since they share the fixtures of its module.
+PYTEST := pytest -n 2 --dist loadfile
 
 .PHONY: run report test test-all style validate tables bench bench-quick setup clean
 
