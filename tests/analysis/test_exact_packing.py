@@ -41,6 +41,7 @@ def assert_within_four_sigma(measured: PackingFraction, exact: float) -> None:
     assert abs(measured.value - exact) < 4 * measured.uncertainty
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("box", BOXES)
 def test_spheres_and_random_points(box: ArrayLike) -> None:
     positions, radii, _ = dimers_on_grid(0, 0.08)

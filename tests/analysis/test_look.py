@@ -258,6 +258,7 @@ def test_dimers(dimers: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert above == below + 1
 
 
+@pytest.mark.slow
 def test_text_and_picture_of_dimers(dimers: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["look", str(dimers), *MIDDLE]) == 0
     output = " ".join(capsys.readouterr().out.split())

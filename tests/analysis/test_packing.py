@@ -61,6 +61,7 @@ def test_the_same_sphere_twice_counts_once() -> None:
     assert once == twice
 
 
+@pytest.mark.slow
 def test_nearest_centre_does_not_decide() -> None:
     # Small spheres line the inside of a large one: most points have a small centre nearest to
     # them, but lie outside it and inside the large one.

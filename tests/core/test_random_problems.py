@@ -125,6 +125,7 @@ def test_bodies(drawn: tuple[Problem, Floats]) -> None:
     assert_projected(drawn[0])
 
 
+@pytest.mark.slow
 @RANDOM
 @given(problems(mass_decades=6.0))
 def test_masses_of_a_million_to_one(drawn: tuple[Problem, Floats]) -> None:

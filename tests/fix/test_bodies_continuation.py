@@ -84,6 +84,7 @@ def assert_same(positions: FloatArray, others: FloatArray) -> None:
     assert np.abs(positions - others).max() <= SAME
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize(
     "runs",

@@ -124,7 +124,7 @@ def overlaps(folder: Path, container: str) -> tuple[FloatArray, FloatArray]:
     ("container", "inertia", "speed"),
     [
         pytest.param("block", "point", 0, marks=pytest.mark.slow, id="block-point-fall"),
-        pytest.param("cylinder", "solid", 0, id="cylinder-solid-fall"),
+        pytest.param("cylinder", "solid", 0, marks=pytest.mark.slow, id="cylinder-solid-fall"),
         pytest.param(
             "cylinder", "point", 60, marks=pytest.mark.slow, id="cylinder-point-ten-times-the-speed"
         ),

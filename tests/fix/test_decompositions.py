@@ -152,6 +152,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
     return read_dump(folder / "particles.dump")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DIVISIONS)
 def test_the_division_does_not_matter(
     name: str, reference: list[Frame], tmp_path: Path, lmp: Runner

@@ -261,6 +261,7 @@ def test_a_tolerance_below_round_off(ranks: int, tmp_path: Path, refused: Refuse
     assert "below the round-off of positions" in refused(text, ranks=ranks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_list_that_does_not_reach(
     ranks: int, tmp_path: Path, refused: Refused, lmp: Runner

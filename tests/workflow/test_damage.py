@@ -143,6 +143,7 @@ def test_a_damaged_result_is_measured_again(
     assert len(list((out / "cases").iterdir())) == 3  # with that of the locks
 
 
+@pytest.mark.slow
 def test_a_damaged_result_in_a_job(study: Path) -> None:
     path, out = study / "few.toml", study / "out"
     before = numbers_of(out / "few.h5")

@@ -403,6 +403,7 @@ def test_a_result_of_another_run(
     assert "2026-01-01T00:00:00+00:00; delete it to measure that" in said
 
 
+@pytest.mark.slow
 def test_every_stage_of_a_run_is_compared(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -197,7 +197,16 @@ def mapped(process: subprocess.Popen[str], part: str) -> bool:
         return False
 
 
-@pytest.mark.parametrize("moment", ["imports", "imports, late", "pool", "twice", "together"])
+@pytest.mark.parametrize(
+    "moment",
+    [
+        "imports",
+        pytest.param("imports, late", marks=pytest.mark.slow),
+        "pool",
+        pytest.param("twice", marks=pytest.mark.slow),
+        pytest.param("together", marks=pytest.mark.slow),
+    ],
+)
 def test_interrupted(moment: Any, tmp_path: Path) -> None:
     """At whatever moment: one line, and nothing is left running."""
     out = tmp_path / "out"
