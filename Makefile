@@ -1,21 +1,27 @@
-# make run      set up, pour 1,000 spheres, print what came out
-# make test     set up, check style and types, run the tests
-# make report   set up, write the report of the paper's studies from the results kept here
-# make validate set up, check the physics (minutes)
-# make bench    set up, measure speed and accuracy (an hour and more; bench-quick: 15 minutes)
-# make tables   set up, print the measured tables of the documentation (an hour)
-# make clean    remove what these made
+# make run       set up, pour 1,000 spheres, print what came out
+# make test      set up, check style and types, run the tests that take three minutes on two cores
+# make test-all  the same, then the slow tests (five minutes more)
+# make report    set up, write the report of the paper's studies from the results kept here
+# make validate  set up, check the physics (minutes)
+# make bench     set up, measure speed and accuracy (an hour and more; bench-quick: 15 minutes)
+# make tables    set up, print the measured tables of the documentation (an hour)
+# make setup     set up only: Python files and decks are used where they are, C++ is compiled again
+# make clean     remove what these made
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# All that ends up in the installed package: it is installed anew when any of it changes.
-SOURCES := $(shell find src_fix inputs workflow analysis -type f -not -path '*/__pycache__/*') \
-           CMakeLists.txt pyproject.toml README.md LICENSE
+# Folders that the environment uses where they are: a change in them needs no installation.
+LINKED := workflow analysis inputs
+# All else that ends up in the installed package: it is compiled again when any of it changes.
+SOURCES := $(shell find src_fix -type f -not -path '*/__pycache__/*' -not -path 'src_fix/doc/*') \
+           CMakeLists.txt pyproject.toml
 # The environment's mpicxx and mpiexec come before any of the system's.
 export PATH := $(abspath $(BIN)):$(PATH)
+# Two processes; the tests of a file stay together, since they share the fixtures of its module.
+PYTEST := pytest -n 2 --dist loadfile
 
-.PHONY: run report test validate tables bench bench-quick setup clean
+.PHONY: run report test test-all style validate tables bench bench-quick setup clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -24,27 +30,38 @@ run: setup
 report: setup
 	inelastic reproduce --stored-only --out paper
 
-test: setup
+style: setup
 	ruff check .
 	ruff format --check .
-	mypy -p lammps_inelastic.analysis -p lammps_inelastic.workflow
-	pytest -m "not validation"
+	clang-format --dry-run -Werror --style=file $$(find src_fix tests/core -name '*.h' -o -name '*.cpp')
+	mypy -p lammps_inelastic.analysis -p lammps_inelastic.workflow -p tests
+
+test: style
+	$(PYTEST) -m "not slow and not validation"
+
+test-all: test
+	$(PYTEST) -m "slow and not validation"
 
 validate: setup
 	pytest -m validation -s --durations=0
 
 tables: setup
-	python tests/tables.py
+	python -m tests.tables
 
 bench: setup
-	PYTHONPATH=tests:tests/fix python tests/benchmark
+	python -m tests.benchmark
 
 bench-quick: setup
-	PYTHONPATH=tests:tests/fix python tests/benchmark --quick
+	python -m tests.benchmark --quick
 
 setup: $(VENV)/installed
 
-$(VENV)/installed: $(SOURCES)
+# All that is needed to build, to run and to test, as pyproject.toml says.
+REQUIREMENTS := import tomllib; file = tomllib.load(open("pyproject.toml", "rb")); \
+  one = file["project"]; print(*file["build-system"]["requires"], *one["dependencies"], \
+  *one["optional-dependencies"]["test"], sep="\n")
+
+$(VENV)/requirements.txt: pyproject.toml
 	@command -v $(PYTHON) >/dev/null && $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 	  || { echo 'Python 3.11 or later is needed (make PYTHON=/path/to/python3.11)'; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
@@ -53,7 +70,20 @@ $(VENV)/installed: $(SOURCES)
 	  || { echo 'The headers of Python are missing: apt-get install python3-dev'; exit 1; }
 	@command -v c++ >/dev/null || { echo 'A C++ compiler is missing: apt-get install g++'; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[test]'
+	$(BIN)/python -c '$(REQUIREMENTS)' > $@.new
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
+	mv $@.new $@
+
+# The compiled parts alone are built (in build/, where only what changed is compiled again) and
+# installed; beside them the package gets links to the folders of this repository. An editable
+# installation would not do: mypy finds no package whose folder has another name than the package.
+$(VENV)/installed: $(VENV)/requirements.txt $(SOURCES)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
+	  --config-settings=wheel.packages= .
+	package=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/lammps_inelastic \
+	  && for folder in $(LINKED); do \
+	    rm -rf "$$package/$$folder" && ln -s "$(CURDIR)/$$folder" "$$package/$$folder" || exit 1; \
+	  done
 	touch $@
 
 clean:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +114,7 @@ class Recorded:
         return float(self.arrays["tolerance"])
 
     @property
-    def spheres(self) -> list[NDArray]:
+    def spheres(self) -> list[Any]:
         """The arguments of `core.project` for the spheres as if all were free."""
         a = self.arrays
         return [
@@ -126,7 +127,7 @@ class Recorded:
         ]
 
     @property
-    def bodies(self) -> dict[str, NDArray]:
+    def bodies(self) -> dict[str, Any]:
         """The arguments of `core.project` for the bodies; none in a scene of free spheres."""
         a = self.arrays
         if "molecule" not in a:
@@ -148,7 +149,7 @@ def read_record(path: Path) -> Recorded:
     with np.load(path) as file:
         arrays = dict(file)
     identifiers = arrays["id"]
-    first = np.searchsorted(identifiers, arrays["id1"])
+    first = np.asarray(np.searchsorted(identifiers, arrays["id1"]))
     second = np.where(arrays["id2"] > 0, np.searchsorted(identifiers, arrays["id2"]), -1)
     return Recorded(arrays, first.astype(np.int64), second.astype(np.int64))
 

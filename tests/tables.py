@@ -1,9 +1,10 @@
 """Prints the measured tables of the documentation: `make tables`.
 
-`tables.py contacts` shows the coordination number of spheres against time step, tolerance and
-solver, `tables.py near` that of dimers that are almost spheres against the tolerance, `tables.py
-start` a regular start of dimers beside a random one, `tables.py inertia` point masses beside solid
-spheres. Every row is nine seeds unless --seeds says otherwise. The paper's numbers are studies.
+`python -m tests.tables NAME` prints one of them. `contacts` shows the coordination number of
+spheres against time step, tolerance and solver, `near` that of dimers that are almost spheres
+against the tolerance, `start` a regular start of dimers beside a random one, `inertia` point masses
+beside solid spheres. Every row is nine seeds unless --seeds says otherwise. The paper's numbers are
+studies.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from pouring import (
+from tests.pouring import (
     Packing,
     measure,
     measuring_at,
@@ -167,7 +168,7 @@ TABLES = {
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.tables", description=__doc__)
     parser.add_argument("tables", nargs="*", choices=[[], *TABLES], help="default: all")
     parser.add_argument("--seeds", type=int, default=9)
     arguments = parser.parse_args()

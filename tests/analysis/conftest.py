@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from written_dumps import CONTACT_COLUMNS, PARTICLE_COLUMNS, Rows, frame_text
-
-Writer = Callable[..., Path]
+from tests.analysis.written_dumps import (
+    CONTACT_COLUMNS,
+    PARTICLE_COLUMNS,
+    Rows,
+    Writer,
+    frame_text,
+)
 
 
 def writer(path: Path, label: str, usual_columns: str) -> Writer:

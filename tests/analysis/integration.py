@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
+
+from lammps_inelastic.analysis.geometry import FloatArray
 
 # Gauss's rule, with x = -cos(t) on [-1, 1]: what starts like a square root at an end of a piece,
 # as everything round does, is smooth in t. 24 points then integrate a piece to rounding.
@@ -11,7 +17,9 @@ _ANGLES = (_NODES + 1) * np.pi / 2
 POINTS, WEIGHTS = -np.cos(_ANGLES), _WEIGHTS * np.sin(_ANGLES) * np.pi / 2
 
 
-def integrate(function, lower, upper, breaks):
+def integrate(
+    function: Callable[[FloatArray], ArrayLike], lower: float, upper: float, breaks: ArrayLike
+) -> float:
     """Integrate a function of an array between points at which it need not be smooth."""
     breaks = np.asarray(breaks, dtype=float)
     inner = breaks[(breaks > lower) & (breaks < upper)]  # NaN is left out
@@ -22,17 +30,17 @@ def integrate(function, lower, upper, breaks):
     return float((values @ WEIGHTS * half).sum())
 
 
-def root(square):
+def root(square: float) -> float:
     """Return the square root, NaN where there is none."""
     return np.sqrt(square) if square >= 0 else np.nan
 
 
-def quadrant(radius, y, z):
+def quadrant(radius: float, y: float, z: float) -> float:
     """Return the area of the disc of this radius where Y < y and Z < z."""
     if radius <= 0:
         return 0.0
 
-    def segment(h):
+    def segment(h: float) -> float:
         """Return the area where the coordinate is below h."""
         h = np.clip(h, -radius, radius)
         return h * root(radius**2 - h**2) + radius**2 * (np.arcsin(h / radius) + np.pi / 2)
@@ -50,14 +58,14 @@ def quadrant(radius, y, z):
     # From the left end of the line Z = z, up to which the whole chord counts, to y.
     left = -root(radius**2 - z**2)
 
-    def half(h):
+    def half(h: float) -> float:
         return (h * root(radius**2 - h**2) + radius**2 * np.arcsin(h / radius)) / 2
 
     below = segment(left) if z >= 0 else 0.0
     return below + half(y) - half(left) + z * (y - left)
 
 
-def ball_in_box(centre, radius, box):
+def ball_in_box(centre: ArrayLike, radius: float, box: ArrayLike) -> float:
     """Return the volume of a ball in a box: the areas of discs in a rectangle, over x."""
     low, high = (np.asarray(box, dtype=float) - np.asarray(centre)[:, None]).T
     (_, y0, z0), (_, y1, z1) = low, high
@@ -65,7 +73,7 @@ def ball_in_box(centre, radius, box):
     squares += [y**2 + z**2 for y in (y0, y1) for z in (z0, z1)]
     breaks = [sign * root(radius**2 - square) for square in squares for sign in (-1, 1)]
 
-    def area(x):
+    def area(x: Any) -> Any:
         discs = np.sqrt(np.maximum(radius**2 - x**2, 0))
         return [
             quadrant(r, y1, z1) - quadrant(r, y0, z1) - quadrant(r, y1, z0) + quadrant(r, y0, z0)
@@ -76,7 +84,7 @@ def ball_in_box(centre, radius, box):
     return integrate(area, lower, upper, breaks) if lower < upper else 0.0
 
 
-def dimer_in_box(centres, radii, box):
+def dimer_in_box(centres: ArrayLike, radii: Sequence[float], box: ArrayLike) -> float:
     """Return the volume of the union of two balls in a box: lengths along z, over y, over x."""
     centres, box = np.asarray(centres, dtype=float), np.asarray(box, dtype=float)
     (y0, y1), (z0, z1) = box[1:]
@@ -104,7 +112,7 @@ def dimer_in_box(centres, radii, box):
         squares = [0, *dy**2, *dz**2, *(y**2 + z**2 for y in dy for z in dz)]
         breaks += [centre[0] + s * root(radius**2 - square) for square in squares for s in (-1, 1)]
 
-    def area(x):
+    def area(x: Any) -> Any:
         discs = [root(r**2 - (x - c[0]) ** 2) for c, r in zip(centres, radii, strict=True)]
         discs = [0.0 if np.isnan(disc) else disc for disc in discs]
         bounds = []
@@ -120,7 +128,7 @@ def dimer_in_box(centres, radii, box):
             foot = centres[0, 1:] + part * flat / apart
             bounds += [foot[0] + s * height * flat[1] / apart for s in (-1, 1)]
 
-        def length(y):
+        def length(y: FloatArray) -> FloatArray:
             ends = []
             for centre, disc in zip(centres, discs, strict=True):
                 square = disc**2 - (y - centre[1]) ** 2
@@ -134,4 +142,5 @@ def dimer_in_box(centres, radii, box):
 
         return integrate(length, y0, y1, bounds)
 
-    return integrate(lambda x: [area(one) for one in x], *box[0], breaks)
+    low, high = box[0]
+    return integrate(lambda x: [area(one) for one in x], low, high, breaks)

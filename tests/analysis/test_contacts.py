@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from lammps_inelastic.analysis import DumpError, iterate_contact_frames
+from lammps_inelastic.analysis import ContactFrame, DumpError, iterate_contact_frames
+from tests.analysis.written_dumps import Writer
 
 PAIR = [3, 8, 0.1, 0.2, 0.3, 0.0, 1.0, 0.0, -1.0000000000000001e-05, 1.0 / 3.0]
 WALL = [8, -3, 0.5, 0.0, 0.5, 0.0, 1.0, 0.0, 2e-6, 0.25]
 
 
-def read(path):
+def read(path: Path) -> list[ContactFrame]:
     return list(iterate_contact_frames(path))
 
 
-def test_numbers_survive(write_contacts):
+def test_numbers_survive(write_contacts: Writer) -> None:
     (frame,) = read(write_contacts({40: [PAIR, WALL]}))
     # Equality, not closeness: 17 digits give a float64 back.
     assert frame.step == 40
@@ -26,34 +29,34 @@ def test_numbers_survive(write_contacts):
     assert frame.forces.tolist() == [PAIR[9], WALL[9]]
 
 
-def test_frames_without_contacts(write_contacts):
+def test_frames_without_contacts(write_contacts: Writer) -> None:
     frames = read(write_contacts({0: [], 1: [PAIR], 2: []}))
     assert [frame.step for frame in frames] == [0, 1, 2]
     assert [frame.ids.shape for frame in frames] == [(0, 2), (1, 2), (0, 2)]
     assert frames[0].normals.shape == (0, 3)
 
 
-def test_columns_are_found_by_name(write_contacts):
+def test_columns_are_found_by_name(write_contacts: Writer) -> None:
     columns = "index force id1 id2 x y z nx ny nz gap"
     (frame,) = read(write_contacts({0: [[1, PAIR[9], *PAIR[:9]]]}, columns))
     assert frame.ids.tolist() == [[3, 8]]
     assert frame.forces.tolist() == [PAIR[9]]
 
 
-def test_label_may_differ(write_contacts):
+def test_label_may_differ(write_contacts: Writer) -> None:
     path = write_contacts({0: [PAIR]})
     path.write_text(path.read_text().replace("ENTRIES", "CONTACTS"))
     assert len(read(path)) == 1
 
 
-def test_frames_come_one_by_one(write_contacts):
+def test_frames_come_one_by_one(write_contacts: Writer) -> None:
     frames = iterate_contact_frames(write_contacts({0: [PAIR], 1: [[*PAIR[:9], np.nan]]}))
     assert next(frames).step == 0
     with pytest.raises(DumpError, match="line 20: force is nan"):
         next(frames)
 
 
-def test_dump_written_by_lammps(lammps_dumps):
+def test_dump_written_by_lammps(lammps_dumps: tuple[Path, Path]) -> None:
     touching, *_, apart = read(lammps_dumps[1])
     assert sorted(touching.ids[0].tolist()) == [1, 2]
     # 16 digits, and a difference of two coordinates near 0.5: a few units of the last place.
@@ -63,23 +66,23 @@ def test_dump_written_by_lammps(lammps_dumps):
     assert (apart.step, len(apart.ids)) == (4000, 0)
 
 
-def test_missing_file(tmp_path):
+def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(DumpError, match="no such file"):
         read(tmp_path / "nowhere")
 
 
-def test_empty_file(tmp_path):
+def test_empty_file(tmp_path: Path) -> None:
     (tmp_path / "empty").touch()
     with pytest.raises(DumpError, match="the file is empty"):
         read(tmp_path / "empty")
 
 
-def test_missing_column(write_contacts):
+def test_missing_column(write_contacts: Writer) -> None:
     with pytest.raises(DumpError, match="line 9: no column gap, force; there is id1 id2 x y z nx"):
         read(write_contacts({0: [PAIR[:8]]}, "id1 id2 x y z nx ny nz"))
 
 
-def test_truncated(write_contacts):
+def test_truncated(write_contacts: Writer) -> None:
     path = write_contacts({0: [PAIR], 1: [PAIR, WALL]})
     path.write_bytes(path.read_bytes()[:-4])
     with pytest.raises(DumpError, match=r"line 21: .* the frame of step 1: 1 of 2 rows"):
@@ -87,7 +90,7 @@ def test_truncated(write_contacts):
 
 
 @pytest.mark.parametrize("announced", [0, 1])
-def test_too_many_rows(write_contacts, announced):
+def test_too_many_rows(write_contacts: Writer, announced: int) -> None:
     path = write_contacts({0: [PAIR, WALL]}, announced=announced)
     with pytest.raises(DumpError, match=f"line {10 + announced}: expected 'ITEM: TIMESTEP'"):
         read(path)
@@ -108,18 +111,18 @@ def test_too_many_rows(write_contacts, announced):
         ([*PAIR, 1.0], "line 11: expected 10 values, found 11"),
     ],
 )
-def test_bad_row(write_contacts, row, message):
+def test_bad_row(write_contacts: Writer, row: str, message: str) -> None:
     with pytest.raises(DumpError, match=message):
         read(write_contacts({0: [PAIR, row, WALL]}))
 
 
-def test_word_instead_of_number(write_contacts):
+def test_word_instead_of_number(write_contacts: Writer) -> None:
     path = write_contacts({0: [WALL, PAIR]})
     path.write_text(path.read_text().replace("0.25", "a quarter", 1).replace(" quarter", ""))
     with pytest.raises(DumpError, match="line 10: force = 'a' is no number"):
         read(path)
 
 
-def test_a_curved_wall_may_be_touched_twice(write_contacts):
+def test_a_curved_wall_may_be_touched_twice(write_contacts: Writer) -> None:
     (frame,) = read(write_contacts({0: [WALL, WALL]}))
     assert frame.ids.tolist() == [[8, -3], [8, -3]]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 
 from lammps_inelastic.analysis import DumpError, ParticleDump, iterate_contact_frames
 from lammps_inelastic.workflow.main import main
-from written_dumps import CONTACT_COLUMNS, PARTICLE_COLUMNS, frame_text
+from tests.analysis.written_dumps import CONTACT_COLUMNS, PARTICLE_COLUMNS, frame_text
 
 # The same examples on every machine; a folder may serve all examples of a test, each writes anew.
 FUZZED = settings(
@@ -46,7 +47,7 @@ UNREAD = {"type"}
 
 
 @pytest.fixture(params=KINDS)
-def kind(request) -> str:
+def kind(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
@@ -55,7 +56,7 @@ def text_of(kind: str) -> bytes:
     return "".join(frame_text(label, step, columns, rows, None) for step in STEPS).encode()
 
 
-def read_particles(path: Path) -> list[list]:
+def read_particles(path: Path) -> list[list[Any]]:
     """All numbers of all frames."""
     return [
         [f.step, f.ids, f.positions, f.velocities, f.radii, f.box, f.bodies, f.contacts]
@@ -63,19 +64,19 @@ def read_particles(path: Path) -> list[list]:
     ]
 
 
-def read_contacts(path: Path) -> list[list]:
+def read_contacts(path: Path) -> list[list[Any]]:
     return [
         [f.step, f.ids, f.points, f.normals, f.gaps, f.forces] for f in iterate_contact_frames(path)
     ]
 
 
-READERS: dict[str, Callable[[Path], list[list]]] = {
+READERS: dict[str, Callable[[Path], list[list[Any]]]] = {
     "particles": read_particles,
     "contacts": read_contacts,
 }
 
 
-def same(some: list[list], others: list[list]) -> bool:
+def same(some: list[list[Any]], others: list[list[Any]]) -> bool:
     """Whether all numbers are equal, bit for bit."""
     return len(some) == len(others) and all(
         np.array_equal(one, other)
@@ -85,7 +86,7 @@ def same(some: list[list], others: list[list]) -> bool:
     )
 
 
-def read_or_refused(kind: str, path: Path, content: bytes) -> list[list] | str:
+def read_or_refused(kind: str, path: Path, content: bytes) -> list[list[Any]] | str:
     """Return the frames, or the error's text after the name of the file: one line of it."""
     path.write_bytes(content)
     try:
@@ -111,6 +112,7 @@ def line_named(said: str) -> int:
     return int(found.group(1))
 
 
+@pytest.mark.slow
 def test_cut_off_anywhere(kind: str, tmp_path: Path) -> None:
     """After every single byte."""
     path, whole = tmp_path / "cut.dump", text_of(kind)

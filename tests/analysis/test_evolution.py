@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from lammps_inelastic.analysis import (
     InputError,
@@ -15,11 +18,12 @@ from lammps_inelastic.analysis import (
     plateau,
     plot_evolution,
 )
+from tests.analysis.written_dumps import Rows, Writer
 
 BOX = [[0, 1], [0, 1], [0, 1]]
 
 
-def rows_at(height, speed, contacts):
+def rows_at(height: float, speed: float, contacts: int) -> Rows:
     """Two spheres, the second twice as large and so eight times as heavy, and outside the box."""
     return [
         [1, 0.5, height, 0.5, speed, 0, 0, 0.1, contacts],
@@ -30,14 +34,14 @@ def rows_at(height, speed, contacts):
 COLUMNS = "id x y z vx vy vz radius contacts"
 
 
-def seen(positions, radii, box):
+def seen(positions: ArrayLike, radii: ArrayLike, box: ArrayLike) -> float:
     """Return a packing fraction that says what it was given."""
     assert np.shape(positions) == (2, 3)
     assert np.shape(radii) == (2,)
     return float(np.asarray(box)[0, 1])
 
 
-def test_each_frame(write_particles):
+def test_each_frame(write_particles: Writer) -> None:
     dump = ParticleDump(
         write_particles({0: rows_at(0.9, 4.0, 0), 50: rows_at(0.45, 0.0, 6)}, COLUMNS)
     )
@@ -51,7 +55,7 @@ def test_each_frame(write_particles):
     assert found.kinetic_energy == pytest.approx([8, 0], rel=1e-15)
 
 
-def test_what_is_not_known_is_nan(write_particles):
+def test_what_is_not_known_is_nan(write_particles: Writer) -> None:
     rows = [[1, 0.5, 0.5, 0.5, 0.1]]
     dump = ParticleDump(write_particles({0: rows}, "id x y z radius"))
     found = measure_evolution(dump, BOX, up=2)
@@ -62,12 +66,14 @@ def test_what_is_not_known_is_nan(write_particles):
     assert found.packing_fraction[0] == pytest.approx(4e-3 * np.pi / 3, abs=4 * 0.0002)
 
 
-def test_no_particle_in_the_box(write_particles):
+def test_no_particle_in_the_box(write_particles: Writer) -> None:
     dump = ParticleDump(write_particles({0: rows_at(3, 0, 6)}, COLUMNS))
     assert np.isnan(measure_evolution(dump, BOX, packing=seen).coordination).all()
 
 
-def test_contact_dump_comes_before_the_column(write_particles, write_contacts):
+def test_contact_dump_comes_before_the_column(
+    write_particles: Writer, write_contacts: Writer
+) -> None:
     dump = ParticleDump(
         write_particles({step: rows_at(0.5, 0, 6) for step in (0, 10, 20, 30)}, COLUMNS)
     )
@@ -78,7 +84,7 @@ def test_contact_dump_comes_before_the_column(write_particles, write_contacts):
     assert found.coordination.tolist() == [6, 1, 0, 6]
 
 
-def test_spheres_of_a_body_add_up(write_particles):
+def test_spheres_of_a_body_add_up(write_particles: Writer) -> None:
     rows = [
         [1, 7, 0.5, 0.4, 0.5, 0.1, 3],
         [2, 7, 0.5, 0.6, 0.5, 0.1, 5],
@@ -89,7 +95,7 @@ def test_spheres_of_a_body_add_up(write_particles):
     assert measure_evolution(dump, BOX, packing=monte_carlo(10)).coordination.tolist() == [4.5]
 
 
-def test_plateau_of_a_decay():
+def test_plateau_of_a_decay() -> None:
     steps = np.arange(0, 1000, 10)
     values = 0.64 * (1 - np.exp(-steps / 50))
     found = plateau(steps, values, band=0.001, last=0.25)
@@ -98,19 +104,19 @@ def test_plateau_of_a_decay():
     assert found.mean == pytest.approx(0.64, rel=1e-6)
 
 
-def test_plateau_that_is_left_again():
+def test_plateau_that_is_left_again() -> None:
     # Near the final mean of 1 from the second value on, but for the fourth.
     values = [0, 1, 1, 2, 1, 1, 1, 1]
     assert plateau(range(8), values, band=0.01).step == 4
     assert plateau(range(8), [1] * 8, band=0.01).step == 0
 
 
-def test_no_plateau():
+def test_no_plateau() -> None:
     found = plateau(range(4), [1, 2, 3, 5], band=0.01, last=0.5)
     assert (found.step, found.mean) == (None, 4)
 
 
-def test_nan_is_before_the_plateau():
+def test_nan_is_before_the_plateau() -> None:
     assert plateau(range(8), [np.nan, 1, np.nan, *[1] * 5], band=0.1).step == 3
 
 
@@ -124,19 +130,19 @@ def test_nan_is_before_the_plateau():
         ([1], [1], {"last": 0}, r"last in \(0, 1\]"),
     ],
 )
-def test_wrong_series(steps, values, options, message):
+def test_wrong_series(steps: Any, values: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         plateau(steps, values, **options)
 
 
-def test_wrong_input():
+def test_wrong_input() -> None:
     with pytest.raises(InputError, match="at least one particle frame"):
         measure_evolution([], BOX)
     with pytest.raises(InputError, match="up must be the axis 0, 1 or 2, not 3"):
         measure_evolution([], BOX, up=3)
 
 
-def test_plot():
+def test_plot() -> None:
     ax = Figure().add_subplot()
     steps, values = [0, 10, 20, 30], [0.0, np.nan, 0.6, 0.6]
     reached = plateau(steps, values)

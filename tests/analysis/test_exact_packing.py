@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from lammps_inelastic.analysis import (
     InputError,
+    PackingFraction,
+    Particles,
     exact_packing_fraction,
     group_spheres,
     packing_fraction,
 )
+from lammps_inelastic.analysis.geometry import FloatArray
 
 UNIT = [[0, 1]] * 3
 # Boxes for particles on a grid in the unit box: none is cut, and all cuts occur.
 BOXES = [UNIT, [[0.1, 0.9]] * 3, [[0.32, 0.35], [0, 1], [0.1, 0.6]], [[0.27, 0.52]] * 3]
 
 
-def dimers_on_grid(distance, radius, cells=6, seed=6):
+def dimers_on_grid(
+    distance: float, radius: float, cells: int = 6, seed: int = 6
+) -> tuple[FloatArray, FloatArray, Particles]:
     """Return dimers of random orientation on a grid, where no two of them overlap."""
     grid = (np.mgrid[:cells, :cells, :cells].reshape(3, -1).T + 0.5) / cells
     arms = np.random.default_rng(seed).normal(size=grid.shape)
@@ -27,14 +35,15 @@ def dimers_on_grid(distance, radius, cells=6, seed=6):
     return positions, np.full(len(positions), radius), group_spheres(np.r_[numbers, numbers])
 
 
-def assert_within_four_sigma(measured, exact):
+def assert_within_four_sigma(measured: PackingFraction, exact: float) -> None:
     # The seed is fixed, so this is not a lottery; four standard deviations are passed by chance
     # once in 16,000 seeds.
     assert abs(measured.value - exact) < 4 * measured.uncertainty
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("box", BOXES)
-def test_spheres_and_random_points(box):
+def test_spheres_and_random_points(box: ArrayLike) -> None:
     positions, radii, _ = dimers_on_grid(0, 0.08)
     exact = exact_packing_fraction(positions[:216], radii[:216], box)
     measured = packing_fraction(positions, radii, box, points=400_000)
@@ -42,9 +51,10 @@ def test_spheres_and_random_points(box):
     assert exact.overlap == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("box", BOXES)
 @pytest.mark.parametrize(("distance", "radius"), [(0.02, 0.07), (0.06, 0.05), (0.08, 0.04)])
-def test_dimers_and_random_points(distance, radius, box):
+def test_dimers_and_random_points(distance: float, radius: float, box: ArrayLike) -> None:
     positions, radii, dimers = dimers_on_grid(distance, radius)
     exact = exact_packing_fraction(positions, radii, box, dimers)
     assert_within_four_sigma(packing_fraction(positions, radii, box, points=400_000), exact.value)
@@ -52,7 +62,7 @@ def test_dimers_and_random_points(distance, radius, box):
 
 
 @pytest.mark.parametrize("distance", [0.02, 0.06, 0.1])
-def test_known_number_of_dimers_in_the_box(distance):
+def test_known_number_of_dimers_in_the_box(distance: float) -> None:
     # Remark 1.3 of the paper: particles of known volume, none of which the box cuts.
     radius = 0.05
     lens = np.pi / 12 * (4 * radius + distance) * max(2 * radius - distance, 0) ** 2
@@ -64,7 +74,7 @@ def test_known_number_of_dimers_in_the_box(distance):
     assert_within_four_sigma(measured, exact.value)
 
 
-def test_overlap_of_two_spheres():
+def test_overlap_of_two_spheres() -> None:
     radius, distance = 0.25, 0.3
     lens = np.pi / 12 * (4 * radius + distance) * (2 * radius - distance) ** 2
     for middle, share in ((0.5, 1), (0, 1 / 2)):
@@ -79,14 +89,14 @@ def test_overlap_of_two_spheres():
         assert as_dimer.overlap == 0
 
 
-def test_sphere_in_a_sphere():
+def test_sphere_in_a_sphere() -> None:
     found = exact_packing_fraction([[0.5, 0.5, 0.5], [0.55, 0.5, 0.5]], [0.4, 0.1], UNIT)
     # A few operations.
     assert found.overlap == pytest.approx(4 / 3 * np.pi * 0.1**3, rel=1e-13)
 
 
 @pytest.mark.parametrize("grouped", [False, True])
-def test_covered_share_lies_within_the_overlap(grouped):
+def test_covered_share_lies_within_the_overlap(grouped: Any) -> None:
     generator = np.random.default_rng(8)
     positions, radii = generator.uniform(-0.1, 1.1, (60, 3)), generator.uniform(0.05, 0.15, 60)
     bodies = np.r_[np.repeat(np.arange(1, 21), 2), np.zeros(20, int)]
@@ -101,11 +111,11 @@ def test_covered_share_lies_within_the_overlap(grouped):
     assert exact.value - exact.overlap - margin < measured.value < exact.value + margin
 
 
-def test_empty_box():
+def test_empty_box() -> None:
     found = exact_packing_fraction([[3, 3, 3]], [0.5], UNIT)
     assert (found.value, found.overlap) == (0, 0)
 
 
-def test_larger_bodies_are_refused():
+def test_larger_bodies_are_refused() -> None:
     with pytest.raises(InputError, match="in body 2 is 3; packing_fraction measures any body"):
         exact_packing_fraction(np.eye(4, 3), [1] * 4, UNIT, group_spheres([0, 2, 2, 2]))

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import MDAnalysis
 import meshio
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import ConvexHull
 
@@ -26,19 +30,22 @@ from lammps_inelastic.analysis import (
     write_vtk,
     write_xyz,
 )
+from lammps_inelastic.analysis.geometry import FloatArray
 
+# Positions and radii.
+Spheres = tuple[FloatArray, FloatArray]
 UNIT = [[0, 1]] * 3
 INTEGERS = {"ids": [3, 5, 2**40], "bodies": [7, 7, 0], "contacts": [1, 0, 12]}
 
 
 @pytest.fixture
-def spheres():
+def spheres() -> Spheres:
     """Return positions (60, 3) and radii (60,) of spheres that overlap and leave the unit cube."""
     generator = np.random.default_rng(3)
     return generator.uniform(-0.1, 1.1, (60, 3)), generator.uniform(0.02, 0.25, 60)
 
 
-def parsed_xyz(path):
+def parsed_xyz(path: Path) -> tuple[dict[str, str], dict[tuple[str, str], Any]]:
     """Return what is said of all spheres, and the columns by their names, all as text."""
     count, comment, *rows = path.read_text().splitlines()
     assert int(count) == len(rows)
@@ -52,7 +59,7 @@ def parsed_xyz(path):
     return said, columns
 
 
-def test_xyz_holds_all_digits(tmp_path, spheres):
+def test_xyz_holds_all_digits(tmp_path: Path, spheres: Spheres) -> None:
     positions, radii = spheres
     write_xyz(tmp_path / "packing.xyz", positions, radii)
     said, columns = parsed_xyz(tmp_path / "packing.xyz")
@@ -63,7 +70,7 @@ def test_xyz_holds_all_digits(tmp_path, spheres):
     assert list(columns) == [("species", "S"), ("pos", "R"), ("radius", "R")]
 
 
-def test_xyz_with_all_that_is_known(tmp_path, spheres):
+def test_xyz_with_all_that_is_known(tmp_path: Path, spheres: Spheres) -> None:
     positions, radii = (values[:3] for values in spheres)
     path = tmp_path / "packing.extxyz"
     box = [[-0.5, 1], [0, 5], [0.25, 1]]
@@ -78,7 +85,7 @@ def test_xyz_with_all_that_is_known(tmp_path, spheres):
     assert (said["pbc"], said["step"]) == ("T F T", "90")
 
 
-def test_xyz_is_read_by_mdanalysis(tmp_path, spheres):
+def test_xyz_is_read_by_mdanalysis(tmp_path: Path, spheres: Spheres) -> None:
     positions, radii = spheres
     path = tmp_path / "packing.xyz"
     write_xyz(path, positions, radii, contacts=np.arange(60), box=UNIT, step=1)
@@ -88,7 +95,7 @@ def test_xyz_is_read_by_mdanalysis(tmp_path, spheres):
     assert set(universe.atoms.names) == {"X"}
 
 
-def test_vtk(tmp_path, spheres):
+def test_vtk(tmp_path: Path, spheres: Spheres) -> None:
     positions, radii = (values[:3] for values in spheres)
     write_vtk(tmp_path / "packing.vtu", positions, radii, **INTEGERS)
     mesh = meshio.read(tmp_path / "packing.vtu")
@@ -105,12 +112,12 @@ def test_vtk(tmp_path, spheres):
     }
 
 
-def test_vtk_without_what_is_not_known(tmp_path, spheres):
+def test_vtk_without_what_is_not_known(tmp_path: Path, spheres: Spheres) -> None:
     write_vtk(tmp_path / "packing.vtu", *spheres)
     assert list(meshio.read(tmp_path / "packing.vtu").point_data) == ["radius", "diameter"]
 
 
-def stack(path):
+def stack(path: Path) -> NDArray[np.uint8]:
     """Return the images of a TIFF file as Pillow reads them, (slices, rows, columns)."""
     with Image.open(path) as image:
         pages = []
@@ -123,7 +130,9 @@ def stack(path):
 BOX = np.array([[0, 1], [0.1, 0.85], [-0.2, 0.4]])
 
 
-def by_looking_at_every_sphere(positions, radii, voxel, shape):
+def by_looking_at_every_sphere(
+    positions: FloatArray, radii: FloatArray, voxel: float, shape: tuple[int, ...]
+) -> NDArray[np.int64]:
     """Return the voxel image of BOX from its definition."""
     z, y, x = (
         lower + (np.arange(count) + 0.5) * voxel
@@ -134,7 +143,7 @@ def by_looking_at_every_sphere(positions, radii, voxel, shape):
     return np.where((squared < radii**2).any(axis=-1), 255, 0)
 
 
-def test_voxels_by_looking_at_every_sphere(spheres):
+def test_voxels_by_looking_at_every_sphere(spheres: Spheres) -> None:
     # No centre of a voxel is so close to one of these surfaces that round-off could decide.
     found = np.array(list(voxel_slices(*spheres, BOX, 0.025)))
     assert found.dtype == np.uint8
@@ -143,18 +152,18 @@ def test_voxels_by_looking_at_every_sphere(spheres):
     assert 0.2 < found.mean() / 255 < 0.8
 
 
-def test_what_is_on_the_surface_is_pore():
+def test_what_is_on_the_surface_is_pore() -> None:
     # The sphere ends at the centres of its neighbours: exact in binary.
     found = np.array(list(voxel_slices([[0.625] * 3], [0.25], UNIT, 0.25)))
     assert np.argwhere(found).tolist() == [[2, 2, 2]]
 
 
-def test_spheres_smaller_than_a_voxel_may_be_missed():
+def test_spheres_smaller_than_a_voxel_may_be_missed() -> None:
     corner_of_eight = np.array(list(voxel_slices([[0.5] * 3], [0.1], UNIT, 0.25)))
     assert not corner_of_eight.any()
 
 
-def test_solid_share_is_the_packing_fraction(tmp_path, spheres):
+def test_solid_share_is_the_packing_fraction(tmp_path: Path, spheres: Spheres) -> None:
     cells = 120
     image = write_tiff(tmp_path / "packing.tif", *spheres, UNIT, 1 / cells)
     measured = packing_fraction(*spheres, UNIT)
@@ -170,7 +179,7 @@ def test_solid_share_is_the_packing_fraction(tmp_path, spheres):
     assert error < 1e-3
 
 
-def test_tiff_holds_the_scale_and_the_place(tmp_path, spheres):
+def test_tiff_holds_the_scale_and_the_place(tmp_path: Path, spheres: Spheres) -> None:
     path = tmp_path / "packing.tiff"
     assert write_tiff(path, *spheres, BOX, 0.025).shape == (24, 30, 40)
     assert (stack(path) == np.array(list(voxel_slices(*spheres, BOX, 0.025)))).all()
@@ -185,7 +194,7 @@ def test_tiff_holds_the_scale_and_the_place(tmp_path, spheres):
     assert origin == pytest.approx([0, -4, 8], abs=1e-14)
 
 
-def test_raw_and_its_header(tmp_path, spheres):
+def test_raw_and_its_header(tmp_path: Path, spheres: Spheres) -> None:
     image = write_raw(tmp_path / "packing.raw", *spheres, BOX, 0.025)
     lines = (tmp_path / "packing.mhd").read_text().splitlines()
     header = dict(line.split(" = ") for line in lines)
@@ -204,7 +213,7 @@ def test_raw_and_its_header(tmp_path, spheres):
 
 
 @pytest.mark.parametrize("write", [write_tiff, write_raw])
-def test_progress(tmp_path, spheres, write):
+def test_progress(tmp_path: Path, spheres: Spheres, write: Callable[..., Any]) -> None:
     seen = []
     name = {write_tiff: "packing.tif", write_raw: "packing.raw"}[write]
     write(tmp_path / name, *spheres, UNIT, 0.25, progress=lambda *done: seen.append(done))
@@ -221,7 +230,9 @@ def test_progress(tmp_path, spheres, write):
         (UNIT, 1 / 10.6, (11, 11, 11)),
     ],
 )
-def test_as_many_voxels_as_have_their_centres_in_the_box(box, voxel, shape):
+def test_as_many_voxels_as_have_their_centres_in_the_box(
+    box: Any, voxel: float, shape: tuple[int, ...]
+) -> None:
     assert voxel_shape(box, voxel) == shape
 
 
@@ -237,7 +248,7 @@ def test_as_many_voxels_as_have_their_centres_in_the_box(box, voxel, shape):
         ([[0, 1], [0, 0], [0, 1]], 0.1, "ylo = 0 must be less than yhi = 0"),
     ],
 )
-def test_wrong_voxels(box, voxel, message):
+def test_wrong_voxels(box: Any, voxel: float, message: str) -> None:
     with pytest.raises(InputError, match=message):
         voxel_slices([[0.5] * 3], [0.5], box, voxel)
 
@@ -250,7 +261,7 @@ ICOSAHEDRON = 5 / 12 * (3 + np.sqrt(5)) * EDGE**3 / (4 / 3 * np.pi)
 @pytest.mark.parametrize(
     ("subdivisions", "share"), [(0, ICOSAHEDRON), (1, None), (2, 0.966), (3, 0.991)]
 )
-def test_stl(tmp_path, subdivisions, share):
+def test_stl(tmp_path: Path, subdivisions: int, share: float) -> None:
     positions, radii = [[0.5, 0.25, 3], [0.6, 0.25, 3], [-1, 0, 0]], [0.1, 0.3, 0.2]
     path = tmp_path / "packing.stl"
     faces = write_stl(path, positions, radii, subdivisions=subdivisions)
@@ -284,7 +295,8 @@ def test_stl(tmp_path, subdivisions, share):
     assert written == pytest.approx(outwards, abs=1e-4)
 
 
-def test_stl_of_many_spheres_is_written_in_parts(tmp_path):
+@pytest.mark.slow
+def test_stl_of_many_spheres_is_written_in_parts(tmp_path: Path) -> None:
     # 20 faces each: 10,000 spheres are written at once.
     centres = np.random.default_rng(6).uniform(0, 1, (20_001, 3))
     faces = write_stl(tmp_path / "packing.stl", centres, np.full(20_001, 0.01), subdivisions=0)
@@ -299,7 +311,7 @@ def test_stl_of_many_spheres_is_written_in_parts(tmp_path):
     ("subdivisions", "message"),
     [(-1, "must not be negative, not -1"), (12, r"1 spheres of 20 x 4\^12 .* more than 1e\+08")],
 )
-def test_wrong_subdivisions(tmp_path, subdivisions, message):
+def test_wrong_subdivisions(tmp_path: Path, subdivisions: int, message: str) -> None:
     with pytest.raises(InputError, match=message):
         write_stl(tmp_path / "packing.stl", [[0, 0, 0]], [1], subdivisions=subdivisions)
 
@@ -314,7 +326,7 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_a_file_is_replaced_and_nothing_is_left(tmp_path, name):
+def test_a_file_is_replaced_and_nothing_is_left(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("old")
     WRITERS[name](tmp_path / name)
     assert (tmp_path / name).read_bytes() != b"old"
@@ -323,20 +335,20 @@ def test_a_file_is_replaced_and_nothing_is_left(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_no_such_folder(tmp_path, name):
+def test_no_such_folder(tmp_path: Path, name: str) -> None:
     with pytest.raises(ExportError, match="cannot be written: No such file or directory"):
         WRITERS[name](tmp_path / "no" / name)
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_name_of_another_format(tmp_path, name):
+def test_name_of_another_format(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match=r"packing\.dat: the name must end in \."):
         WRITERS[name](tmp_path / "packing.dat")
 
 
 @pytest.mark.parametrize("name", ["packing.tif", "packing.raw"])
-def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path, name):
-    def stop(done, total):
+def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path: Path, name: str) -> None:
+    def stop(done: int, total: int) -> None:
         raise KeyboardInterrupt
 
     (tmp_path / name).write_text("old")
@@ -347,7 +359,7 @@ def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path, name):
     assert [file.name for file in tmp_path.iterdir()] == [name]
 
 
-def test_a_column_of_another_length(tmp_path):
+def test_a_column_of_another_length(tmp_path: Path) -> None:
     message = r"body must have shape \(1,\), not \(2,\)"
     with pytest.raises(InputError, match=message):
         write_xyz(tmp_path / "packing.xyz", [[0, 0, 0]], [1], bodies=[1, 2])

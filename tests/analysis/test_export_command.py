@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -11,6 +13,7 @@ import trimesh
 from PIL import Image
 
 from lammps_inelastic.workflow.main import main
+from tests.analysis.written_dumps import Rows, Writer
 
 CENTRES = np.array([(0.3, 1, 0.5), (0.4, 1, 0.5), (0.6, 1.5, 0.5)])
 RADIUS = 0.125
@@ -20,13 +23,13 @@ BOX = ["--box", "0.2", "0.5", "0.8", "1.2", "0.25", "0.75"]
 
 
 @pytest.fixture
-def run(tmp_path, write_particles, write_contacts):
+def run(tmp_path: Path, write_particles: Writer, write_contacts: Writer) -> Path:
     """Return a folder whose spheres 1 and 2 are a body; sphere 2 touches 3 at step 90 only.
 
     At step 0 all centres are 0.25 lower; nothing is known of the contacts there.
     """
 
-    def rows(fall):
+    def rows(fall: float) -> Rows:
         mol = (1, 1, 2)
         return [
             [i + 1, mol[i], 1, x, y - fall, z, 0, 0, 0, RADIUS]
@@ -40,14 +43,16 @@ def run(tmp_path, write_particles, write_contacts):
     return tmp_path
 
 
-def xyz_rows(path):
+def xyz_rows(path: Path) -> list[list[float]]:
     return [
         [float(word) for word in line.split()[1:]] for line in path.read_text().split("\n")[2:-1]
     ]
 
 
 @pytest.mark.parametrize("name", ENDINGS)
-def test_the_last_frame_into_the_folder_of_the_run(run, name, capsys):
+def test_the_last_frame_into_the_folder_of_the_run(
+    run: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["export", str(run), "--format", name]) == 0
     path = run / f"packing{ENDINGS[name]}"
     assert path.exists()
@@ -56,7 +61,7 @@ def test_the_last_frame_into_the_folder_of_the_run(run, name, capsys):
     assert "step 90" in output
 
 
-def test_columns_of_points(run, capsys):
+def test_columns_of_points(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(run), "--format", "xyz"]) == 0
     assert "columns  radius, id, body, contacts\n" in capsys.readouterr().out
     assert xyz_rows(run / "packing.xyz") == [
@@ -87,7 +92,9 @@ def test_columns_of_points(run, capsys):
         (["--step", "50"], 1, [0, 0, 0]),
     ],
 )
-def test_frames(run, choice, height, contacts, capsys):
+def test_frames(
+    run: Path, choice: list[str], height: float, contacts: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["export", str(run), "--format", "vtk", *choice]) == 0
     mesh = meshio.read(run / "packing.vtu")
     assert mesh.points[0, 1] == height
@@ -96,21 +103,21 @@ def test_frames(run, choice, height, contacts, capsys):
     assert mesh.point_data.get("contacts", np.array(None)).tolist() == contacts
 
 
-def test_a_dump_alone_has_no_contacts(run):
+def test_a_dump_alone_has_no_contacts(run: Path) -> None:
     # The contacts beside it may be those of another dump.
     path = run / "particles.lammpsdump"
     assert main(["export", str(path), "--format", "xyz", "--out", str(run / "some.xyz")]) == 0
     assert xyz_rows(run / "some.xyz")[2] == [*CENTRES[2], RADIUS, 3, 2]
 
 
-def test_periodic_axes_are_said(run):
+def test_periodic_axes_are_said(run: Path) -> None:
     path = run / "particles.lammpsdump"
     path.write_text(path.read_text().replace("ff ff ff", "pp ff ff"))
     assert main(["export", str(run), "--format", "xyz"]) == 0
     assert 'pbc="T F F"' in (run / "packing.xyz").read_text()
 
 
-def test_whole_spheres_by_their_centres(run, capsys):
+def test_whole_spheres_by_their_centres(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["export", str(run), *BOX]
     assert main([*command, "--format", "xyz"]) == 0
     # The contact of sphere 2 with sphere 3 still counts.
@@ -126,7 +133,7 @@ def test_whole_spheres_by_their_centres(run, capsys):
 
 
 @pytest.mark.parametrize("name", ["tiff", "raw"])
-def test_image_of_a_box(run, name, capsys):
+def test_image_of_a_box(run: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(run), *BOX, "--format", name, "--voxel", "0.02"]) == 0
     captured = capsys.readouterr()
     assert "voxels       15 x 20 x 25 of 0.02\n" in captured.out
@@ -143,14 +150,16 @@ def test_image_of_a_box(run, name, capsys):
     assert share * 0.3 * 0.4 * 0.5 == pytest.approx(exact, abs=4 * 0.5 * np.sqrt(850) * 0.02**3)
 
 
-def test_voxels_follow_the_smallest_radius(run, capsys):
+def test_voxels_follow_the_smallest_radius(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(run), *BOX, "--format", "tiff"]) == 0
     assert "voxels       24 x 32 x 40 of 0.0125\n" in capsys.readouterr().out
     with Image.open(run / "packing.tif") as image:
         assert (image.size, image.n_frames) == ((24, 32), 40)
 
 
-def test_bar_on_a_terminal(run, capsys, monkeypatch):
+def test_bar_on_a_terminal(
+    run: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
     assert main(["export", str(run), *BOX, "--format", "tiff"]) == 0
     captured = capsys.readouterr()
@@ -159,7 +168,7 @@ def test_bar_on_a_terminal(run, capsys, monkeypatch):
     assert "solid share" in captured.out
 
 
-def failure_of(arguments, capsys):
+def failure_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """Run the command line; return what it says, after seeing that it is one line and no more."""
     assert main(["export", *arguments]) == 2
     captured = capsys.readouterr()
@@ -187,24 +196,28 @@ def failure_of(arguments, capsys):
         (["tiff", "--out", "/no/such/folder/a.tif"], "cannot be written: No such file"),
     ],
 )
-def test_wrong_values(run, arguments, message, capsys):
+def test_wrong_values(
+    run: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert message in failure_of([str(run), "--format", *arguments], capsys)
     assert len(list(run.iterdir())) == 2
 
 
-def test_of_many_steps_some_are_named(run, write_particles, capsys):
+def test_of_many_steps_some_are_named(
+    run: Path, write_particles: Writer, capsys: pytest.CaptureFixture[str]
+) -> None:
     write_particles({step: [[1, 1, 0, 0, 0, 0, 0, 0, 1]] for step in range(0, 1000, 10)})
     message = failure_of([str(run), "--format", "xyz", "--step", "7"], capsys)
     assert "no step 7; the 100 steps are 0, 10, 20, 30, 40, ..., 990\n" in message
 
 
-def test_no_dump(tmp_path, capsys):
+def test_no_dump(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     message = failure_of([str(tmp_path), "--format", "xyz"], capsys)
     assert "particles.lammpsdump: no such file" in message
     assert "nowhere: no such file" in failure_of(["nowhere", "--format", "xyz"], capsys)
 
 
-def test_image_of_a_periodic_box(run, capsys):
+def test_image_of_a_periodic_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = run / "particles.lammpsdump"
     path.write_text(path.read_text().replace("ff ff ff", "pp ff ff"))
     message = failure_of([str(run), "--format", "raw"], capsys)
@@ -220,7 +233,7 @@ def test_image_of_a_periodic_box(run, capsys):
         ["x", "--format", "tiff", "--box", "1"],
     ],
 )
-def test_wrong_arguments(arguments, capsys):
+def test_wrong_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(["export", *arguments])
     error = capsys.readouterr().err

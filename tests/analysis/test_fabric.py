@@ -44,4 +44,4 @@ def test_it_turns_with_the_packing() -> None:
 )
 def test_wrong_input(normals: object, weights: object, named: str) -> None:
     with pytest.raises(InputError, match=named):
-        fabric_tensor(normals, weights)  # type: ignore[arg-type]
+        fabric_tensor(normals, weights)

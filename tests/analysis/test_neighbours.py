@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from lammps_inelastic.analysis import (
 ROUNDING = 1e-15
 
 
-def test_two_spheres_of_different_size():
+def test_two_spheres_of_different_size() -> None:
     found = contacts_by_distance([[0, 0, 0], [0, 1.6, 0], [9, 9, 9]], [1, 0.5, 1], 0.2)
     assert found.sides.tolist() == [[0, 1]]
     assert found.gaps == pytest.approx([0.1], abs=ROUNDING)
@@ -28,7 +29,7 @@ def test_two_spheres_of_different_size():
     assert found.criterion == 0.2
 
 
-def test_the_gap_must_be_below_the_criterion():
+def test_the_gap_must_be_below_the_criterion() -> None:
     # Numbers that float64 holds exactly: gaps of 0 and of 0.125.
     centres, radii = [[0, 0, 0], [1, 0, 0], [2.125, 0, 0]], [0.5] * 3
     assert contacts_by_distance(centres, radii, 0).sides.tolist() == []
@@ -36,7 +37,7 @@ def test_the_gap_must_be_below_the_criterion():
     assert contacts_by_distance(centres, radii, 0.126).sides.tolist() == [[0, 1], [1, 2]]
 
 
-def test_walls_have_the_numbers_of_a_block():
+def test_walls_have_the_numbers_of_a_block() -> None:
     # A sphere in each of two opposite corners; the first overlaps its walls by 0.01.
     centres = [[0.09, 0.09, 0.09], [0.9, 4.9, 0.9]]
     found = contacts_by_distance(centres, [0.1, 0.1], 1e-9, walls=[[0, 1], [0, 5], [0, 1]])
@@ -46,7 +47,7 @@ def test_walls_have_the_numbers_of_a_block():
     assert found.normals[:3].tolist() == [[1, 0, 0], [-1, 0, 0], [0, 1, 0]]
 
 
-def test_spheres_of_a_body_do_not_touch():
+def test_spheres_of_a_body_do_not_touch() -> None:
     centres = [[0, 0, 0], [0.5, 0, 0], [1.4, 0, 0], [1.9, 0, 0], [2.8, 0, 0], [3.3, 0, 0]]
     particles = group_spheres([7, 7, 8, 8, 0, 0])
     found = contacts_by_distance(centres, [0.5] * 6, 0.01, particles)
@@ -56,13 +57,13 @@ def test_spheres_of_a_body_do_not_touch():
     assert counts.particles.tolist() == [1, 2, 2, 1]
 
 
-def test_ids_of_the_sides():
+def test_ids_of_the_sides() -> None:
     found = contacts_by_distance([[0.5, 0, 0], [1.5, 0, 0]], [0.5, 0.5], 0.1, walls=[[0, 9]] * 3)
     assert found.ids([30, 20])[:2].tolist() == [[30, 20], [30, -1]]
 
 
 @pytest.mark.parametrize("spread", [0.05, 1.0], ids=["similar radii", "very different radii"])
-def test_same_contacts_as_by_looking_at_all(spread):
+def test_same_contacts_as_by_looking_at_all(spread: float) -> None:
     generator = np.random.default_rng(3)
     centres = generator.uniform(0, 1, (500, 3))
     radii = 0.05 * 10 ** generator.uniform(-spread, 0, 500)
@@ -80,7 +81,7 @@ def test_same_contacts_as_by_looking_at_all(spread):
         assert found.points == pytest.approx(middle, abs=ROUNDING)
 
 
-def test_a_hundred_thousand_spheres_take_about_a_second():
+def test_a_hundred_thousand_spheres_take_about_a_second() -> None:
     places = np.indices((47, 47, 47)).reshape(3, -1).T[:100_000]
     start = time.perf_counter()
     found = contacts_by_distance(places, np.full(100_000, 0.5), 0.01)
@@ -102,6 +103,6 @@ def test_a_hundred_thousand_spheres_take_about_a_second():
         (([[0, 0, 0]], [1], 0, None, [[1, 0]] * 3), "xlo = 1 must be less than xhi = 0"),
     ],
 )
-def test_wrong_input(arguments, message):
+def test_wrong_input(arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(InputError, match=message):
         contacts_by_distance(*arguments)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
+from typing import Any
 
 import networkx
 import numpy as np
@@ -24,7 +26,7 @@ CONTACTS = [[10, -3], [20, 10], [20, 30]]
 FORCES = [3.0, 2.0, 1.0]
 
 
-def test_nodes_and_edges():
+def test_nodes_and_edges() -> None:
     graph = contact_graph(CONTACTS, IDS, PLACES, FORCES)
     assert sorted(graph) == [0, 1, 2, 3]
     assert graph.nodes[2]["position"] == (0.5, 3, 0.5)
@@ -35,7 +37,7 @@ def test_nodes_and_edges():
     assert sorted(map(len, networkx.connected_components(graph))) == [1, 3]
 
 
-def test_walls_are_nodes_if_wanted():
+def test_walls_are_nodes_if_wanted() -> None:
     graph = contact_graph(CONTACTS, IDS, PLACES, walls=True)
     assert sorted(graph) == [-3, 0, 1, 2, 3]
     assert graph.edges[0, -3] == {"contacts": 1}
@@ -44,7 +46,7 @@ def test_walls_are_nodes_if_wanted():
     assert not networkx.has_path(graph, -3, 3)
 
 
-def test_contacts_of_the_same_two_bodies_are_one_edge():
+def test_contacts_of_the_same_two_bodies_are_one_edge() -> None:
     particles = group_spheres([1, 1, 2, 2])
     contacts = [[10, 30], [40, 20], [10, 40], [20, -1]]
     graph = contact_graph(contacts, IDS, PLACES, [1, 2, 4, 8], particles)
@@ -52,20 +54,20 @@ def test_contacts_of_the_same_two_bodies_are_one_edge():
     assert graph.nodes[0]["position"] == (0.5, 1.5, 0.5)
 
 
-def test_no_contacts():
+def test_no_contacts() -> None:
     graph = contact_graph(np.empty((0, 2)), IDS, PLACES, [])
     assert (graph.number_of_nodes(), graph.number_of_edges()) == (4, 0)
     ax = Figure().add_subplot()
     assert draw_network(ax, graph) is ax
 
 
-def lines_of(ax):
+def lines_of(ax: Any) -> set[tuple[tuple[float, ...], ...]]:
     return {
         tuple(map(tuple, np.round(path.vertices, 12))) for path in ax.collections[0].get_paths()
     }
 
 
-def test_flat_drawing():
+def test_flat_drawing() -> None:
     ax = Figure().add_subplot()
     graph = contact_graph(CONTACTS, IDS, PLACES, FORCES, walls=True)
     assert draw_network(ax, graph) is ax
@@ -76,14 +78,14 @@ def test_flat_drawing():
     assert thick == pytest.approx(2 * thin, rel=1e-15)
 
 
-def test_lower_half_only():
+def test_lower_half_only() -> None:
     # Heights 1 to 3: the upper contact reaches above 2.
     ax = Figure().add_subplot()
     draw_network(ax, contact_graph(CONTACTS, IDS, PLACES), lower_half=True)
     assert lines_of(ax) == {((0.5, 1), (0.5, 2))}
 
 
-def test_drawing_in_space_is_no_mirror_image():
+def test_drawing_in_space_is_no_mirror_image() -> None:
     figure = Figure()
     ax = figure.add_subplot(projection="3d")
     draw_network(ax, contact_graph(CONTACTS, IDS, PLACES, FORCES))
@@ -95,7 +97,8 @@ def test_drawing_in_space_is_no_mirror_image():
     assert not ax.zaxis_inverted()
 
 
-def test_ten_thousand_spheres_are_drawn_in_seconds(tmp_path):
+@pytest.mark.slow
+def test_ten_thousand_spheres_are_drawn_in_seconds(tmp_path: Path) -> None:
     places = np.indices((22, 22, 22)).reshape(3, -1).T[:10_000]
     contacts = contacts_by_distance(places, np.full(10_000, 0.5), 0.1)
     forces = np.random.default_rng(0).exponential(1, len(contacts.sides))
@@ -110,7 +113,7 @@ def test_ten_thousand_spheres_are_drawn_in_seconds(tmp_path):
     assert time.perf_counter() - start < 20
 
 
-def test_wrong_input():
+def test_wrong_input() -> None:
     with pytest.raises(InputError, match=r"forces must have shape \(3,\), not \(2,\)"):
         contact_graph(CONTACTS, IDS, PLACES, [1, 2])
     with pytest.raises(InputError, match="two of the axes 0, 1, 2, not 1 and 1"):

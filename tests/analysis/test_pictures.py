@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +17,11 @@ CONTAINER = [[0, 1], [0, 5], [0, 1]]
 CENTRES, RADII = [[0.5, 0.9, 0.5], [0.5, 0.2, 0.5]], [0.2, 0.2]
 
 
-def pixels_of(path):
+def pixels_of(path: Path) -> Any:
     return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
 
-def test_colours_and_gravity(tmp_path):
+def test_colours_and_gravity(tmp_path: Path) -> None:
     path = tmp_path / "packing.png"
     draw_packing(path, CENTRES, RADII, CONTAINER, [0, 12], pixels=300)
     red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
@@ -31,7 +33,7 @@ def test_colours_and_gravity(tmp_path):
     assert np.median(violet[:, 0]) < np.median(yellow[:, 0])
 
 
-def test_colours_of_bodies(tmp_path):
+def test_colours_of_bodies(tmp_path: Path) -> None:
     # Thirteen contacts are yellow; where each colour stands for two numbers they are green.
     green_pixels = []
     path = tmp_path / "packing.png"
@@ -46,7 +48,7 @@ def test_colours_of_bodies(tmp_path):
     assert green_pixels[1] > 1000
 
 
-def test_overlapping_spheres_meet_in_a_plane(tmp_path):
+def test_overlapping_spheres_meet_in_a_plane(tmp_path: Path) -> None:
     # Side by side, at right angles to the view: each is seen up to the plane between them.
     path = tmp_path / "packing.png"
     across = 0.1 * np.array([-0.3725, 0, 0.928])
@@ -59,7 +61,7 @@ def test_overlapping_spheres_meet_in_a_plane(tmp_path):
 
 
 @pytest.mark.parametrize("size", [(1, 1, 1), (1, 5, 1), (5, 1, 1), (1, 1, 5)])
-def test_nothing_is_cut_off(tmp_path, size):
+def test_nothing_is_cut_off(tmp_path: Path, size: tuple[int, int]) -> None:
     path = tmp_path / "packing.png"
     corners = [np.full(3, 0.5), np.array(size) - 0.5]
     draw_packing(path, corners, [0.5, 0.5], [[0, length] for length in size], pixels=300)
@@ -73,30 +75,30 @@ def test_nothing_is_cut_off(tmp_path, size):
     assert [file.name for file in tmp_path.iterdir()] == ["packing.png"]
 
 
-def test_colours_by_radius(tmp_path):
+def test_colours_by_radius(tmp_path: Path) -> None:
     path = tmp_path / "packing.png"
     draw_packing(path, CENTRES, [0.1, 0.2], CONTAINER, pixels=300)
     red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
     assert np.count_nonzero((red > 150) & (green > 150) & (blue < 100)) > 1000
 
 
-def test_picture_without_lammps(tmp_path, monkeypatch):
+def test_picture_without_lammps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "lammps", None)
     with pytest.raises(PictureError, match="no picture: LAMMPS cannot be imported"):
         draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER)
 
 
-def test_picture_into_no_folder(tmp_path):
+def test_picture_into_no_folder(tmp_path: Path) -> None:
     with pytest.raises(PictureError, match="cannot be written"):
         draw_packing(tmp_path / "no" / "packing.png", CENTRES, RADII, CONTAINER, pixels=100)
 
 
-def test_wrong_number_of_contacts(tmp_path):
+def test_wrong_number_of_contacts(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"contacts must have shape \(2,\), not \(3,\)"):
         draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2, 3])
 
 
-def test_a_colour_for_no_contacts_at_all(tmp_path):
+def test_a_colour_for_no_contacts_at_all(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="at least one number of contacts, not 0"):
         draw_packing(
             tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2], contacts_per_colour=0

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import (
     InputError,
+    Particles,
     exact_packing_fraction,
     group_spheres,
     mueller_packing_fraction,
     wall_profile,
     wall_profile_monte_carlo,
 )
+from lammps_inelastic.analysis.geometry import FloatArray
 
 WALLS = ["xlo", "xhi", "ylo", "yhi", "zlo", "zhi"]
 
 
-def random_dimers(count, radius, distance, seed):
+def random_dimers(
+    count: int, radius: float, distance: float, seed: int
+) -> tuple[FloatArray, FloatArray, Particles]:
     generator = np.random.default_rng(seed)
     centres = generator.uniform(0, 1, (count, 3))
     arms = generator.normal(size=(count, 3))
@@ -29,7 +34,7 @@ def random_dimers(count, radius, distance, seed):
     return positions, np.full(2 * count, radius), group_spheres(np.r_[numbers, numbers])
 
 
-def test_one_sphere_at_the_wall():
+def test_one_sphere_at_the_wall() -> None:
     radius = 0.1
     found = wall_profile(
         [[0.1, 0.5, 0.5]], [radius], [[0, 0.25], [0, 1], [0, 1]], wall="xlo", thickness=0.01
@@ -47,7 +52,7 @@ def test_one_sphere_at_the_wall():
 
 
 @pytest.mark.parametrize("wall", WALLS)
-def test_slabs_are_boxes(wall):
+def test_slabs_are_boxes(wall: str) -> None:
     positions, radii, dimers = random_dimers(60, 0.15, 0.2, seed=1)
     box = np.array([[0.1, 0.5], [0.2, 0.9], [-0.1, 0.45]])
     found = wall_profile(
@@ -65,7 +70,7 @@ def test_slabs_are_boxes(wall):
         assert value == pytest.approx(expected, rel=1e-12)
 
 
-def test_slabs_add_up(monkeypatch):
+def test_slabs_add_up(monkeypatch: pytest.MonkeyPatch) -> None:
     positions, radii, dimers = random_dimers(200, 0.1, 0.15, seed=2)
     box = [[0, 0.5], [0.25, 0.75], [0.25, 0.75]]
     whole = exact_packing_fraction(positions, radii, box, dimers).value
@@ -80,7 +85,7 @@ def test_slabs_add_up(monkeypatch):
 
 
 @pytest.mark.parametrize("wall", ["xlo", "yhi"])
-def test_random_points(wall):
+def test_random_points(wall: str) -> None:
     # On a grid, so that no dimers overlap.
     grid = (np.mgrid[:5, :5, :5].reshape(3, -1).T + 0.5) / 5
     arms = np.random.default_rng(3).normal(size=grid.shape)
@@ -102,7 +107,7 @@ def test_random_points(wall):
     assert len(np.unique(deviations.round(6))) == len(deviations)
 
 
-def test_thickness_of_the_paper():
+def test_thickness_of_the_paper() -> None:
     # 0.25 / 0.005 and 0.3 / 0.1 are not whole numbers in floating point.
     one = [[0.1, 0.5, 0.5]]
     box = [[0, 0.25], [0.25, 0.75], [0.25, 0.75]]
@@ -113,7 +118,7 @@ def test_thickness_of_the_paper():
     assert len(wall_profile(one, [0.1], box, wall="xlo", thickness=0.1).values) == 3
 
 
-def test_many_dimers_are_fast():
+def test_many_dimers_are_fast() -> None:
     positions, radii, dimers = random_dimers(10_000, 0.026, 0.04, seed=4)
     box = [[0, 0.25], [0.25, 0.75], [0.25, 0.75]]
     begin = time.process_time()
@@ -133,7 +138,7 @@ def test_many_dimers_are_fast():
         ({"box": [[0, 1]]}, r"a box must have shape \(3, 2\)"),
     ],
 )
-def test_wrong_input(changes, message):
+def test_wrong_input(changes: dict[str, Any], message: str) -> None:
     usual = {"positions": np.eye(2, 3), "radii": [1, 1], "box": [[0, 1]] * 3}
     with pytest.raises(InputError, match=message):
         wall_profile(**(usual | {"wall": "ylo", "thickness": 0.1} | changes))
@@ -141,7 +146,7 @@ def test_wrong_input(changes, message):
         wall_profile_monte_carlo(**(usual | {"wall": "ylo", "thickness": 0.1} | changes))
 
 
-def test_mueller_wide():
+def test_mueller_wide() -> None:
     assert mueller_packing_fraction(0) == 0
     # exp(-0.315 s) is 2e-14 at s = 100.
     assert mueller_packing_fraction([100]) == pytest.approx([0.635], abs=1e-13)
@@ -153,7 +158,7 @@ def test_mueller_wide():
     assert values.max() == pytest.approx(0.853, abs=0.001)
 
 
-def test_mueller_narrow():
+def test_mueller_narrow() -> None:
     # By hand: D/d = 10, s = 1. a = 7.135, b = 0.2425, e_b = 0.387. J0(7.135) = 0.29799.
     expected = 1 - 0.387 - 0.613 * 0.29799 * np.exp(-0.2425)
     # J0 is given to five digits.
@@ -168,7 +173,7 @@ def test_mueller_narrow():
     )
 
 
-def test_mueller_wrong_input():
+def test_mueller_wrong_input() -> None:
     with pytest.raises(InputError, match=r"cylinders of D/d >= 2.02, not 2"):
         mueller_packing_fraction(1, 2)
     with pytest.raises(InputError, match="must not be negative or NaN"):

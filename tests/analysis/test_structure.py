@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from lammps_inelastic.analysis import (
     InputError,
@@ -12,12 +16,13 @@ from lammps_inelastic.analysis import (
     plot_radial_distribution,
     radial_distribution,
 )
+from lammps_inelastic.analysis.geometry import FloatArray
 
 # freud computes in float32: seven digits, of which sums of spherical harmonics lose two.
 SINGLE = 1e-4
 
 
-def lattice(cell, basis, repeats):
+def lattice(cell: float, basis: ArrayLike, repeats: Sequence[int]) -> FloatArray:
     cells = np.indices(repeats).reshape(3, -1).T
     return (cells[:, None] + np.asarray(basis)).reshape(-1, 3) * cell
 
@@ -47,7 +52,9 @@ INSIDE = np.array([[3, 7], [3, 7], [3, 7]])
     ],
     ids=["fcc", "hcp"],
 )
-def test_crystals(centres, box, name, q4, q6, w6):
+def test_crystals(
+    centres: FloatArray, box: Any, name: str, q4: float, q6: float, w6: float
+) -> None:
     found = bond_order(centres, box)
     # The values of Steinhardt, Nelson and Ronchetti (1983), to the digits given.
     assert found.q4 == pytest.approx(q4, abs=SINGLE)
@@ -60,12 +67,12 @@ def test_crystals(centres, box, name, q4, q6, w6):
     assert found.verdict().startswith("crystallised: 100.0% of ")
 
 
-def test_a_shaken_crystal_is_still_one():
+def test_a_shaken_crystal_is_still_one() -> None:
     shaken = FCC + np.random.default_rng(2).normal(0, 0.03, FCC.shape)
     assert bond_order(shaken, MIDDLE).crystallised
 
 
-def test_points_at_random_are_no_crystal():
+def test_points_at_random_are_no_crystal() -> None:
     points = np.random.default_rng(0).uniform(0, 1, (20_000, 3))
     found = bond_order(points, [[0.2, 0.8]] * 3)
     # Twelve independent directions: the mean of q6^2 is 1 / 12. 4,300 particles scatter by 0.2 each
@@ -77,7 +84,7 @@ def test_points_at_random_are_no_crystal():
     assert found.verdict().startswith("not crystallised: 0.0% of ")
 
 
-def test_radial_distribution_of_points_at_random_is_one():
+def test_radial_distribution_of_points_at_random_is_one() -> None:
     points = np.random.default_rng(5).uniform(0, [1, 5, 1], (50_000, 3))
     found = radial_distribution(points, [[0.3, 0.7], [1, 4], [0.3, 0.7]], largest=0.25, bins=10)
     # 4,800 particles in the box: the mean density is known to 1.4 %. The innermost shell has 1,600
@@ -88,7 +95,7 @@ def test_radial_distribution_of_points_at_random_is_one():
     assert found.middles[0] == pytest.approx(0.0125, rel=1e-14)
 
 
-def test_shells_of_a_crystal():
+def test_shells_of_a_crystal() -> None:
     found = radial_distribution(FCC, MIDDLE, largest=2.1, bins=210)
     assert found.particles == 256
     # Four spheres in a cube of width sqrt(2).
@@ -103,14 +110,14 @@ def test_shells_of_a_crystal():
     assert (neighbours == 0).all()
 
 
-def test_box_too_near_to_the_surface():
+def test_box_too_near_to_the_surface() -> None:
     with pytest.raises(
         InputError, match="along y the box must be 2 or more away from the outermost"
     ):
         radial_distribution(FCC, [[3, 7], [1.5, 7], [3, 7]], largest=2)
 
 
-def test_plot():
+def test_plot() -> None:
     ax = Figure().add_subplot()
     found = radial_distribution(FCC, MIDDLE, largest=2, bins=20)
     assert plot_radial_distribution(ax, found, diameter=2.0) is ax
@@ -126,6 +133,6 @@ def test_plot():
         (lambda: radial_distribution(FCC, MIDDLE, largest=1, bins=0), "at least one shell"),
     ],
 )
-def test_wrong_input(call, message):
+def test_wrong_input(call: Callable[[], object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         call()

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from itertools import pairwise, permutations, product
+from typing import Any
 
 import numpy as np
 import overlap
 import pytest
+from numpy.typing import ArrayLike
 
-from integration import ball_in_box, dimer_in_box, integrate
 from lammps_inelastic.analysis import (
     InputError,
+    Particles,
     group_spheres,
     particle_volumes_in_box,
     sphere_volumes_in_box,
 )
+from lammps_inelastic.analysis.geometry import FloatArray
+from tests.analysis.integration import ball_in_box, dimer_in_box, integrate
 
 UNIT = [[0, 1]] * 3
 BALL = 4 / 3 * np.pi
@@ -61,33 +66,33 @@ BOXES = {
 }
 
 
-def in_box(centre, radius, box):
+def in_box(centre: ArrayLike, radius: float, box: ArrayLike) -> float:
     with np.errstate(all="raise"):
         return sphere_volumes_in_box([centre], [radius], box)[0]
 
 
 @pytest.mark.parametrize("name", CUTS)
-def test_ball_in_unit_box(name):
+def test_ball_in_unit_box(name: str) -> None:
     centre = CUTS[name]
     # Both sides round at 1e-16 of terms of the size of the ball, 0.07.
     assert in_box(centre, 0.25, UNIT) == pytest.approx(ball_in_box(centre, 0.25, UNIT), abs=1e-12)
 
 
 @pytest.mark.parametrize("name", BOXES)
-def test_unit_ball_in_boxes(name):
+def test_unit_ball_in_boxes(name: str) -> None:
     # As above, for a ball of 4.
     expected = ball_in_box([0, 0, 0], 1, BOXES[name])
     assert in_box([0, 0, 0], 1, BOXES[name]) == pytest.approx(expected, abs=1e-11)
 
 
-def hexahedron(box):
+def hexahedron(box: Any) -> overlap.Hexahedron:
     (x0, x1), (y0, y1), (z0, z1) = box
     base = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
     return overlap.Hexahedron([[x, y, z] for z in (z0, z1) for x, y in base])
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_other_library(seed):
+def test_other_library(seed: int) -> None:
     # S. Strobl, A. Formella, T. Poeschel, J. Comput. Phys. 311 (2016) 158.
     generator = np.random.default_rng(seed)
     for _ in range(200):
@@ -98,7 +103,7 @@ def test_other_library(seed):
         assert in_box(centre, radius, box) == pytest.approx(expected, abs=1e-13)
 
 
-def test_nothing_and_everything_are_exact():
+def test_nothing_and_everything_are_exact() -> None:
     assert in_box([0.5, 0.5, 0.5], 0.5, UNIT) == 4 / 3 * np.pi * 0.5**3
     assert in_box([0.5, 0.5, 0.5], 0.9, UNIT) == 1
     assert in_box([1.2, 1.2, 0.5], 0.25, UNIT) == 0
@@ -112,24 +117,24 @@ def test_nothing_and_everything_are_exact():
 # lies on the inner side of two others: {x > a, y < b} and {x > a, y < b, z < c} in the ball.
 
 
-def disc_integral(r, radius):
+def disc_integral(r: Any, radius: float) -> Any:
     return -((radius**2 - r**2) ** 1.5) / 3
 
 
-def over_angles(function, lower, upper):
+def over_angles(function: Callable[[FloatArray], ArrayLike], lower: float, upper: float) -> float:
     # Near the ends the integrand bends as sharply as a is small: short pieces.
     return integrate(function, lower, upper, np.linspace(lower, upper, 12))
 
 
-def cap(a, radius):
+def cap(a: float, radius: float) -> float:
     return np.pi * (2 / 3 * radius**3 - a * radius**2 + a**3 / 3)
 
 
-def edge(a, b, radius):
+def edge(a: float, b: float, radius: float) -> float:
     rm = np.sqrt(radius**2 - a**2)
     theta = np.arcsin(b / rm)
 
-    def of_angle(angle):
+    def of_angle(angle: FloatArray) -> FloatArray:
         return disc_integral(b / np.sin(angle), radius)
 
     return (
@@ -140,7 +145,7 @@ def edge(a, b, radius):
     )
 
 
-def corner(a, b, c, radius):
+def corner(a: float, b: float, c: float, radius: float) -> float:
     rm = np.sqrt(radius**2 - a**2)
     theta0, theta1, theta2 = np.arcsin(b / rm), np.arccos(c / rm), np.arctan(b / c)
     yc = np.sqrt(rm**2 - c**2)
@@ -161,7 +166,7 @@ def corner(a, b, c, radius):
 
 
 @pytest.mark.parametrize("a", [0.05, 0.3, 0.55])
-def test_appendix_a(a):
+def test_appendix_a(a: float) -> None:
     b, c, far = 0.3, 0.4, 5
     boxes = [
         (cap(a, 1), [[a, far], [-far, far], [-far, far]]),
@@ -174,7 +179,7 @@ def test_appendix_a(a):
         assert ball_in_box([0, 0, 0], 1, box) == pytest.approx(expected, abs=1e-12)
 
 
-def test_all_axes_and_sides_are_alike():
+def test_all_axes_and_sides_are_alike() -> None:
     box = np.array([[0.1, 0.7], [0.2, 0.9], [0.05, 0.4]])
     centre = np.array([0.2, 0.3, 0.15])
     expected = in_box(centre, 0.3, box)
@@ -187,13 +192,15 @@ def test_all_axes_and_sides_are_alike():
         assert in_box(centre * signs, 0.3, mirrored) == pytest.approx(expected, abs=1e-15)
 
 
-def boxes_of(box, cuts):
+def boxes_of(box: Any, cuts: Any) -> list[FloatArray]:
     """Return the boxes into which planes across each axis part a box."""
     edges = [np.r_[low, cut, high] for (low, high), cut in zip(box, cuts, strict=True)]
     return [np.array(b) for b in product(*(pairwise(e) for e in edges))]
 
 
-def random_dimers(count, radii, distance, seed, spread=1.2):
+def random_dimers(
+    count: int, radii: Any, distance: float, seed: int, spread: float = 1.2
+) -> tuple[FloatArray, FloatArray, Particles]:
     generator = np.random.default_rng(seed)
     centres = generator.uniform(0.5 - spread / 2, 0.5 + spread / 2, (count, 3))
     arms = generator.normal(size=(count, 3))
@@ -206,7 +213,7 @@ def random_dimers(count, radii, distance, seed, spread=1.2):
     )
 
 
-def test_parts_of_a_box_add_up():
+def test_parts_of_a_box_add_up() -> None:
     positions, radii, dimers = random_dimers(300, [0.2, 0.15], 0.25, seed=1)
     parts = boxes_of(UNIT, [[0.3, 0.31], [0.5], [0.2, 0.7]])
     # Each of the 18 parts rounds at 1e-17.
@@ -246,19 +253,19 @@ DIMERS = {
 }
 
 
-def dimer(centres, radii, box):
+def dimer(centres: ArrayLike, radii: ArrayLike, box: ArrayLike) -> float:
     with np.errstate(all="raise"):
         return particle_volumes_in_box(centres, radii, box, group_spheres([3, 3]))[0]
 
 
 @pytest.mark.parametrize("name", DIMERS)
-def test_dimers(name):
+def test_dimers(name: str) -> None:
     # The integrand is smooth between the breaks: what is left is rounding and the rule's error.
     assert dimer(*DIMERS[name]) == pytest.approx(dimer_in_box(*DIMERS[name]), abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_random_dimers(seed):
+def test_random_dimers(seed: int) -> None:
     generator = np.random.default_rng(seed)
     centres = generator.uniform(-0.2, 0.8, (2, 3))
     radii = generator.uniform(0.3, 0.6, 2)
@@ -268,7 +275,7 @@ def test_random_dimers(seed):
 
 
 @pytest.mark.parametrize("shift", [0, 1e-16, 3e-15])
-def test_rounding_decides_which_corner_is_behind_the_plane(shift):
+def test_rounding_decides_which_corner_is_behind_the_plane(shift: float) -> None:
     # The plane on which the spheres meet all but holds faces, edges and corners of the box.
     for axis in ([1, 0, 0], [1, 1, 0], [1, 1, 1], [1, -1, 0], [1, 1, -2]):
         arm = 0.1 * np.array(axis) / np.linalg.norm(axis) + [0, shift, 2 * shift]
@@ -280,7 +287,7 @@ def test_rounding_decides_which_corner_is_behind_the_plane(shift):
             assert dimer(centres, [0.3, 0.3], UNIT) == pytest.approx(expected, abs=1e-9)
 
 
-def test_dimers_in_a_large_box():
+def test_dimers_in_a_large_box() -> None:
     radius, distance = 0.2, 0.3
     positions, radii, particles = random_dimers(50, [radius, radius], distance, seed=2)
     volumes = particle_volumes_in_box(positions, radii, [[-5, 5]] * 3, particles)
@@ -289,13 +296,13 @@ def test_dimers_in_a_large_box():
     assert volumes == pytest.approx(np.full(50, 2 * BALL * radius**3 - lens), rel=1e-13)
 
 
-def test_the_same_sphere_twice_counts_once():
+def test_the_same_sphere_twice_counts_once() -> None:
     centre = [0.1, 0.1, 0.1]
     assert dimer([centre, centre], [0.2, 0.2], UNIT) == in_box(centre, 0.2, UNIT)
     assert dimer([centre, centre], [0.1, 0.2], UNIT) == in_box(centre, 0.2, UNIT)
 
 
-def test_free_spheres_and_dimers_in_any_order():
+def test_free_spheres_and_dimers_in_any_order() -> None:
     positions, radii, _ = random_dimers(40, [0.2, 0.15], 0.2, seed=3)
     bodies = np.r_[np.arange(40), np.arange(40)]
     bodies[[5, 45, 7, 47]] = [0, 0, 100, 101]  # bodies of one sphere, too
@@ -316,13 +323,13 @@ def test_free_spheres_and_dimers_in_any_order():
     assert np.sort(found[~is_body]) == pytest.approx(np.sort(free), abs=1e-15)
 
 
-def test_larger_bodies_are_refused():
+def test_larger_bodies_are_refused() -> None:
     message = "the number of spheres in body 4 is 3; packing_fraction measures any body"
     with pytest.raises(InputError, match=message):
         particle_volumes_in_box(np.eye(3), [1] * 3, UNIT, group_spheres([4, 4, 4]))
 
 
-def test_wrong_input():
+def test_wrong_input() -> None:
     with pytest.raises(InputError, match="radii must be positive"):
         sphere_volumes_in_box([[0, 0, 0]], [0], UNIT)
     with pytest.raises(InputError, match="ylo = 2 must be less than yhi = 2"):
@@ -331,7 +338,7 @@ def test_wrong_input():
         particle_volumes_in_box([[0, 0, 0]], [1], UNIT, group_spheres([1, 1]))
 
 
-def test_many_spheres_are_fast():
+def test_many_spheres_are_fast() -> None:
     positions = np.random.default_rng(5).uniform(0, 1, (100_000, 3))
     begin = time.process_time()
     sphere_volumes_in_box(positions, np.full(len(positions), 0.3), [[0.25, 0.75]] * 3)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 PARTICLE_COLUMNS = "id type x y z vx vy vz radius"
 CONTACT_COLUMNS = "id1 id2 x y z nx ny nz gap force"
 
 Rows = Sequence[Sequence[float]]
+# Writes a dump into the test's folder: see the fixtures write_particles and write_contacts.
+Writer = Callable[..., Path]
 
 
 def frame_text(label: str, step: int, columns: str, rows: Rows, announced: int | None) -> str:

@@ -12,11 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import machine
-import million
-import recorded
-import scenes_without
-import settling
+from tests.benchmark import machine, million, recorded, scenes_without, settling
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,7 @@ FULL = Size(10_000, 0.052, 2, 1.8, (1_000, 10_000, 100_000), 100_000, True)
 
 def main() -> int:
     """Measure what is asked for."""
-    parser = argparse.ArgumentParser(prog="benchmark", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmark", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="smaller scenes: under 15 minutes")
     parser.add_argument("--out", type=Path, default=Path("benchmark"), help="folder for the runs")
     parser.add_argument(

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pouring import shipped_deck
+from tests.pouring import shipped_deck
 
 STEPS = 20
 TOLERANCE = 0.005  # radii

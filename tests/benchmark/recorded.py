@@ -15,12 +15,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lammps_inelastic import core
-from pouring import Recorded, read_record, recording, records, run_deck, shipped_deck
+from tests.pouring import Recorded, read_record, recording, records, run_deck, shipped_deck
 
 TOLERANCE = 0.0005  # of the runs that are recorded [radii]
 TOLERANCES = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
@@ -110,15 +111,14 @@ class Solved:
     seconds: float
 
 
-def _solve(problem: Recorded, tolerance: float, **options: object) -> Solved | None:
+def _solve(problem: Recorded, tolerance: float, **options: Any) -> Solved | None:
     def once() -> core.Projection:
         return core.project(
             *problem.spheres,
-            **problem.bodies,
             timestep=problem.timestep,
             tolerance=tolerance,
             max_iterations=MOST_ITERATIONS,
-            **options,
+            **(problem.bodies | options),
         )
 
     result, seconds = _timed(once, 1 if options.get("solver") == "uzawa" else REPEATS)

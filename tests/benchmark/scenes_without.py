@@ -17,8 +17,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from building import cmake, generator, run
-from lammps_run import without_launcher
+from tests.building import cmake, generator, run
+from tests.fix.lammps_run import without_launcher
 
 ROOT = Path(__file__).parents[2]
 REPEATS = 9

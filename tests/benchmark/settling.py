@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from million import diameter_of
+from tests.benchmark.million import diameter_of
 
 TIME = 2.0
 LOOSE = 0.005  # radii

@@ -8,14 +8,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lammps_inelastic import core
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+# First and second particle, normal and gap.
+Contact = tuple[int, int, ArrayLike, float]
 
 WALL = -1
 UP = (0.0, 0.0, 1.0)
@@ -70,7 +73,7 @@ class Problem:
         )
 
     @property
-    def body_arguments(self) -> dict[str, Floats | Indices]:
+    def body_arguments(self) -> dict[str, Any]:
         """Nothing in a scene without bodies."""
         if self.bodies.inverse_mass.size == 0:
             return {}
@@ -91,13 +94,12 @@ class Problem:
     def fastest(self) -> float:
         return float(np.abs(self.predicted_velocity).max())
 
-    def project(self, tolerance: float, **options) -> core.Projection:
+    def project(self, tolerance: float, **options: Any) -> core.Projection:
         return core.project(
             *self.arguments,
             timestep=self.timestep,
             tolerance=tolerance,
-            **self.body_arguments,
-            **options,
+            **(self.body_arguments | options),
         )
 
     def jacobian(self) -> Floats:
@@ -163,7 +165,7 @@ class Problem:
         )
 
 
-def assert_within(actual, expected, bound: float) -> None:
+def assert_within(actual: ArrayLike, expected: ArrayLike, bound: float) -> None:
     """Fail, naming the worst offender, where two arrays differ by more than the bound."""
     actual, expected = np.broadcast_arrays(np.asarray(actual, float), np.asarray(expected, float))
     difference = np.abs(actual - expected)
@@ -181,7 +183,12 @@ def residual_left(projection: core.Projection) -> float:
     return max(projection.feasibility, projection.complementarity)
 
 
-def problem(velocity, mass, contacts, timestep=0.01) -> Problem:
+def problem(
+    velocity: ArrayLike,
+    mass: Sequence[float] | Floats,
+    contacts: Sequence[Contact],
+    timestep: float = 0.01,
+) -> Problem:
     """Write out a small problem: contacts are (first, second, normal, gap) each.
 
     A particle of infinite mass is frozen.
@@ -200,7 +207,10 @@ def problem(velocity, mass, contacts, timestep=0.01) -> Problem:
 
 
 def in_bodies(
-    given: Problem, position, groups: Sequence[Sequence[int]], radius: float = 0.0
+    given: Problem,
+    position: ArrayLike,
+    groups: Sequence[Sequence[int] | Indices],
+    radius: float = 0.0,
 ) -> Problem:
     """Join each group of particles, point masses or solid spheres of a radius, to a rigid body.
 
@@ -234,14 +244,14 @@ def in_bodies(
     return joined.with_contacts(np.flatnonzero(apart))
 
 
-def column(mass, velocity) -> Problem:
+def column(mass: Sequence[float] | Floats, velocity: Sequence[float] | Floats) -> Problem:
     """Spheres on top of each other, the lowest on a floor, all just touching."""
     count = len(mass)
     contacts = [(k, k - 1, UP, 0.0) for k in range(count)]  # the lowest sphere's k - 1 is the wall
     return problem([(0, 0, v) for v in velocity], mass, contacts)
 
 
-def row(mass, velocity) -> Problem:
+def row(mass: Sequence[float] | Floats, velocity: Sequence[float] | Floats) -> Problem:
     """Spheres side by side along x, all just touching, with these speeds along x."""
     contacts = [(k + 1, k, (1, 0, 0), 0.0) for k in range(len(mass) - 1)]
     return problem([(v, 0, 0) for v in velocity], mass, contacts)
@@ -302,7 +312,7 @@ def cubic_crystal(side: int, seed: int, *, walls: int = 1) -> Problem:
     With six walls there are more contacts than degrees of freedom: the impulses are not unique.
     """
     index = np.arange(side**3).reshape(side, side, side)
-    contacts = []
+    contacts: list[Contact] = []
     for axis in range(3):
         normal = np.eye(3)[axis]
         layers = np.moveaxis(index, axis, 0)
@@ -312,7 +322,8 @@ def cubic_crystal(side: int, seed: int, *, walls: int = 1) -> Problem:
             contacts += [(i, WALL, -normal, 0.0) for i in layers[-1].ravel()]
         for below, above in pairwise(layers):
             contacts += [
-                (j, i, normal, 0.0) for i, j in zip(below.ravel(), above.ravel(), strict=True)
+                (j, i, normal, 0.0)
+                for i, j in zip(below.ravel().tolist(), above.ravel().tolist(), strict=True)
             ]
     velocity = np.random.default_rng(seed).uniform(-1, 1, (side**3, 3))
     return problem(velocity, np.ones(side**3), contacts)

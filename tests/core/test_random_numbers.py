@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
+from tests.core.contact_problems import Floats
 
 WORD = 2**32
 
@@ -50,11 +51,13 @@ def expected_vector(seed: int, particle: int, step: int) -> tuple[float, ...]:
 
 
 @pytest.mark.parametrize(("counter", "key", "answer"), KNOWN_ANSWERS)
-def test_this_file_knows_philox(counter, key, answer):
+def test_this_file_knows_philox(
+    counter: tuple[int, ...], key: tuple[int, ...], answer: tuple[int, ...]
+) -> None:
     assert philox(counter, key) == answer
 
 
-def test_known_answer_for_zeros():
+def test_known_answer_for_zeros() -> None:
     _, _, answer = KNOWN_ANSWERS[0]
     expected = [2 * word / (WORD - 1) - 1 for word in answer[:3]]
     # Two roundings of numbers up to 2.
@@ -72,14 +75,14 @@ def test_known_answer_for_zeros():
         (12345, 2**53 + 1, 2**31),
     ],
 )
-def test_seed_particle_and_step(seed, particle, step):
+def test_seed_particle_and_step(seed: int, particle: int, step: int) -> None:
     # Two roundings of numbers up to 2.
     assert core.uniform_vector(seed, particle, step) == pytest.approx(
         expected_vector(seed, particle, step), abs=5e-16
     )
 
 
-def test_many_seeds_particles_and_steps():
+def test_many_seeds_particles_and_steps() -> None:
     generator = np.random.default_rng(0)
     for _ in range(300):
         seed = int(generator.integers(WORD))
@@ -100,21 +103,21 @@ def sample() -> np.ndarray:
     )
 
 
-def test_bounds(sample):
+def test_bounds(sample: Floats) -> None:
     assert np.abs(sample).max() <= 1
     # 90,000 numbers come this near to both ends, but for a chance of e^-9 each.
     assert sample.max() > 1 - 2e-4
     assert sample.min() < -1 + 2e-4
 
 
-def test_mean_and_variance(sample):
+def test_mean_and_variance(sample: Floats) -> None:
     count = sample[..., 0].size
     # Four standard deviations, of the mean of x (variance 1/3) and of x^2 (variance 4/45).
     assert np.abs(sample.mean(axis=(0, 1))).max() < 4 * np.sqrt(1 / 3 / count)
     assert np.abs((sample**2).mean(axis=(0, 1)) - 1 / 3).max() < 4 * np.sqrt(4 / 45 / count)
 
 
-def test_components_particles_and_steps_are_independent(sample):
+def test_components_particles_and_steps_are_independent(sample: Floats) -> None:
     # Four standard deviations of the mean of a product (variance 1/9) of independent numbers.
     def correlated(one: np.ndarray, other: np.ndarray) -> bool:
         return abs((one * other).mean()) > 4 * np.sqrt(1 / 9 / one.size)
@@ -125,13 +128,13 @@ def test_components_particles_and_steps_are_independent(sample):
     assert not correlated(sample[1:], sample[:-1])
 
 
-def test_no_two_alike(sample):
+def test_no_two_alike(sample: Floats) -> None:
     vectors = sample.reshape(-1, 3)
     assert len(np.unique(vectors, axis=0)) == len(vectors)
     assert core.uniform_vector(7, 1, 0) != core.uniform_vector(8, 1, 0)
 
 
-def test_numbers_out_of_range_are_refused():
+def test_numbers_out_of_range_are_refused() -> None:
     for wrong in [(-1, 0, 0), (WORD, 0, 0), (0, -1, 0), (0, 0, 2**64)]:
         with pytest.raises(TypeError):
             core.uniform_vector(*wrong)

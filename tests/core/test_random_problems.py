@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from contact_problems import WALL, Floats, Problem, assert_within, in_bodies, no_bodies
-from reference_solver import NotSolvedError, reference
+from tests.core.contact_problems import WALL, Floats, Problem, assert_within, in_bodies, no_bodies
+from tests.core.reference_solver import NotSolvedError, reference
 
 # The same examples on every machine.
 RANDOM = settings(derandomize=True, deadline=None, max_examples=400)
@@ -125,6 +126,7 @@ def test_bodies(drawn: tuple[Problem, Floats]) -> None:
     assert_projected(drawn[0])
 
 
+@pytest.mark.slow
 @RANDOM
 @given(problems(mass_decades=6.0))
 def test_masses_of_a_million_to_one(drawn: tuple[Problem, Floats]) -> None:

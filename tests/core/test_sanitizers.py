@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from building import REPOSITORY, cmake, generator, run
+import pytest
+
+from tests.building import REPOSITORY, cmake, generator, run
 
 
+@pytest.mark.slow
 def test_core_and_npz_are_clean_under_the_sanitizers(tmp_path: Path) -> None:
     build = str(tmp_path)
     run(

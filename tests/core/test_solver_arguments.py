@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
 from lammps_inelastic import core
+from tests.core.contact_problems import Floats
 
 NOT_FINITE = [np.nan, np.inf, -np.inf]
 
 
-def arguments(**changes) -> dict:
+def arguments(**changes: Any) -> dict[str, Any]:
     """Return a good problem, two particles and a floor, with some arguments changed."""
     return {
         "predicted_velocity": np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]),
@@ -25,17 +29,17 @@ def arguments(**changes) -> dict:
     }
 
 
-def project(**changes) -> core.Projection:
+def project(**changes: Any) -> core.Projection:
     return core.project(**arguments(**changes))
 
 
-def residual(**changes) -> tuple[float, float]:
+def residual(**changes: Any) -> Any:
     given = arguments(**{"impulse": np.zeros(2), **changes})
     del given["tolerance"]
     return core.residual(**given)
 
 
-def largest_eigenvalue(**changes) -> float:
+def largest_eigenvalue(**changes: Any) -> float:
     given = arguments(**changes)
     for name in ("predicted_velocity", "gap", "tolerance"):
         del given[name]
@@ -45,7 +49,7 @@ def largest_eigenvalue(**changes) -> float:
 ALL = pytest.mark.parametrize("function", [project, residual, largest_eigenvalue])
 
 
-def test_these_arguments_are_fine():
+def test_these_arguments_are_fine() -> None:
     assert project().converged
     assert residual() == (pytest.approx(0.02, abs=1e-15), 0)  # both approach at 1: 2 h
     assert largest_eigenvalue() > 0
@@ -66,7 +70,7 @@ def test_these_arguments_are_fine():
         (largest_eigenvalue, "normal"),
     ],
 )
-def test_wrong_length(function, name, length):
+def test_wrong_length(function: Callable[..., object], name: str, length: int) -> None:
     wrong = np.zeros(
         (length, 3) if name == "normal" else length,
         np.int64 if name in ("first", "second") else float,
@@ -83,7 +87,7 @@ def test_wrong_length(function, name, length):
         (largest_eigenvalue, "first", "second must have length 3, not 2"),
     ],
 )
-def test_one_too_many(function, name, message):
+def test_one_too_many(function: Callable[..., object], name: str, message: str) -> None:
     good = arguments()[name]
     with pytest.raises(ValueError, match=message):
         function(**{name: np.concatenate([good, good[:1]])})
@@ -103,7 +107,7 @@ def test_one_too_many(function, name, message):
         ("impulse", (2, 1)),
     ],
 )
-def test_wrong_shape(name, shape):
+def test_wrong_shape(name: str, shape: tuple[int, ...]) -> None:
     wrong = np.zeros(shape, np.int64 if name in ("first", "second") else float)
     # nanobind looks for a function that takes such an array: a TypeError that lists the shapes.
     with pytest.raises((ValueError, TypeError), match="shape"):
@@ -112,7 +116,7 @@ def test_wrong_shape(name, shape):
 
 @pytest.mark.parametrize("value", NOT_FINITE)
 @pytest.mark.parametrize("name", ["predicted_velocity", "inverse_mass", "normal", "gap", "impulse"])
-def test_not_finite_in_an_array(name, value):
+def test_not_finite_in_an_array(name: str, value: Any) -> None:
     array = np.ones(2) if name == "impulse" else arguments()[name].copy()
     array.flat[-1] = value
     with pytest.raises(ValueError, match=r"finite|cannot move"):
@@ -120,7 +124,7 @@ def test_not_finite_in_an_array(name, value):
 
 
 @pytest.mark.parametrize("value", NOT_FINITE)
-def test_not_finite_without_contacts(value):
+def test_not_finite_without_contacts(value: Any) -> None:
     none = {
         "first": np.zeros(0, np.int64),
         "second": np.zeros(0, np.int64),
@@ -135,19 +139,19 @@ def test_not_finite_without_contacts(value):
 
 @ALL
 @pytest.mark.parametrize("value", [0.0, -0.01, *NOT_FINITE])
-def test_timestep(function, value):
+def test_timestep(function: Callable[..., object], value: Any) -> None:
     with pytest.raises(ValueError, match="timestep must be"):
         function(timestep=value)
 
 
 @pytest.mark.parametrize("value", [0.0, -1e-9, *NOT_FINITE])
-def test_tolerance(value):
+def test_tolerance(value: Any) -> None:
     with pytest.raises(ValueError, match="tolerance must be"):
         project(tolerance=value)
 
 
 @pytest.mark.parametrize("name", ["", "APGD", "gauss-seidel"])
-def test_unknown_solver(name):
+def test_unknown_solver(name: str) -> None:
     with pytest.raises(ValueError, match=f"solver must be apgd or uzawa, not {name}"):
         project(solver=name)
 
@@ -164,7 +168,7 @@ def test_unknown_solver(name):
         ("second", 2**40),
     ],
 )
-def test_index_out_of_range(function, name, value):
+def test_index_out_of_range(function: Callable[..., object], name: str, value: Any) -> None:
     indices = arguments()[name].copy()
     indices[1] = value
     with pytest.raises(ValueError, match=r"contact 1 names a particle outside 0 \.\.\. 1"):
@@ -172,7 +176,7 @@ def test_index_out_of_range(function, name, value):
 
 
 @ALL
-def test_contact_between_frozen_particles(function):
+def test_contact_between_frozen_particles(function: Callable[..., object]) -> None:
     # Contact 0 is between both, contact 1 between particle 1 and the floor.
     with pytest.raises(ValueError, match="contact 0 is between particles that cannot move"):
         function(inverse_mass=np.zeros(2))
@@ -181,20 +185,20 @@ def test_contact_between_frozen_particles(function):
 
 
 @ALL
-def test_negative_mass(function):
+def test_negative_mass(function: Callable[..., object]) -> None:
     # Particle 0 makes the sum over contact 0 positive.
     with pytest.raises(ValueError, match="inverse_mass"):
         function(inverse_mass=np.array([2.0, -1.0]), second=np.array([1, 0]))
 
 
 @ALL
-def test_contact_of_a_particle_with_itself(function):
+def test_contact_of_a_particle_with_itself(function: Callable[..., object]) -> None:
     with pytest.raises(ValueError, match="contact 1"):
         function(second=np.array([1, 1]))
 
 
 @pytest.mark.parametrize("solver", ["apgd", "uzawa"])
-def test_negative_first_guess_does_not_pull(solver):
+def test_negative_first_guess_does_not_pull(solver: str) -> None:
     # The floor is far below: with this guess it would pull, and the residual would be zero.
     impulse, gap = np.array([0.0, -1.0]), np.array([10.0, 10.0])
     projection = project(impulse=impulse, gap=gap, solver=solver)
@@ -202,7 +206,7 @@ def test_negative_first_guess_does_not_pull(solver):
 
 
 @pytest.mark.parametrize("solver", ["apgd", "uzawa"])
-def test_overflow_is_not_convergence(solver):
+def test_overflow_is_not_convergence(solver: str) -> None:
     # h V overflows: gaps are -inf, then not numbers.
     projection = project(
         predicted_velocity=np.array([[0.0, 0.0, -1e300], [0.0, 0.0, 0.0]]),
@@ -214,7 +218,7 @@ def test_overflow_is_not_convergence(solver):
     assert not projection.feasibility <= 1e-9
 
 
-def test_arguments_may_be_strided_and_are_not_changed():
+def test_arguments_may_be_strided_and_are_not_changed() -> None:
     good = arguments()
     expected = core.project(**good)
     strided = dict(good)
@@ -228,13 +232,13 @@ def test_arguments_may_be_strided_and_are_not_changed():
         assert np.array_equal(good[name], value)
 
 
-def test_first_guess_is_not_changed():
+def test_first_guess_is_not_changed() -> None:
     guess = np.array([1.0, 1.0])
     project(impulse=guess)
     assert np.array_equal(guess, [1.0, 1.0])
 
 
-def bodies(**changes) -> dict:
+def bodies(**changes: Any) -> dict[str, Any]:
     """Return arguments about bodies, with some changed, that go with a third particle.
 
     A hinge and a ball, on particles 2 and 1: the inverse inertia of neither is regular.
@@ -253,7 +257,7 @@ def bodies(**changes) -> dict:
 BODIES = ["body", "arm", "body_inverse_mass", "body_inverse_inertia"]
 
 
-def test_these_bodies_are_fine():
+def test_these_bodies_are_fine() -> None:
     # What is not read is neither finite nor positive.
     assert project(**bodies()).converged
     assert residual(**bodies()) == (pytest.approx(0.02, abs=1e-15), 0)  # both approach at 1: 2 h
@@ -262,7 +266,9 @@ def test_these_bodies_are_fine():
 
 @ALL
 @pytest.mark.parametrize("names", [BODIES[:1], BODIES[1:], BODIES[:3], BODIES[2:3]])
-def test_only_some_of_the_arguments_about_bodies(function, names):
+def test_only_some_of_the_arguments_about_bodies(
+    function: Callable[..., object], names: list[str]
+) -> None:
     given = bodies(inverse_mass=np.array([1.0, 0.5, 0.0]))
     for name in names:
         del given[name]
@@ -273,7 +279,9 @@ def test_only_some_of_the_arguments_about_bodies(function, names):
 @ALL
 @pytest.mark.parametrize("name", ["body", "arm", "body_inverse_inertia"])
 @pytest.mark.parametrize("change", [-1, 1])
-def test_wrong_length_of_an_argument_about_bodies(function, name, change):
+def test_wrong_length_of_an_argument_about_bodies(
+    function: Callable[..., object], name: str, change: int
+) -> None:
     good = bodies()[name]
     wrong = good[:-1] if change < 0 else np.concatenate([good, good[:1]])
     message = f"{name} must have length {len(good)}, not {len(good) + change}"
@@ -292,7 +300,7 @@ def test_wrong_length_of_an_argument_about_bodies(function, name, change):
         ("body_inverse_inertia", (2, 3, 2)),
     ],
 )
-def test_wrong_shape_of_an_argument_about_bodies(name, shape):
+def test_wrong_shape_of_an_argument_about_bodies(name: str, shape: tuple[int, ...]) -> None:
     wrong = np.zeros(shape, np.int64 if name == "body" else float)
     # As in test_wrong_shape.
     with pytest.raises((ValueError, TypeError), match="shape"):
@@ -302,7 +310,9 @@ def test_wrong_shape_of_an_argument_about_bodies(name, shape):
 @ALL
 @pytest.mark.parametrize("value", NOT_FINITE)
 @pytest.mark.parametrize("name", BODIES[1:])
-def test_not_finite_in_an_argument_about_bodies(function, name, value):
+def test_not_finite_in_an_argument_about_bodies(
+    function: Callable[..., object], name: str, value: Any
+) -> None:
     wrong = bodies()[name].copy()
     wrong.flat[-1] = value
     with pytest.raises(ValueError, match=f"^{name} holds a number that is not finite"):
@@ -311,26 +321,28 @@ def test_not_finite_in_an_argument_about_bodies(function, name, value):
 
 @ALL
 @pytest.mark.parametrize("value", [np.nan, -1.0])
-def test_inverse_mass_of_a_free_particle_among_bodies(function, value):
+def test_inverse_mass_of_a_free_particle_among_bodies(
+    function: Callable[..., object], value: Any
+) -> None:
     with pytest.raises(ValueError, match=r"^inverse_mass"):
         function(**bodies(inverse_mass=np.array([value, 1.0, 1.0])))
 
 
 @ALL
 @pytest.mark.parametrize("value", [-2, 2, 2**40])
-def test_body_out_of_range(function, value):
+def test_body_out_of_range(function: Callable[..., object], value: Any) -> None:
     with pytest.raises(ValueError, match=r"particle 1 is in a body outside -1 \.\.\. 1"):
         function(**bodies(body=np.array([-1, value, 0])))
 
 
 @ALL
-def test_body_without_particles(function):
+def test_body_without_particles(function: Callable[..., object]) -> None:
     with pytest.raises(ValueError, match="body 1 has no particle"):
         function(**bodies(body=np.array([-1, -1, 0]), inverse_mass=np.ones(3)))
 
 
 @ALL
-def test_negative_mass_of_a_body(function):
+def test_negative_mass_of_a_body(function: Callable[..., object]) -> None:
     with pytest.raises(ValueError, match="body_inverse_mass must not be negative"):
         function(**bodies(body_inverse_mass=np.array([-0.1, 1.0])))
 
@@ -348,7 +360,9 @@ NOT_POSITIVE = {
 @ALL
 @pytest.mark.parametrize("inertia", NOT_POSITIVE.values(), ids=NOT_POSITIVE)
 @pytest.mark.parametrize("scale", [1e-200, 1.0, 1e100])
-def test_inverse_inertia_that_no_body_has(function, inertia, scale):
+def test_inverse_inertia_that_no_body_has(
+    function: Callable[..., object], inertia: Floats, scale: float
+) -> None:
     wrong = np.array([np.zeros((3, 3)), scale * inertia])
     message = "body_inverse_inertia of body 1 is not symmetric and positive semi-definite"
     with pytest.raises(ValueError, match=message):
@@ -357,7 +371,7 @@ def test_inverse_inertia_that_no_body_has(function, inertia, scale):
 
 @pytest.mark.parametrize("rank", [0, 1, 2, 3])
 @pytest.mark.parametrize("seed", range(5))
-def test_inverse_inertia_may_have_any_rank_and_rounding(seed, rank):
+def test_inverse_inertia_may_have_any_rank_and_rounding(seed: int, rank: int) -> None:
     generator = np.random.default_rng(seed)
     axes = np.linalg.qr(generator.normal(size=(3, 3)))[0]
     inertia = axes @ np.diag(generator.uniform(0.1, 10, 3) * (np.arange(3) < rank)) @ axes.T
@@ -367,7 +381,7 @@ def test_inverse_inertia_may_have_any_rank_and_rounding(seed, rank):
 
 
 @ALL
-def test_contact_within_a_body(function):
+def test_contact_within_a_body(function: Callable[..., object]) -> None:
     one = bodies(
         body=np.array([0, 0, -1]),
         arm=np.zeros((3, 3)),
@@ -380,7 +394,7 @@ def test_contact_within_a_body(function):
 
 
 @ALL
-def test_contact_of_bodies_that_cannot_move(function):
+def test_contact_of_bodies_that_cannot_move(function: Callable[..., object]) -> None:
     # A hinge moves no particle along its arm, and a body of no mobility none at all.
     hinged = {"first": np.array([0, 2]), "second": np.array([1, -1])}
     along = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -391,7 +405,7 @@ def test_contact_of_bodies_that_cannot_move(function):
         function(**bodies(body_inverse_mass=np.zeros(2)))
 
 
-def test_arguments_about_bodies_may_be_strided_and_are_not_changed():
+def test_arguments_about_bodies_may_be_strided_and_are_not_changed() -> None:
     expected = project(**bodies())
     strided = {name: np.repeat(value, 2, axis=0)[::2] for name, value in bodies().items()}
     for value in strided.values():

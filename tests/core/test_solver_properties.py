@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
 
-from contact_problems import (
+from lammps_inelastic import core
+from tests.core.contact_problems import (
     WALL,
     Problem,
     assert_within,
@@ -18,7 +20,6 @@ from contact_problems import (
     heap,
     no_bodies,
 )
-from lammps_inelastic import core
 
 # [diameters] One step's motion is 0.01.
 TOLERANCE = 1e-10
@@ -51,17 +52,17 @@ PROBLEMS = WITHOUT_BODIES | WITH_BODIES
 IN_FREE_SPACE = [name for name in PROBLEMS if "without a floor" in name]
 
 
-@pytest.fixture(params=PROBLEMS.values(), ids=PROBLEMS.keys())
-def given(request) -> Problem:
+@pytest.fixture(params=list(PROBLEMS.values()), ids=list(PROBLEMS))
+def given(request: pytest.FixtureRequest) -> Problem:
     return request.param
 
 
 @pytest.fixture(params=["apgd", "uzawa"])
-def solver(request) -> str:
+def solver(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-def test_both_residuals_meet_the_tolerance(given):
+def test_both_residuals_meet_the_tolerance(given: Problem) -> None:
     for tolerance in (1e-3, 1e-6, 1e-13):
         projection = given.project(tolerance)
         assert projection.converged
@@ -69,7 +70,7 @@ def test_both_residuals_meet_the_tolerance(given):
         assert projection.complementarity <= tolerance
 
 
-def test_residuals_by_independent_formulas(given, solver):
+def test_residuals_by_independent_formulas(given: Problem, solver: str) -> None:
     for max_iterations in (0, 1, 10, 100_000):
         projection = given.project(TOLERANCE, solver=solver, max_iterations=max_iterations)
         reported = projection.feasibility, projection.complementarity
@@ -83,18 +84,18 @@ def test_residuals_by_independent_formulas(given, solver):
         )
 
 
-def test_velocity_belongs_to_the_impulses(given, solver):
+def test_velocity_belongs_to_the_impulses(given: Problem, solver: str) -> None:
     projection = given.project(TOLERANCE, solver=solver, max_iterations=10)
     assert_within(projection.velocity, given.velocity(projection.impulse), ROUNDING)
 
 
-def test_impulses_are_never_negative(given, solver):
+def test_impulses_are_never_negative(given: Problem, solver: str) -> None:
     for max_iterations in (1, 2, 3, 10, 100_000):
         projection = given.project(TOLERANCE, solver=solver, max_iterations=max_iterations)
         assert projection.impulse.min() >= 0
 
 
-def test_max_iterations(given, solver):
+def test_max_iterations(given: Problem, solver: str) -> None:
     for max_iterations in (0, 1, 7):
         projection = given.project(1e-14, solver=solver, max_iterations=max_iterations)
         assert projection.iterations == max_iterations
@@ -106,9 +107,9 @@ def test_max_iterations(given, solver):
 
 
 @pytest.mark.parametrize("given", WITHOUT_BODIES.values(), ids=WITHOUT_BODIES)
-def test_no_bodies_change_no_bit(given, solver):
+def test_no_bodies_change_no_bit(given: Problem, solver: str) -> None:
     nobody = no_bodies(given.inverse_mass.size)
-    nothing = {
+    nothing: dict[str, Any] = {
         "body": nobody.body,
         "arm": nobody.arm,
         "body_inverse_mass": nobody.inverse_mass,
@@ -119,18 +120,18 @@ def test_no_bodies_change_no_bit(given, solver):
     assert same.iterations == usual.iterations
     assert np.array_equal(same.velocity, usual.velocity)
     assert np.array_equal(same.impulse, usual.impulse)
-    rest = {"timestep": given.timestep}
-    assert core.residual(*given.arguments, usual.impulse, **rest, **nothing) == core.residual(
+    rest: dict[str, Any] = {"timestep": given.timestep}
+    assert core.residual(*given.arguments, usual.impulse, **(rest | nothing)) == core.residual(
         *given.arguments, usual.impulse, **rest
     )
     contacts = given.arguments[1:5]
-    assert core.largest_eigenvalue(*contacts, **rest, **nothing) == core.largest_eigenvalue(
+    assert core.largest_eigenvalue(*contacts, **(rest | nothing)) == core.largest_eigenvalue(
         *contacts, **rest
     )
 
 
 @pytest.mark.parametrize("given", WITH_BODIES.values(), ids=WITH_BODIES)
-def test_bodies_move_by_momentum_and_angular_momentum(given, solver):
+def test_bodies_move_by_momentum_and_angular_momentum(given: Problem, solver: str) -> None:
     """Each by one velocity and one angular velocity, from the impulses on its particles."""
     projection = given.project(TOLERANCE, solver=solver, max_iterations=10)
     change = projection.velocity - given.predicted_velocity
@@ -150,12 +151,12 @@ def test_bodies_move_by_momentum_and_angular_momentum(given, solver):
         turn = np.linalg.lstsq(cross, (moved - mass @ moved / mass.sum()).ravel(), rcond=1e-9)[0]
         inertia = np.linalg.pinv(given.bodies.inverse_inertia[b], rtol=1e-9, hermitian=True)
         assert_within(inertia @ turn, np.cross(arm, push).sum(axis=0), accuracy)
-        pushed += push.any()
+        pushed += int(push.any())
     assert pushed > given.bodies.inverse_mass.size / 2
 
 
 @pytest.mark.parametrize("name", IN_FREE_SPACE)
-def test_momentum_is_kept(name, solver):
+def test_momentum_is_kept(name: str, solver: str) -> None:
     given = PROBLEMS[name]
     for max_iterations in (3, 100_000):
         projection = given.project(TOLERANCE, solver=solver, max_iterations=max_iterations)
@@ -164,7 +165,7 @@ def test_momentum_is_kept(name, solver):
         )
 
 
-def test_kinetic_energy_does_not_rise(given, solver):
+def test_kinetic_energy_does_not_rise(given: Problem, solver: str) -> None:
     """T(V) = T(V*) + sum lambda (w - gap) / h - 1/2 (V - V*)^T M (V - V*).
 
     Because V = V* + M^-1 G^T lambda gives T(V*) = T(V) - lambda . G V + 1/2 (V - V*)^T M (V - V*),
@@ -187,7 +188,7 @@ def test_kinetic_energy_does_not_rise(given, solver):
 
 
 @pytest.mark.parametrize("name", ["heap", "mixed"])
-def test_kinetic_energy_falls_without_overlaps(name, solver):
+def test_kinetic_energy_falls_without_overlaps(name: str, solver: str) -> None:
     given = PROBLEMS[name]
     projection = given.project(TOLERANCE, solver=solver)
     before = given.kinetic_energy(given.predicted_velocity)
@@ -200,14 +201,14 @@ def test_kinetic_energy_falls_without_overlaps(name, solver):
 ITERATIONS = 30
 
 
-def after_some_iterations(given: Problem, **options) -> core.Projection:
+def after_some_iterations(given: Problem, **options: Any) -> core.Projection:
     projection = given.project(1e-300, max_iterations=ITERATIONS, **options)
     assert projection.iterations == ITERATIONS
     return projection
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_order_of_contacts_does_not_matter(given, seed):
+def test_order_of_contacts_does_not_matter(given: Problem, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(given.gap.size)
     usual = after_some_iterations(given)
     shuffled = after_some_iterations(given.with_contacts(order))
@@ -216,7 +217,7 @@ def test_order_of_contacts_does_not_matter(given, seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_names_of_particles_do_not_matter(given, seed):
+def test_names_of_particles_do_not_matter(given: Problem, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(given.inverse_mass.size)
     new_name = np.argsort(order)
     usual = after_some_iterations(given)
@@ -236,7 +237,7 @@ def test_names_of_particles_do_not_matter(given, seed):
 
 
 @pytest.mark.parametrize("given", WITH_BODIES.values(), ids=WITH_BODIES)
-def test_names_of_bodies_do_not_matter(given):
+def test_names_of_bodies_do_not_matter(given: Problem) -> None:
     bodies = given.bodies
     order = np.random.default_rng(0).permutation(bodies.inverse_mass.size)
     usual = after_some_iterations(given)
@@ -255,7 +256,7 @@ def test_names_of_bodies_do_not_matter(given):
     assert_within(renamed.impulse, usual.impulse, ROUNDING)
 
 
-def test_sides_of_a_contact_do_not_matter(given):
+def test_sides_of_a_contact_do_not_matter(given: Problem) -> None:
     turned = (given.second != WALL) & (np.arange(given.gap.size) % 2 == 0)
     usual = after_some_iterations(given)
     swapped = after_some_iterations(
@@ -270,7 +271,7 @@ def test_sides_of_a_contact_do_not_matter(given):
     assert_within(swapped.impulse, usual.impulse, ROUNDING)
 
 
-def test_galilean_invariance(given, solver):
+def test_galilean_invariance(given: Problem, solver: str) -> None:
     # Walls move along: what they go in the step is taken off their gaps.
     drift = np.array([3.0, -2.0, 1.0])
     wall = given.second == WALL
@@ -289,7 +290,7 @@ def test_galilean_invariance(given, solver):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_direction_of_axes_does_not_matter(given, seed):
+def test_direction_of_axes_does_not_matter(given: Problem, seed: int) -> None:
     # Orthogonal: a rotation, or one with a reflection.
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     bodies = given.bodies
@@ -310,7 +311,7 @@ def test_direction_of_axes_does_not_matter(given, seed):
     assert_within(turned.impulse, usual.impulse, ROUNDING)
 
 
-def test_units_of_powers_of_two_change_no_bit(given, solver):
+def test_units_of_powers_of_two_change_no_bit(given: Problem, solver: str) -> None:
     length, time, mass = 2.0**-20, 2.0**9, 2.0**31
     speed = length / time
     usual = given.project(TOLERANCE, solver=solver)
@@ -334,7 +335,7 @@ def test_units_of_powers_of_two_change_no_bit(given, solver):
     assert scaled.complementarity == usual.complementarity * length
 
 
-def test_own_result_as_first_guess_needs_no_iteration(given):
+def test_own_result_as_first_guess_needs_no_iteration(given: Problem) -> None:
     first = given.project(TOLERANCE)
     second = given.project(TOLERANCE, impulse=first.impulse)
     assert second.iterations == 0
@@ -342,7 +343,7 @@ def test_own_result_as_first_guess_needs_no_iteration(given):
     assert np.array_equal(second.velocity, first.velocity)
 
 
-def test_same_answer_from_any_first_guess(given):
+def test_same_answer_from_any_first_guess(given: Problem) -> None:
     """||V - V'||^2_M = (lambda - lambda') . (w - w') / h, and every product of an impulse with an
     end-of-step gap is at most sum lambda times the residual.
     """
@@ -355,7 +356,7 @@ def test_same_answer_from_any_first_guess(given):
     assert apart <= np.sqrt(2e-14 * total / given.timestep)
 
 
-def test_uzawa_starts_from_zero(given):
+def test_uzawa_starts_from_zero(given: Problem) -> None:
     guess = np.random.default_rng(0).uniform(0, 2, given.gap.size)
     cold = given.project(TOLERANCE, solver="uzawa")
     guessed = given.project(TOLERANCE, solver="uzawa", impulse=guess)
@@ -363,14 +364,14 @@ def test_uzawa_starts_from_zero(given):
     assert np.array_equal(guessed.impulse, cold.impulse)
 
 
-def test_same_bits_twice(given, solver):
+def test_same_bits_twice(given: Problem, solver: str) -> None:
     once, again = (given.project(TOLERANCE, solver=solver) for _ in range(2))
     assert np.array_equal(once.velocity, again.velocity)
     assert np.array_equal(once.impulse, again.impulse)
 
 
 @pytest.mark.parametrize("name", ["dense crystal", "crystal in a box"])
-def test_acceleration_saves_iterations(name):
+def test_acceleration_saves_iterations(name: str) -> None:
     # Measured: 82 and 11 times fewer. Without restarts or with a wrong momentum apgd converges too.
     accelerated = PROBLEMS[name].project(TOLERANCE)
     plain = PROBLEMS[name].project(TOLERANCE, solver="uzawa")
@@ -378,7 +379,7 @@ def test_acceleration_saves_iterations(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_mass_ratio_of_a_million(seed):
+def test_mass_ratio_of_a_million(seed: int) -> None:
     given = heap(seed, mass_ratio=1e6)
     projection = given.project(TOLERANCE)
     assert projection.converged
@@ -388,7 +389,7 @@ def test_mass_ratio_of_a_million(seed):
     assert_within(reported, given.residual(projection.impulse), 1e-12)
 
 
-def test_results_are_not_shared():
+def test_results_are_not_shared() -> None:
     projection = PROBLEMS["heap"].project(TOLERANCE)
     projection.velocity[:] = np.nan
     assert np.isfinite(projection.velocity).all()

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact_problems import (
+from lammps_inelastic import core
+from tests.core.contact_problems import (
     Problem,
     assert_within,
     bricks,
@@ -18,8 +19,7 @@ from contact_problems import (
     problem,
     row,
 )
-from lammps_inelastic import core
-from reference_solver import reference
+from tests.core.reference_solver import reference
 
 # [diameters] A ten-thousand-millionth of one step's motion, not far above what float64 resolves.
 TOLERANCE = 1e-13
@@ -68,7 +68,7 @@ PROBLEMS = {
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_velocities_of_an_interior_point_method(name):
+def test_velocities_of_an_interior_point_method(name: str) -> None:
     given = PROBLEMS[name]
     velocity, _ = reference(given)
     projection = given.project(TOLERANCE)
@@ -78,7 +78,7 @@ def test_velocities_of_an_interior_point_method(name):
 
 
 @pytest.mark.parametrize("name", [name for name in PROBLEMS if "overlapping" in name])
-def test_impulses_of_an_interior_point_method(name):
+def test_impulses_of_an_interior_point_method(name: str) -> None:
     # Only where they are unique: the pressed contacts are independent.
     given = PROBLEMS[name]
     _, impulse = reference(given)
@@ -91,7 +91,7 @@ def test_impulses_of_an_interior_point_method(name):
 
 
 @pytest.mark.parametrize("name", ["overlapping 0", "mixed, frozen 0"])
-def test_uzawa_gives_the_same_velocities(name):
+def test_uzawa_gives_the_same_velocities(name: str) -> None:
     given = PROBLEMS[name]
     velocity, _ = reference(given)
     projection = given.project(TOLERANCE, solver="uzawa")
@@ -116,14 +116,14 @@ def largest_eigenvalue(given: Problem) -> float:
     ids=[*(name for name in PROBLEMS if "overlapping" not in name)]
     + [f"column of {count}" for count in (3, 10, 30, 100)],
 )
-def test_largest_eigenvalue(given):
+def test_largest_eigenvalue(given: Problem) -> None:
     estimate = largest_eigenvalue(given)
     exact = np.linalg.eigvalsh(given.delassus())[-1]
     # A Rayleigh quotient is never above the largest eigenvalue, except for rounding.
     assert (1 - EIGENVALUE_ACCURACY) * exact <= estimate <= (1 + 1e-13) * exact
 
 
-def test_largest_eigenvalues_known_by_hand():
+def test_largest_eigenvalues_known_by_hand() -> None:
     timestep = 0.01
     one = problem([(0, 0, 0)], [4], [(0, -1, (0, 0, 1), 0)])
     assert_within(largest_eigenvalue(one), timestep / 4, 1e-17)  # one rounding of 0.0025
@@ -134,7 +134,7 @@ def test_largest_eigenvalues_known_by_hand():
     assert largest_eigenvalue(problem([], [], [])) == 0
 
 
-def test_largest_eigenvalue_of_one_contact_among_many():
+def test_largest_eigenvalue_of_one_contact_among_many() -> None:
     # Its share of the start vector is below 1e-4, the change of the estimate to stop at.
     pairs = 20_000
     contacts = [(2 * k, 2 * k + 1, (0, 0, 1), 0) for k in range(pairs)]

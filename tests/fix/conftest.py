@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lammps_run import Run, Runner, run_lmp
+from tests.fix.lammps_run import Run, Runner, run_lmp
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 GRAVITY = 9.81
 DEFAULT_BOX = ((0.0, 1.0), (0.0, 5.0), (0.0, 1.0))
 CONTACT_NAMES = "id1 id2 x y z nx ny nz gap force"
-# Every step, the columns of shared conventions.
+# The columns that the shipped decks write, at every step.
 DUMP_PARTICLES = """
 dump particles all custom 1 particles.dump id type x y z vx vy vz radius
 dump_modify particles sort id format float %.17g

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lammps_run import OF_A_LAUNCHER
+from tests.fix.lammps_run import OF_A_LAUNCHER
 
 SERVER = Path(__file__).with_name("argument_server.py")
 # [s] An answer takes 0.01.
@@ -162,6 +162,7 @@ def test_right_arguments_in_any_order(tolerance: str, chosen: list[str], server:
     assert_runs(server.ask(commands), commands)
 
 
+@pytest.mark.slow
 @FUZZED
 @given(
     tolerance=st.sampled_from(LENGTHS),
@@ -187,6 +188,7 @@ def test_a_wrong_tolerance(tolerance: str, server: Server) -> None:
         assert_one_clear_error(server.ask(commands)["error"])
 
 
+@pytest.mark.slow
 @FUZZED
 @given(
     words=st.lists(

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lammps_run import Runner
-from scenes import (
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DUMP_PARTICLES,
     deepest_in_box,
     deepest_pair,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     BENT,
     BODY_THERMO,
     DUMP_BODY_SPHERES,
@@ -19,8 +19,8 @@ from bodies import (
     placed,
     random_bodies,
 )
-from lammps_run import Runner
-from scenes import deepest_in_box, deepest_pair, mass, read_dump
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import deepest_in_box, deepest_pair, mass, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS
@@ -38,6 +38,7 @@ ENERGY = (
 AT_REST = 20 * EPS / STEP
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize(
     "shapes",
@@ -197,6 +198,7 @@ def fix_first(deck: str) -> str:
     return "".join([before, scene, fix, options, end, run, diameters, deleted, after])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_from_a_file_written_while_a_run_pushes_apart(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     BENT,
     DUMP_BODY_SPHERES,
     INERTIAS,
@@ -23,8 +23,8 @@ from bodies import (
     random_bodies,
     rigid_velocities,
 )
-from lammps_run import Runner, run_lmp
-from scenes import DIVISIONS, FloatArray, deepest_pair, read_dump
+from tests.fix.lammps_run import Runner, run_lmp
+from tests.fix.scenes import DIVISIONS, FloatArray, deepest_pair, read_dump
 
 RADIUS = 0.055
 EXACT = 5e-9 * RADIUS
@@ -80,10 +80,11 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, FloatArra
 
 
 def assert_same(positions: FloatArray, others: FloatArray) -> None:
-    """Compare within the design's equality."""
+    """Fail where a sphere is further than SAME from where it should be on an axis."""
     assert np.abs(positions - others).max() <= SAME
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize(
     "runs",
@@ -159,6 +160,7 @@ def test_from_a_file(
     assert_same(last_positions(tmp_path), undisturbed[inertia])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "inertia"),
     [("runs", "point"), ("runs", "solid"), ("restart", "point"), ("data", "solid")],
@@ -200,6 +202,7 @@ def test_a_tumbling_body_goes_on_tumbling(
     assert last_positions(tmp_path) == pytest.approx(expected, abs=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DIVISIONS)
 def test_the_division_does_not_matter(
     name: str, undisturbed: dict[str, FloatArray], tmp_path: Path, lmp: Runner
@@ -240,6 +243,7 @@ def drifting(folder: Path, inertia: str, eps: float, setup: str) -> tuple[str, B
     return deck, bodies
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize("newton", ["on", "off"])
 def test_periodic_sides(inertia: str, newton: str, tmp_path: Path, lmp: Runner) -> None:

@@ -14,7 +14,7 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from lammps_run import Runner
+from tests.fix.lammps_run import Runner
 
 STEPS = {
     "steps_agitated": 100,
@@ -45,6 +45,8 @@ CASES = {
         3,
     ),
 }
+# The others see two ranks, and dimers, too.
+SLOW = {"dimers, 2 ranks", "nearly spheres"}
 TRIMER = """# bent trimer, lengths in diameters
 
 3 atoms
@@ -67,7 +69,9 @@ def deck(name: str) -> str:
     return (files("lammps_inelastic.inputs") / name).read_text()
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=pytest.mark.slow if case in SLOW else ()) for case in CASES]
+)
 def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
     """Bodies fall and settle; the dumps hold every sphere, and overlaps stay within two tolerances.
 

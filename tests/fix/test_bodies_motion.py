@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from bodies import (
+from tests.fix.bodies import (
     BENT,
     BODY_THERMO,
     DUMP_BODIES,
@@ -24,8 +24,16 @@ from bodies import (
     placed,
     rigid_velocities,
 )
-from lammps_run import Runner
-from scenes import DUMP_PARTICLES, GRAVITY, FloatArray, mass, random_points, read_dump, scene
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
+    DUMP_PARTICLES,
+    GRAVITY,
+    FloatArray,
+    mass,
+    random_points,
+    read_dump,
+    scene,
+)
 
 RADIUS = 0.055
 STEP = 0.005
@@ -110,6 +118,7 @@ def test_what_a_collision_conserves(
     assert energy[-1] < 0.9 * energy[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 def test_bodies_stay_rigid(inertia: str, tmp_path: Path, lmp: Runner) -> None:
     both, velocities, spins = about_to_collide("rod-and-tetrahedron", 1)
@@ -217,6 +226,7 @@ def sliding(
     return positions, np.array([forces(state)[2] for state in solution.y.T])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 def test_a_body_that_slides_on_the_floor_converges(
     inertia: str, tmp_path: Path, lmp: Runner

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     DUMP_BODY_SPHERES,
     INERTIAS,
     ROD,
@@ -20,8 +20,8 @@ from bodies import (
     random_bodies,
     rigid_velocities,
 )
-from lammps_run import Runner
-from scenes import FloatArray, deepest_in_box, deepest_pair, read_dump
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import FloatArray, deepest_in_box, deepest_pair, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS
@@ -123,9 +123,11 @@ def overlaps(folder: Path, container: str) -> tuple[FloatArray, FloatArray]:
 @pytest.mark.parametrize(
     ("container", "inertia", "speed"),
     [
-        pytest.param("block", "point", 0, id="block-point-fall"),
-        pytest.param("cylinder", "solid", 0, id="cylinder-solid-fall"),
-        pytest.param("cylinder", "point", 60, id="cylinder-point-ten-times-the-speed"),
+        pytest.param("block", "point", 0, marks=pytest.mark.slow, id="block-point-fall"),
+        pytest.param("cylinder", "solid", 0, marks=pytest.mark.slow, id="cylinder-solid-fall"),
+        pytest.param(
+            "cylinder", "point", 60, marks=pytest.mark.slow, id="cylinder-point-ten-times-the-speed"
+        ),
         pytest.param("block", "solid", 60, id="block-solid-ten-times-the-speed"),
     ],
 )
@@ -156,6 +158,7 @@ def test_fall_impact_and_rest(
     assert result.thermo["f_contact[6]"].max() > 15
 
 
+@pytest.mark.slow
 def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
     """Steps that are far too long, and may not be shortened."""
     largest = 0.0

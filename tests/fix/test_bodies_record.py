@@ -11,15 +11,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy import sparse
 
-from bodies import (
+from tests.fix.bodies import (
     DUMP_BODY_SPHERES,
     TETRAHEDRON,
     body_scene,
     dimer,
     random_bodies,
 )
-from lammps_run import Runner
-from scenes import FloatArray, mass, read_dump
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import FloatArray, mass, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS
@@ -240,6 +240,7 @@ def test_what_a_record_holds(name: str, ranks: int, tmp_path: Path, lmp: Runner)
 PHASES = {"falling": 10, "impact": 50, "rest": 300}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_an_independent_solver_agrees(name: str, tmp_path: Path, lmp: Runner) -> None:
     """Falling, on impact and at rest, to 1e-6 of the largest predicted velocity."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     BENT,
     DUMP_BODY_SPHERES,
     INERTIAS,
@@ -22,8 +22,8 @@ from bodies import (
     random_bodies,
     rigid_velocities,
 )
-from lammps_run import Runner
-from scenes import mass, read_dump
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import mass, read_dump
 
 RADIUS = 0.05
 EPS = 0.0005 * RADIUS

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodies import (
+from lammps_inelastic.analysis import iterate_contact_frames
+from tests.fix.bodies import (
     DUMP_BODIES,
     DUMP_BODY_SPHERES,
     INERTIAS,
@@ -21,9 +22,8 @@ from bodies import (
     random_bodies,
     rigid_velocities,
 )
-from lammps_inelastic.analysis import iterate_contact_frames
-from lammps_run import Runner
-from scenes import (
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DUMP_CONTACTS,
     DUMP_FORCES,
     GRAVITY,

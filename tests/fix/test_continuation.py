@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from lammps_run import Runner, run_lmp
-from scenes import (
+from tests.fix.lammps_run import Runner, run_lmp
+from tests.fix.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     FloatArray,
@@ -60,7 +60,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> FloatArray:
 
 
 def assert_same(positions: FloatArray, others: FloatArray) -> None:
-    """Compare within the design's equality."""
+    """Fail where a sphere is further than SAME from where it should be on an axis."""
     assert np.abs(positions - others).max() <= SAME
 
 
@@ -109,7 +109,7 @@ def simulated(
     runs: list[tuple[int, float]],
     tolerance: float,
 ) -> list[FloatArray]:
-    """Return the positions at every step, computed with the scheme of the design alone.
+    """Return the positions at every step, computed by the equations of a step alone.
 
     Each run is a number of steps and a time step. LAMMPS holds whole-step velocities between runs.
     """
@@ -240,6 +240,7 @@ def test_a_restart_in_the_midst_of_pushing_apart_keeps_no_speed(
     assert result.thermo["f_contact[4]"][-1] <= 1e-5 * (1 + 1e-6)  # round-off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("step", [1, 2, 3])
 def test_from_a_file_written_while_a_run_pushes_apart(

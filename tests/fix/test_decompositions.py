@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bodies import body_scene, dimer, random_bodies
 from lammps_inelastic.analysis import iterate_contact_frames
-from lammps_run import Runner
-from scenes import (
+from tests.fix.bodies import body_scene, dimer, random_bodies
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DIVISIONS,
     DUMP_CONTACTS,
     DUMP_FORCES,
@@ -28,7 +28,7 @@ RADIUS = 0.06
 EPS = 0.0005 * RADIUS
 SLACK = 1 + 1e-6  # round-off of positions
 # Summation orders differ between decompositions; contacts amplify that. At this tolerance 80 steps
-# agree within SAME .
+# agree within SAME, the tolerance of a deck.
 EXACT = 5e-9 * RADIUS
 SAME = 0.0005 * RADIUS
 
@@ -144,7 +144,7 @@ def test_atoms_outside_the_group_are_ignored(tmp_path: Path, lmp: Runner) -> Non
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
     """Return the bed's frames on one rank, with LAMMPS's defaults."""
-    from lammps_run import run_lmp
+    from tests.fix.lammps_run import run_lmp
 
     folder = tmp_path_factory.mktemp("reference")
     deck = scene(bed(), RADIUS, folder, tolerance=EXACT, box=BOX)
@@ -153,6 +153,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
     return read_dump(folder / "particles.dump")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DIVISIONS)
 def test_the_division_does_not_matter(
     name: str, reference: list[Frame], tmp_path: Path, lmp: Runner

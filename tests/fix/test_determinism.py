@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from bodies import INERTIAS, body_scene, dimer, random_bodies
-from lammps_run import Runner
-from scenes import DUMP_CONTACTS, DUMP_FORCES, DUMP_PARTICLES, random_points, scene
+from tests.fix.bodies import body_scene, dimer, random_bodies
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import DUMP_CONTACTS, DUMP_FORCES, DUMP_PARTICLES, random_points, scene
 
 RADIUS = 0.06
 EPS = 0.0005 * RADIUS
@@ -62,7 +62,9 @@ def digest(folder: Path, screen: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("kind", ["spheres", *INERTIAS])
+@pytest.mark.parametrize(
+    "kind", ["spheres", pytest.param("point", marks=pytest.mark.slow), "solid"]
+)
 def test_the_same_bytes_twice(kind: str, ranks: int, tmp_path: Path, lmp: Runner) -> None:
     found = []
     for name in ("one", "other"):

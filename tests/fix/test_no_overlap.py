@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lammps_inelastic.analysis import largest_pair_overlap
-from lammps_run import Run, Runner
-from scenes import (
+from tests.fix.lammps_run import Run, Runner
+from tests.fix.scenes import (
     DUMP_CONTACTS,
     DUMP_PARTICLES,
     GRAVITY,
@@ -26,7 +26,7 @@ from scenes import (
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS
-# Positions are doubles: the slack that the issue allows.
+# Positions are doubles: overlaps are as deep as the tolerance up to round-off.
 SLACK = 1 + 1e-6
 CENTRES = ((0.06, 0.94), (0.06, 4.9), (0.06, 0.94))
 
@@ -70,9 +70,9 @@ def test_own_formula_agrees_with_the_analysis() -> None:
     [
         pytest.param(0.005, 0, "", 0.11, 300, id="fall"),
         pytest.param(0.02, 0, "", 0.5, 100, id="four-times-the-step"),
-        pytest.param(0.005, 100, "", 0.9, 200, id="ten-times-the-speed"),
+        pytest.param(0.005, 100, "", 0.9, 200, marks=pytest.mark.slow, id="ten-times-the-speed"),
         pytest.param(0.005, 100, "shorten yes", 0.11, 250, id="ten-times-the-speed-shortened"),
-        pytest.param(0.005, 0, "solver uzawa", 0.11, 220, id="uzawa"),
+        pytest.param(0.005, 0, "solver uzawa", 0.11, 220, marks=pytest.mark.slow, id="uzawa"),
     ],
 )
 def test_fall_impact_and_rest(
@@ -196,7 +196,9 @@ def points_in_container(name: str, number: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("name", CONTAINERS)
-@pytest.mark.parametrize("speed", [0, 20, 80])
+@pytest.mark.parametrize(
+    "speed", [0, pytest.param(20, marks=pytest.mark.slow), pytest.param(80, marks=pytest.mark.slow)]
+)
 def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
     regions, names, depth = CONTAINERS[name]
     random = np.random.default_rng(7)
@@ -223,6 +225,7 @@ def test_inside_concave_walls(name: str, speed: float, tmp_path: Path, lmp: Runn
     assert result.thermo["KinEng"].max() <= result.thermo["KinEng"][0] + potential
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CONTAINERS)
 def test_concave_walls_only_take_energy(name: str, tmp_path: Path, lmp: Runner) -> None:
     regions, names, _ = CONTAINERS[name]
@@ -320,6 +323,7 @@ def test_flat_faces_hold_a_sphere(
     assert contact.vectors("nx ny nz")[0] == pytest.approx(-pull, abs=1e-15)  # round-off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("region", "wall", "axis", "sign", "distance"), FACES)
 def test_faces_of_a_turned_region(
     region: str, wall: int, axis: int, sign: int, distance: float, tmp_path: Path, lmp: Runner
@@ -550,7 +554,7 @@ OBSTACLES = {
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-@pytest.mark.parametrize("speed", [0, 60])
+@pytest.mark.parametrize("speed", [0, pytest.param(60, marks=pytest.mark.slow)])
 def test_convex_obstacles(name: str, speed: float, tmp_path: Path, lmp: Runner) -> None:
     region, depth = OBSTACLES[name]
     deck = scene(
@@ -646,7 +650,7 @@ def test_a_frozen_sphere_that_moves_pushes(tmp_path: Path, lmp: Runner) -> None:
         tmp_path,
         tolerance=EPS,
         gravity=False,
-        velocities=[[0.5, 0, 0], [0, 0, 0]],
+        velocities=[[0.5, 0.0, 0.0], [0.0, 0.0, 0.0]],
         options="region container frozen pusher",
         motion="group pusher id 1\ngroup free id 2\nfix push pusher move linear 0.5 0 0\n"
         "fix motion free nve",

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from bodies import body_scene, dimer, placed
-from lammps_run import BIN, OF_A_LAUNCHER, Runner
-from scenes import scene
-from test_plugin import ELSEWHERE, HERE, plugin_file
-from test_refusals import BOX, EPS, POINTS, RADIUS, deck
+from tests.fix.bodies import body_scene, dimer, placed
+from tests.fix.lammps_run import BIN, OF_A_LAUNCHER, Runner
+from tests.fix.scenes import scene
+from tests.fix.test_plugin import ELSEWHERE, HERE, plugin_file
+from tests.fix.test_refusals import BOX, EPS, POINTS, RADIUS, deck
 
 Refused = Callable[..., str]
 # [s] A run takes one; a rank that waited for another would wait for ever.

@@ -7,7 +7,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import pytest
 
 from lammps_inelastic.workflow.decks import Rule, as_value, find_deck, read_rule
 from lammps_inelastic.workflow.shipped import DECKS
-from lammps_run import OF_A_LAUNCHER, Runner, run_lmp
+from tests.fix.lammps_run import OF_A_LAUNCHER, Runner, run_lmp
 
 SERVER = Path(__file__).with_name("table_server.py")
 TABLE = re.compile(r'^parameters """\n(.*?)"""', re.MULTILINE | re.DOTALL)
@@ -69,7 +69,7 @@ def ask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ask]:
         answers: list[str] = json.loads(line)
         return answers
 
-    run.folder = folder  # type: ignore[attr-defined]
+    run.folder = folder
     yield run
     process.kill()
     process.communicate()
@@ -390,13 +390,13 @@ Parameters (* is not the default):
   * start     there.data default random
     out       out
 """
-    folder = ask.folder  # type: ignore[attr-defined]
+    folder = ask.folder
     assert (folder / "first.log").read_text().count(listed) == 1
     assert (folder / "second.log").read_text().count(listed) == 1
 
 
 def test_a_folder_is_made_only_if_all_else_is_right(ask: Ask) -> None:
-    folder = ask.folder  # type: ignore[attr-defined]
+    folder = ask.folder
     assert ask([SMALL], "-var", "out", "not/yet", "-var", "seed", "0") != [""]
     assert not (folder / "not").exists()
     assert ask([SMALL], "-var", "out", "not/yet") == [""]
@@ -457,12 +457,14 @@ def test_parameters_that_do_not_go_together(
 COORDINATES = [(-0.6, 0, 0), (0, 0.3, 0), (0.6, 0, 0)]
 
 
-def shape(coordinates: list[tuple[object, ...]], section: str = "", rows: object = ()) -> str:
+def shape(
+    coordinates: Sequence[tuple[object, ...]], section: str = "", rows: Iterable[object] = ()
+) -> str:
     """A molecule file with these coordinates, and with a section of one value an atom."""
-    sections = {
+    sections: dict[str, Sequence[tuple[object, ...]]] = {
         "Coords": coordinates,
         "Types": [(1,)] * len(coordinates),
-        **({section: [(value,) for value in rows]} if section else {}),  # type: ignore[attr-defined]
+        **({section: [(value,) for value in rows]} if section else {}),
     }
     text = f"# Shape\n\n{len(coordinates)} atoms\n"
     for name, values in sections.items():

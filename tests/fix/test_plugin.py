@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from lammps_run import Runner
+from tests.fix.lammps_run import LAUNCHER, Runner
 
 HERE = b"stable_22Jul2025_update4"
 ELSEWHERE = b"stable_22Jul2025_update2"
@@ -19,7 +19,7 @@ def plugin_file() -> Path:
 
 def test_found_without_a_plugin_command(lmp: Runner) -> None:
     """`lmp` knows both fixes at once."""
-    listed = lmp("plugin list").screen
+    listed = lmp("plugin list", program=LAUNCHER).screen
     assert "fix style plugin inelastic" in listed
     assert "fix style plugin random/force" in listed
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from lammps_run import Runner
-from scenes import (
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     FloatArray,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from lammps_run import Runner
-from scenes import (
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DUMP_PARTICLES,
     deepest_in_box,
     deepest_pair,
@@ -260,6 +261,7 @@ def test_a_tolerance_below_round_off(ranks: int, tmp_path: Path, refused: Refuse
     assert "below the round-off of positions" in refused(text, ranks=ranks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_list_that_does_not_reach(
     ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
@@ -359,7 +361,7 @@ def test_a_union_seen_from_outside(ranks: int, tmp_path: Path, refused: Refused)
     assert "list the parts instead" in error, error
 
 
-MESSAGES = {
+MESSAGES: dict[str, tuple[dict[str, Any], list[str]]] = {
     "a force that is not finite": (
         {"fixes": "variable f atom (id==1)*1e305\nfix blow all addforce v_f 0 0"},
         ["the force on atom 1 is not a finite number"],

@@ -16,7 +16,7 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from lammps_run import Runner, run_lmp
+from tests.fix.lammps_run import Runner, run_lmp
 
 PARTICLES, RADIUS = 250, 0.055
 PACKING = {
@@ -92,6 +92,7 @@ def test_a_data_file_is_a_start(packing: Path, lmp: Runner) -> None:
     frame = read_particle_frame(result.folder / "out" / "particles.lammpsdump", 0)
     before = read_particle_frame(packing.with_name("particles.lammpsdump"))
     # Nothing overlaps, so nothing is pushed: only what the packing still moved goes on for a step.
+    assert before.velocities is not None
     motion = 2 * 0.01 * np.abs(before.velocities).max()
     assert frame.positions == pytest.approx(before.positions, abs=motion)
     assert motion < 0.1 * RADIUS

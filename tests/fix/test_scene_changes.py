@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from lammps_run import Run, Runner
-from scenes import (
+from tests.fix.lammps_run import Run, Runner
+from tests.fix.scenes import (
     DUMP_CONTACTS,
     DUMP_PARTICLES,
     deepest_pair,
@@ -26,8 +26,11 @@ SLACK = 1 + 1e-6  # round-off of positions
 Refused = Callable[..., str]
 
 
-def pair(folder: Path, **options: object) -> str:
-    """Return two spheres at rest, a small gap apart, in a periodic box without forces."""
+def pair(folder: Path, largest: float = 2 * RADIUS, **options: object) -> str:
+    """Return two spheres at rest, a small gap apart, in a periodic box without forces.
+
+    `largest` is the diameter up to which they may grow.
+    """
     defaults: dict[str, object] = {
         "tolerance": EPS,
         "box": ((0, 1), (0, 1), (0, 1)),
@@ -36,7 +39,8 @@ def pair(folder: Path, **options: object) -> str:
         "options": "shorten yes",
     }
     centres = [[0.4, 0.5, 0.5], [0.4 + 2.02 * RADIUS, 0.5, 0.5]]
-    return scene(centres, RADIUS, folder, **(defaults | options))  # type: ignore[arg-type]
+    text = scene(centres, RADIUS, folder, **(defaults | options))  # type: ignore[arg-type]
+    return text.replace(f"pair_style zero {2 * RADIUS}", f"pair_style zero {largest}")
 
 
 # Buffers of LAMMPS
@@ -151,11 +155,11 @@ def test_radii_grown_between_runs(tmp_path: Path, lmp: Runner) -> None:
     """What the page says to do instead: a short run pushes apart what has grown before it."""
     text = pair(
         tmp_path,
+        largest=0.12,
         style="atom_style sphere 1",
         setup="variable wide equal 0.1*(1+0.001*step)",
         fixes="fix grow all adapt 0 atom diameter v_wide mass no",
     )
-    text = text.replace("pair_style zero 0.1", "pair_style zero 0.12")
     result = lmp(text + DUMP_PARTICLES + "run 5\n" * 20)
     last = read_dump(tmp_path / "particles.dump")[-1]
     assert last["radius"] == pytest.approx(0.05 * 1.095, rel=1e-12)
@@ -276,11 +280,11 @@ def test_an_overlap_that_appears_between_runs(
 ) -> None:
     text = pair(
         tmp_path,
+        largest=0.14,
         setup="region walls plane 0.01 0 0 1 0 0",
         options="region walls shorten yes",
         fixes="group second id 2",
     )
-    text = text.replace("pair_style zero 0.1", "pair_style zero 0.14")
     result = lmp(text + f"run 5\n{change}\nrun 20\n", ranks=ranks)
     (warning,) = warned(result)
     assert re.search(f"step 5: {who}", warning), warning

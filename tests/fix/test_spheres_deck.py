@@ -13,7 +13,7 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from lammps_run import Runner
+from tests.fix.lammps_run import LAUNCHER, Runner
 
 VARIABLES = {
     "steps_agitated": 300,
@@ -32,7 +32,7 @@ def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
     communication buffers.
     """
     deck = (files("lammps_inelastic.inputs") / "spheres.in").read_text()
-    result = lmp(deck, ranks=ranks, variables=VARIABLES)
+    result = lmp(deck, ranks=ranks, variables=VARIABLES, program=LAUNCHER)
     assert not result.warnings, result.warnings
     frame = read_particle_frame(result.folder / "out" / "particles.lammpsdump")
     assert frame.step == 348

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from lammps_run import Runner
-from scenes import (
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
     DEFAULT_BOX,
     DUMP_CONTACTS,
     DUMP_FORCES,
@@ -299,7 +299,7 @@ def test_boxes_walls_and_their_sum_balance_the_weight_at_rest(tmp_path: Path, lm
     )
     result = lmp(deck + "thermo 50\nrun 600\n")
     wall = {name: values[-1] for name, values in result.thermo.items()}
-    weight = 30 * mass(0.08) * GRAVITY
+    weight = float(30 * mass(0.08) * GRAVITY)
     # Slow motion is left after 3 time units: a hundredth of the weight is far above it.
     assert wall["v_wy3"] == pytest.approx(-weight, rel=0.01)
     assert wall["v_wy4"] == 0

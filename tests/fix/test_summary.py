@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from lammps_run import Runner
-from test_record import pile
+from tests.fix.lammps_run import Runner
+from tests.fix.test_record import pile
 
 PHASES = ("collect", "solve", "communicate", "check", "apply")
 

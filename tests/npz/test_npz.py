@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from building import REPOSITORY, cmake, generator, run
+from tests.building import REPOSITORY, cmake, generator, run
 
 # As in npz_test.cpp.
 ARRAYS = {

@@ -1,8 +1,8 @@
 """Random scenes for fix inelastic, one after the other, each checked.
 
-python tests/random_scenes --minutes 20 --seed 1000     seeds from 1000 on, for 20 minutes
-python tests/random_scenes --scenes 100 --sanitize      100 scenes, under the address sanitizer
-python tests/random_scenes --seed 17 --scenes 1         one again; its files are kept
+python -m tests.random_scenes --minutes 20 --seed 1000     seeds from 1000 on, for 20 minutes
+python -m tests.random_scenes --scenes 100 --sanitize      100 scenes, under the address sanitizer
+python -m tests.random_scenes --seed 17 --scenes 1         one again; its files are kept
 """
 
 from __future__ import annotations
@@ -14,14 +14,11 @@ import time
 from collections import Counter
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parent / "fix")]
-
-from scene_loop import Programs, Verdict, installed, judge, sanitized, summary  # noqa: E402
+from tests.random_scenes.scene_loop import Programs, Verdict, installed, judge, sanitized, summary
 
 
 def options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python tests/random_scenes", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.random_scenes", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("--seed", type=int, default=0, help="the first seed (0)")
     parser.add_argument("--scenes", type=int, help="how many")

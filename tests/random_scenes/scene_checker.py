@@ -27,10 +27,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from scene_generator import BODY_COLUMNS, CONTACTS, FROZEN, OUTSIDE
-from scene_walls import FloatArray, Shape, View, moves, turns, views
+from tests.random_scenes.scene_generator import BODY_COLUMNS, CONTACTS, FROZEN, OUTSIDE
+from tests.random_scenes.scene_walls import Shape, View, moves, turns, views
+
+# Numbers, indices or flags.
+Array = NDArray[Any]
 
 # Of lengths and forces that are sums of some terms of that size; doubles have 1.1e-16.
 ROUND_OFF = 1e-12
@@ -73,11 +77,11 @@ class Table:
     """One frame of a dump."""
 
     step: int
-    box: FloatArray
+    box: Array
     columns: dict[str, int]
-    rows: FloatArray
+    rows: Array
 
-    def __getitem__(self, names: str) -> FloatArray:
+    def __getitem__(self, names: str) -> Array:
         """One column, or several side by side."""
         wanted = [self.columns[name] for name in names.split()]
         return self.rows[:, wanted[0]] if len(wanted) == 1 else self.rows[:, wanted]
@@ -165,40 +169,40 @@ class _Frame:
     """One step: what was read, and what follows from it."""
 
     step: int
-    x: FloatArray
-    v: FloatArray
-    force: FloatArray
-    before: FloatArray
-    radius: FloatArray
-    mass: FloatArray
-    id: FloatArray
-    kind: FloatArray
-    molecule: FloatArray
+    x: Array
+    v: Array
+    force: Array
+    before: Array
+    radius: Array
+    mass: Array
+    id: Array
+    kind: Array
+    molecule: Array
     h: float
     time: float
-    periods: FloatArray
+    periods: Array
     thermo: dict[str, float]
     first: bool
     deepest: float = 0.0
     # Momentum, as a velocity, of free spheres, and of bodies in the order of their dump.
-    momentum: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    body_v: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    body_l: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    momentum: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    body_v: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    body_l: Array = field(default_factory=lambda: np.zeros((0, 3)))
     # By how much these may be off.
-    body_slack: tuple[FloatArray, FloatArray] = (np.zeros(0), np.zeros(0))
+    body_slack: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
     bodies: Table | None = None
     # The list, the linearised gaps at the end of the step, and where these are exact.
     listed: dict[str, Any] | None = None
-    ends: FloatArray = field(default_factory=lambda: np.zeros(0))
-    plain: FloatArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    ends: Array = field(default_factory=lambda: np.zeros(0))
+    plain: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
     # No bad overlap now and in the frame before; none now; the last frame of a run.
     quiet: bool = False
     settled: bool = True
     final: bool = False
     # Momentum without what pushes apart, for bodies; the largest that free spheres had meanwhile.
-    kept_v: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    kept_l: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    momentum_size: FloatArray = field(default_factory=lambda: np.zeros(0))
+    kept_v: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    kept_l: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    momentum_size: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class _Part:
@@ -275,7 +279,7 @@ class _Part:
     def wrong(self, kind: str, what: str) -> None:
         self.report.wrong(kind, self.where, what)
 
-    def close(self, kind: str, a: FloatArray, b: FloatArray, allowed: Any, ids: Any = None) -> None:
+    def close(self, kind: str, a: ArrayLike, b: ArrayLike, allowed: Any, ids: Any = None) -> None:
         """Note where two arrays differ by more than is allowed; `ids` names the rows."""
         off = np.abs(np.asarray(a) - np.asarray(b))
         beyond = ~(off <= allowed)
@@ -294,7 +298,7 @@ class _Part:
         """The largest length there is: positions are known to a part of it."""
         return float(np.abs(frame.x).max() + frame.radius.max() + frame.periods.max())
 
-    def apart(self, frame: _Frame, i: Any, j: Any) -> FloatArray:
+    def apart(self, frame: _Frame, i: Any, j: Any) -> Array:
         """Vector from the nearest image of j to i."""
         away = frame.x[i] - frame.x[j]
         for axis, period in enumerate(frame.periods):
@@ -302,7 +306,7 @@ class _Part:
                 away[..., axis] -= period * np.rint(away[..., axis] / period)
         return np.asarray(away)
 
-    def gaps(self, frame: _Frame) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def gaps(self, frame: _Frame) -> tuple[Array, Array, Array]:
         """Pairs that see each other, with their gaps."""
         i, j = np.triu_indices(len(frame.x), 1)
         seen = (frame.kind[i] != OUTSIDE) & (frame.kind[j] != OUTSIDE)
@@ -312,7 +316,7 @@ class _Part:
         gap = np.linalg.norm(self.apart(frame, i, j), axis=1) - frame.radius[i] - frame.radius[j]
         return i, j, gap
 
-    def movable(self, frame: _Frame) -> FloatArray:
+    def movable(self, frame: _Frame) -> Array:
         """Indices of the spheres that walls hold back."""
         return np.flatnonzero((frame.kind != OUTSIDE) & (frame.kind != FROZEN))
 
@@ -356,10 +360,10 @@ class _Part:
         kind: str,
         frame: _Frame,
         last: _Frame | None,
-        i: FloatArray,
-        j: FloatArray,
-        depth: FloatArray,
-        bound: FloatArray,
+        i: Array,
+        j: Array,
+        depth: Array,
+        bound: Array,
         shape: Shape | None = None,
     ) -> None:
         """Overlaps beyond the bound are those of the frame before, and no deeper."""
@@ -421,7 +425,7 @@ class _Part:
         depth = sizes - np.linalg.norm(self.apart(frame, one, other), axis=1)
         return bool((depth > ENTANGLED * sizes).any())
 
-    def pair(self, frame: _Frame, i: FloatArray, j: FloatArray, k: int, depth: float) -> str:
+    def pair(self, frame: _Frame, i: Array, j: Array, k: int, depth: float) -> str:
         second = int(frame.id[j[k]]) if j[k] >= 0 else f"wall {-int(j[k])}"
         return (
             f"{int(frame.id[i[k]])} and {second} overlap by {depth:.6g} = {depth / self.eps:.4g} "
@@ -430,7 +434,7 @@ class _Part:
 
     # --- the list of contacts
 
-    def contacts(self, frame: _Frame, rows: Table) -> dict[str, FloatArray] | None:
+    def contacts(self, frame: _Frame, rows: Table) -> dict[str, Array] | None:
         """(e) Check each row; return the list with indices instead of IDs."""
         index = {int(name): k for k, name in enumerate(frame.id)}
         first, second = rows["id1"].astype(int), rows["id2"].astype(int)
@@ -499,14 +503,14 @@ class _Part:
         self.wall_contacts(frame, listed)
         return listed
 
-    def seen_by(self, shape: Shape, number: int, x: FloatArray, time: float) -> View | None:
+    def seen_by(self, shape: Shape, number: int, x: Array, time: float) -> View | None:
         """The view of one wall of a shape, if it has that wall."""
         for view in views(shape, x, time):
             if view.number == number:
                 return view
         return None
 
-    def wall_contacts(self, frame: _Frame, listed: dict[str, FloatArray]) -> None:
+    def wall_contacts(self, frame: _Frame, listed: dict[str, Array]) -> None:
         """Normals and gaps of walls, where these are not tangent planes added for the end."""
         slack = 10 * ROUND_OFF * self.lengths(frame)
         for row in np.flatnonzero(~listed["pair"]):
@@ -531,7 +535,7 @@ class _Part:
 
     # --- forces
 
-    def forces(self, frame: _Frame, table: Table, listed: dict[str, FloatArray]) -> None:
+    def forces(self, frame: _Frame, table: Table, listed: dict[str, Array]) -> None:
         """(e, g, h) Counts and forces of spheres and walls are those of the list."""
         count = len(frame.x)
         i, j, pair = listed["i"], listed["j"], listed["pair"]
@@ -559,7 +563,7 @@ class _Part:
             allowed = ROUND_OFF * (listed["force"][mine].sum() + 1e-300)
             self.close("force on a wall", given, -push[mine].sum(axis=0), allowed)
 
-    def virial(self, frame: _Frame, table: Table, listed: dict[str, FloatArray]) -> None:
+    def virial(self, frame: _Frame, table: Table, listed: dict[str, Array]) -> None:
         """(f) Of the whole and of each sphere, half of a pair's to either."""
         i, j, pair, n = listed["i"], listed["j"], listed["pair"], listed["n"]
         arm = frame.radius[i] + listed["gap"] + np.where(pair, frame.radius[j], 0.0)
@@ -588,7 +592,7 @@ class _Part:
 
     # --- motion
 
-    def motion(self, new: _Frame, last: _Frame | None, listed: dict[str, FloatArray]) -> None:
+    def motion(self, new: _Frame, last: _Frame | None, listed: dict[str, Array]) -> None:
         """(b, c, d) Momentum, energy and complementarity of the step that begins here."""
         residual = new.thermo["f_contact[2]"]
         if self.facts["solver"] != "uzawa":
@@ -690,7 +694,7 @@ class _Part:
         slack = ROUND_OFF * (sizes + 1e-300)[:, None]
         self.close("velocity", now[alone], after[alone], slack[alone], new.id[alone])
 
-    def inertia(self, frame: _Frame, mine: FloatArray, arm: FloatArray) -> FloatArray:
+    def inertia(self, frame: _Frame, mine: Array, arm: Array) -> Array:
         """Moments of a body about its centre of mass."""
         m = frame.mass[mine]
         moments = np.eye(3) * (m * (arm**2).sum(axis=1)).sum() - (arm * m[:, None]).T @ arm
@@ -698,16 +702,14 @@ class _Part:
             moments += np.eye(3) * (0.4 * m * frame.radius[mine] ** 2).sum()
         return np.asarray(moments)
 
-    def spin(
-        self, frame: _Frame, mine: FloatArray, arm: FloatArray, momentum: FloatArray
-    ) -> FloatArray:
+    def spin(self, frame: _Frame, mine: Array, arm: Array, momentum: Array) -> Array:
         """Angular velocity of a body by its angular momentum."""
         values, axes = np.linalg.eigh(self.inertia(frame, mine, arm))
         # Point masses on a line do not turn about it.
         inverse = np.where(values > 1e-10 * values.max(), 1 / np.maximum(values, 1e-300), 0.0)
         return np.asarray(axes @ (inverse * (axes.T @ momentum)))
 
-    def members(self, frame: _Frame) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    def members(self, frame: _Frame) -> Iterator[tuple[int, Array, Array]]:
         """Each row of the bodies' dump, its spheres, and their arms from the centre of mass."""
         assert frame.bodies is not None
         for row, molecule in enumerate(frame.bodies["mol"]):
@@ -760,7 +762,7 @@ class _Part:
         self.report.seen["momenta of bodies"] += count
 
     def pushed(
-        self, new: _Frame, last: _Frame | None, listed: dict[str, FloatArray], settled: bool
+        self, new: _Frame, last: _Frame | None, listed: dict[str, Array], settled: bool
     ) -> None:
         """Of what pushed bodies apart nothing is left when the overlaps are gone, to EPS / h."""
         assert new.bodies is not None
@@ -827,17 +829,17 @@ class _Part:
             kept_l = np.where(in_line[:, None], kept_l, new.body_l)
         new.kept_v, new.kept_l, new.settled = kept_v, kept_l, settled
 
-    def is_in_line(self, arm: FloatArray) -> bool:
+    def is_in_line(self, arm: Array) -> bool:
         """Whether a body's spheres lie on a line, about which no force on them turns it."""
         rank = np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
         return bool(rank < REAL_TURNING)
 
-    def to_strength(self, frame: _Frame, forces: FloatArray) -> FloatArray:
+    def to_strength(self, frame: _Frame, forces: Array) -> Array:
         """Sum of the sizes of the forces on each body's spheres."""
         size = np.linalg.norm(forces, axis=1) + np.linalg.norm(frame.force, axis=1)
         return np.array([size[mine].sum() for _, mine, _ in self.members(frame)])
 
-    def velocities(self, frame: _Frame) -> FloatArray:
+    def velocities(self, frame: _Frame) -> Array:
         """Of the spheres during the step, from momentum alone; those of bodies by their turning."""
         velocity = frame.momentum.copy()
         fixed = (frame.kind == FROZEN) | (frame.kind == OUTSIDE)
@@ -850,7 +852,7 @@ class _Part:
         return velocity
 
     def complementary(
-        self, new: _Frame, listed: dict[str, FloatArray], velocity: FloatArray, quiet: bool
+        self, new: _Frame, listed: dict[str, Array], velocity: Array, quiet: bool
     ) -> None:
         """(d) Where a force acts, the gap at the end of the step is within the tolerance."""
         if self.facts["solver"] == "uzawa" or (new.bodies is not None and not quiet):
@@ -859,7 +861,7 @@ class _Part:
         relative = velocity[i] - np.where(pair[:, None], velocity[j], 0.0)
         asked = np.where(listed["gap"] < -REGULAR * self.eps, 0.0, listed["gap"])
         end = asked + new.h * (n * relative).sum(axis=1)
-        for row in np.flatnonzero(~pair):
+        for row in np.flatnonzero(~pair).tolist():
             end[row] -= self.wall_motion(new, listed, row)
         ends = np.full(len(i), self.eps)
         if self.facts["warn"]:
@@ -869,7 +871,7 @@ class _Part:
         # Walls that curve or turn, and bodies: the constraint was set for the end of the step.
         plain = (new.molecule[i] == 0) & (~pair | (new.molecule[j] == 0))
         new.listed, new.ends = listed, end
-        for row in np.flatnonzero(~pair & plain):
+        for row in np.flatnonzero(~pair & plain).tolist():
             plain[row] = self.is_exact(listed["wall"][row])
         new.plain = plain
         borderline = np.abs(listed["gap"] + REGULAR * self.eps) < 1e-3 * self.eps
@@ -954,7 +956,7 @@ class _Part:
                         return not view.curved
         return False
 
-    def wall_motion(self, new: _Frame, listed: dict[str, FloatArray], row: int) -> float:
+    def wall_motion(self, new: _Frame, listed: dict[str, Array], row: int) -> float:
         """How far a wall comes nearer in the step, seen from where the sphere is now."""
         k, number = listed["i"][row], listed["wall"][row]
         for shape in self.shapes:
@@ -968,12 +970,12 @@ class _Part:
     def energy(
         self,
         new: _Frame,
-        listed: dict[str, FloatArray],
-        predicted: FloatArray,
-        velocity: FloatArray,
+        listed: dict[str, Array],
+        predicted: Array,
+        velocity: Array,
         kick: float,
-        alone: FloatArray,
-        sizes: FloatArray,
+        alone: Array,
+        sizes: Array,
     ) -> None:
         """(c) T(V+) <= T(V*) + sum lambda (max(0, -D) + EPS) / h + the work of what moves."""
         if new.bodies is not None or self.facts["warn"]:
@@ -983,7 +985,7 @@ class _Part:
         i, j, pair, n = listed["i"], listed["j"], listed["pair"], listed["n"]
         impulse = listed["force"] * kick * self.to_v
         allowed = (impulse * (np.maximum(0, -listed["gap"]) + self.eps)).sum() / new.h
-        for row in np.flatnonzero(~pair):
+        for row in np.flatnonzero(~pair).tolist():
             allowed += impulse[row] * max(0.0, self.wall_motion(new, listed, row)) / new.h
         for side, sign in ((i, -1.0), (np.where(pair, j, i), 1.0)):
             frozen = new.kind[side] == FROZEN

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bodies import BENT, BODY_STYLE, ROD, TETRAHEDRON, dimer
-from scene_walls import AXES, FloatArray, Shape, moves, views
+from tests.fix.bodies import BENT, BODY_STYLE, ROD, TETRAHEDRON, dimer
+from tests.random_scenes.scene_walls import AXES, FloatArray, Shape, moves, views
 
 # Acceleration of a unit of mass by a unit of force, and pressure of a unit of energy per volume
 # (LAMMPS's update.cpp: ftm2v, nktv2p).
@@ -313,7 +313,7 @@ class _Draw:
             if self.flags[axis] == "f" and (self.open_sides or self.chance(0.15)):
                 self.flags[axis] = self.one("s", "m") if self.open_sides else "s"
                 self.note("shrink-wrapped")
-        self.random.shuffle(self.regions)  # type: ignore[arg-type]
+        self.random.shuffle(self.regions)
         # Numbers count on in the order of the list.
         at = 1
         for _, names in self.regions:

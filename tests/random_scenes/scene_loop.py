@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from building import sanitized_plugin, sanitizer_libraries
-from lammps_run import without_launcher
-from scene_checker import Report, check
-from scene_generator import ITERATIONS, Scene, random_scene
-from scene_run import TIMEOUT, answer, finding
-from test_plugin import plugin_file
+from tests.building import sanitized_plugin, sanitizer_libraries
+from tests.fix.lammps_run import without_launcher
+from tests.fix.test_plugin import plugin_file
+from tests.random_scenes.scene_checker import Report, check
+from tests.random_scenes.scene_generator import ITERATIONS, Scene, random_scene
+from tests.random_scenes.scene_run import TIMEOUT, answer, finding
 
 MANY_ITERATIONS = "maxiter 1000000"
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lammps_run import BIN, OF_A_LAUNCHER
+from tests.fix.lammps_run import BIN, OF_A_LAUNCHER
 
 TIMEOUT = 60.0
 

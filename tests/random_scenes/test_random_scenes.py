@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from scene_generator import random_scene
-from scene_loop import Programs, Verdict, installed, judge, summary
+from tests.random_scenes.scene_generator import random_scene
+from tests.random_scenes.scene_loop import Programs, Verdict, installed, judge, summary
 
 pytestmark = pytest.mark.validation
 

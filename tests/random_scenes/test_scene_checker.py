@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bodies import BENT, body_scene, dimer, random_bodies, rigid_velocities
-from scene_checker import Report, check, read_thermo
-from scene_generator import BODY_COLUMNS, CONTACTS, computes, redump
-from scene_loop import installed
-from scene_run import REFUSALS, Answer, answer, finding
-from scene_walls import views
-from scenes import random_points, scene
+from tests.fix.bodies import BENT, body_scene, dimer, random_bodies, rigid_velocities
+from tests.fix.scenes import random_points, scene
+from tests.random_scenes.scene_checker import Report, check, read_thermo
+from tests.random_scenes.scene_generator import BODY_COLUMNS, CONTACTS, computes, redump
+from tests.random_scenes.scene_loop import installed
+from tests.random_scenes.scene_run import REFUSALS, Answer, answer, finding
+from tests.random_scenes.scene_walls import views
 
 RADIUS, EPS = 0.06, 3e-5
 BOX = ((0.0, 0.5), (0.0, 2.0), (0.0, 0.5))

@@ -11,11 +11,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from bodies import (
+from tests.fix.bodies import (
     DUMP_BODY_SPHERES,
     INERTIAS,
     TETRAHEDRON,
@@ -25,8 +26,8 @@ from bodies import (
     placed,
     random_bodies,
 )
-from lammps_run import Run, run_lmp
-from scenes import (
+from tests.fix.lammps_run import Run, run_lmp
+from tests.fix.scenes import (
     DEFAULT_BOX,
     DUMP_CONTACTS,
     DUMP_PARTICLES,
@@ -100,7 +101,7 @@ def residuals(path: Path, box: object) -> tuple[float, float, float]:
     return max(lacking) / eps, max([0.0, *w]) / eps, max(0.0, gained)
 
 
-def measured(folder: Path, eps: float, box: object = DEFAULT_BOX) -> Measured:
+def measured(folder: Path, eps: float, box: Any = DEFAULT_BOX) -> Measured:
     """Look at all dumped steps and all recorded problems of a folder."""
     overlap = 0.0
     for frame in read_dump(folder / "particles.dump"):
@@ -131,7 +132,8 @@ def run(folder: Path, deck: str, **options: object) -> Run:
 
 def crystal(side: int, apart: float, corner: float = RADIUS) -> FloatArray:
     """Return a simple cubic crystal of points."""
-    return corner + apart * np.moveaxis(np.indices((side,) * 3), 0, -1).reshape(-1, 3)
+    places = np.moveaxis(np.indices((side,) * 3), 0, -1).reshape(-1, 3)
+    return np.asarray(corner + apart * places, dtype=float)
 
 
 # ---------------------------------------------------------------- shapes, tolerances, time steps
@@ -184,7 +186,11 @@ def test_tolerance_at_the_round_off_of_positions(coordinate: float, tmp_path: Pa
     floor = ROUND_OFF * (points.max() + RADIUS)
 
     def deck(eps: float) -> str:
-        settings = {"box": box, "skin": 0.1, "options": f"region container {RECORD}"}
+        settings: dict[str, Any] = {
+            "box": box,
+            "skin": 0.1,
+            "options": f"region container {RECORD}",
+        }
         return scene(points, RADIUS, tmp_path, tolerance=eps, **settings) + DUMP_PARTICLES
 
     # The spheres do not move along x by more than their gaps.
@@ -551,7 +557,7 @@ CLOSING = "variable down equal -3*time\nregion lid plane 0 2.2 0 0 -1 0 move NUL
 
 def crushed(name: str, folder: Path, options: str) -> str:
     """Return a scene that has no room, now or after some steps."""
-    lid = {"setup": CLOSING, "options": f"region container lid {options}"}
+    lid: dict[str, Any] = {"setup": CLOSING, "options": f"region container lid {options}"}
     if name == "one sphere":
         return scene([0.5, RADIUS, 0.5], RADIUS, folder, tolerance=EPS, skin=0.1, **lid)
     if name == "spheres":
@@ -574,7 +580,11 @@ def crushed(name: str, folder: Path, options: str) -> str:
             motion="group jaws id 1 3\nfix motion all nve",
         )
     points = np.random.default_rng(1).uniform(0.06, 0.94, (1500, 3))
-    settings = {"skin": 0.2, "box": ((0, 1),) * 3, "options": f"region container {options}"}
+    settings: dict[str, Any] = {
+        "skin": 0.2,
+        "box": ((0, 1),) * 3,
+        "options": f"region container {options}",
+    }
     return scene(points, RADIUS, folder, tolerance=EPS, **settings)
 
 
@@ -685,7 +695,7 @@ def in_units(folder: Path, length: float, gravity: float, eps: float) -> FloatAr
         timestep=STEP * np.sqrt(length / gravity),
         velocities=np.sqrt(length * gravity) * np.array([0.0, -3.0, 0.0]),
         skin=length * 0.2,
-        box=length * np.array(DEFAULT_BOX),
+        box=(length * np.array(DEFAULT_BOX)).tolist(),
         gravity=False,
         fixes=f"fix gravity all gravity {gravity * GRAVITY:.17g} vector 0 -1 0",
     )
@@ -730,7 +740,7 @@ def bodies_in_units(folder: Path, length: float, gravity: float, inertia: str) -
         tolerance=length * EPS,
         timestep=STEP * np.sqrt(length / gravity),
         skin=length * 0.2,
-        box=length * np.array(DEFAULT_BOX),
+        box=(length * np.array(DEFAULT_BOX)).tolist(),
         gravity=False,
         fixes=f"fix gravity all gravity {gravity * GRAVITY:.17g} vector 0 -1 0",
         options="region container shorten yes",

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import test_bodies_continuation as of_bodies
-import test_continuation as of_spheres
-from lammps_run import BIN, OF_A_LAUNCHER, run_lmp
-from scenes import FloatArray
+from tests.fix import test_bodies_continuation as of_bodies
+from tests.fix import test_continuation as of_spheres
+from tests.fix.lammps_run import BIN, OF_A_LAUNCHER, run_lmp
+from tests.fix.scenes import FloatArray
 
 pytestmark = pytest.mark.validation
 

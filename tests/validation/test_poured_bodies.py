@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
-from pouring import Packing, measure, run_deck, shipped_deck
+from tests.pouring import Packing, measure, run_deck, shipped_deck
 
 pytestmark = pytest.mark.validation
 
@@ -23,9 +24,12 @@ PAPER_Z, PAPER_Z_TOLERANCE = 10.0, 0.2
 FAR = 3.0
 SLACK = 1 + 1e-6  # round-off of positions and of the dump
 
+# Aspect ratio, start and seed to the packing.
+Poured = Callable[[float, str, int], Packing]
+
 
 @pytest.fixture(scope="module")
-def poured(tmp_path_factory: pytest.TempPathFactory):
+def poured(tmp_path_factory: pytest.TempPathFactory) -> Poured:
     """Pour dimers of an aspect ratio once for each start and seed."""
 
     @cache
@@ -39,7 +43,7 @@ def poured(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.mark.parametrize("aspect_ratio", [1.01, 1.5, 1.95])
-def test_contacts_and_neighbours_of_dimers(aspect_ratio: float, poured) -> None:
+def test_contacts_and_neighbours_of_dimers(aspect_ratio: float, poured: Poured) -> None:
     """2,000 dimers: ten contacts each, and fewer neighbours, at every aspect ratio."""
     packings = [poured(aspect_ratio, "random", seed) for seed in SEEDS]
     contacts = [packing.coordination_number.mean for packing in packings]
@@ -52,7 +56,7 @@ def test_contacts_and_neighbours_of_dimers(aspect_ratio: float, poured) -> None:
     assert max(neighbours) < PAPER_Z
 
 
-def test_no_memory_of_the_start(poured) -> None:
+def test_no_memory_of_the_start(poured: Poured) -> None:
     """Dimers that all start along x end as those that start anyhow, and x and z are alike."""
     directions = {}
     for start in ("random", "regular"):
@@ -92,7 +96,7 @@ def thrown(deck: str) -> str:
     )
 
 
-SCENES = {
+SCENES: dict[str, tuple[str, dict[str, object]]] = {
     "dimers 1.05": (shipped_deck("dimers"), {"aspect_ratio": 1.05}),
     "dimers 1.5": (shipped_deck("dimers"), {"aspect_ratio": 1.5}),
     "solid dimers 2": (shipped_deck("dimers"), {"aspect_ratio": 2.0, "inertia": "solid"}),

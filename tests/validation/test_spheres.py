@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
-from pouring import (
+from tests.pouring import (
     Recorded,
     measure,
     read_record,

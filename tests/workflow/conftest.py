@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-# Where the helpers that all tests share are imported from.
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 
 @pytest.fixture

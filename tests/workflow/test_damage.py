@@ -6,18 +6,21 @@ import json
 import os
 import random
 import shutil
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
-from few_spheres import TINY
-from lammps_inelastic.workflow.folder import FAILED, FINISHED, Folder
+from lammps_inelastic.workflow.finished import FINISHED
+from lammps_inelastic.workflow.folder import FAILED, Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.study import read_study
-from study_run import inelastic, numbers_of, same
+from tests.workflow.few_spheres import TINY
+from tests.workflow.study_run import inelastic, numbers_of, same
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of two cases that has been run."""
     folder = tmp_path_factory.mktemp("done")
     (folder / "few.toml").write_text(TINY.replace("{seeds}", "[1, 2]"))
@@ -27,54 +30,54 @@ def done(tmp_path_factory):
 
 
 @pytest.fixture
-def study(done, tmp_path):
+def study(done: Path, tmp_path: Path) -> Path:
     """Return a copy of it."""
     shutil.copytree(done, tmp_path / "study")
     return tmp_path / "study"
 
 
-def cut(path):
+def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:1000])
 
 
-def emptied(path):
+def emptied(path: Path) -> None:
     path.write_bytes(b"")
 
 
-def of_random_bytes(path):
+def of_random_bytes(path: Path) -> None:
     path.write_bytes(random.Random(1).randbytes(20_000))
 
 
-def that_begins_well(path):
+def that_begins_well(path: Path) -> None:
     content = path.read_bytes()
     path.write_bytes(content[:64] + random.Random(2).randbytes(len(content) - 64))
 
 
-def with_one_bit_changed(path):
+def with_one_bit_changed(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
 
 
-def too_deep(path):
+def too_deep(path: Path) -> None:
     path.write_text("[" * 100_000)
 
 
-def of_another_kind(path):
+def of_another_kind(path: Path) -> None:
     path.write_text("null")
 
 
-def that_is_a_folder(path):
+def that_is_a_folder(path: Path) -> None:
     path.unlink()
     (path / "inner").mkdir(parents=True)
 
 
-def that_is_a_pipe(path):
+def that_is_a_pipe(path: Path) -> None:
     path.unlink()
     os.mkfifo(path)
 
 
-def that_is_a_link_to_nowhere(path):
+def that_is_a_link_to_nowhere(path: Path) -> None:
     path.unlink()
     path.symlink_to("nowhere")
 
@@ -96,7 +99,9 @@ DAMAGED_JSON = [each for each in DAMAGED if each is not with_one_bit_changed]
 
 
 @pytest.mark.parametrize("damage", DAMAGED)
-def test_a_damaged_result_is_named_and_set_aside(study, damage, capsys):
+def test_a_damaged_result_is_named_and_set_aside(
+    study: Path, damage: Callable[[Path], None], capsys: pytest.CaptureFixture[str]
+) -> None:
     path, out = study / "few.toml", study / "out"
     read, folder = read_study(path), Folder(out)
     first, second = read.cases
@@ -122,7 +127,9 @@ def test_a_damaged_result_is_named_and_set_aside(study, damage, capsys):
     assert folder.set_aside(read, second) == []
 
 
-def test_a_damaged_result_is_measured_again(study, capsys):
+def test_a_damaged_result_is_measured_again(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path, out = study / "few.toml", study / "out"
     before = numbers_of(out / "few.h5")
     read = read_study(path)
@@ -136,7 +143,8 @@ def test_a_damaged_result_is_measured_again(study, capsys):
     assert len(list((out / "cases").iterdir())) == 3  # with that of the locks
 
 
-def test_a_damaged_result_in_a_job(study):
+@pytest.mark.slow
+def test_a_damaged_result_in_a_job(study: Path) -> None:
     path, out = study / "few.toml", study / "out"
     before = numbers_of(out / "few.h5")
     read = read_study(path)
@@ -148,7 +156,7 @@ def test_a_damaged_result_in_a_job(study):
     assert same(before, numbers_of(out / "few.h5"))
 
 
-def test_set_aside_again_and_again(study):
+def test_set_aside_again_and_again(study: Path) -> None:
     read, folder = read_study(study / "few.toml"), Folder(study / "out")
     case = read.cases[0]
     result = folder.result(read, case)
@@ -159,7 +167,9 @@ def test_set_aside_again_and_again(study):
 
 
 @pytest.mark.parametrize("damage", DAMAGED)
-def test_a_report_of_a_damaged_file(study, damage, capsys):
+def test_a_report_of_a_damaged_file(
+    study: Path, damage: Callable[[Path], None], capsys: pytest.CaptureFixture[str]
+) -> None:
     file = study / "out" / "few.h5"
     damage(file)
     assert main(["report", str(file), "--out", str(study / "report.html")]) == 2
@@ -168,7 +178,9 @@ def test_a_report_of_a_damaged_file(study, damage, capsys):
 
 
 @pytest.mark.parametrize("damage", DAMAGED_JSON)
-def test_a_damaged_record_of_a_run(study, damage, capsys):
+def test_a_damaged_record_of_a_run(
+    study: Path, damage: Callable[[Path], None], capsys: pytest.CaptureFixture[str]
+) -> None:
     """The run can no longer be measured: it is kept, and made again."""
     path, out = study / "few.toml", study / "out"
     read, folder = read_study(path), Folder(out)
@@ -185,7 +197,9 @@ def test_a_damaged_record_of_a_run(study, damage, capsys):
 
 
 @pytest.mark.parametrize("damage", DAMAGED_JSON)
-def test_a_damaged_record_of_a_failure(study, damage, capsys):
+def test_a_damaged_record_of_a_failure(
+    study: Path, damage: Callable[[Path], None], capsys: pytest.CaptureFixture[str]
+) -> None:
     path, out = study / "few.toml", study / "out"
     read, folder = read_study(path), Folder(out)
     case = read.cases[0]
@@ -216,7 +230,13 @@ PLACES = [
 
 @pytest.mark.parametrize("kind", ["file", "link to nowhere", "link to a file", "pipe"])
 @pytest.mark.parametrize("place", PLACES)
-def test_what_stands_in_the_way(write_study, tmp_path, place, kind, capsys):
+def test_what_stands_in_the_way(
+    write_study: Callable[..., Path],
+    tmp_path: Path,
+    place: str,
+    kind: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     path = write_study(TINY.replace("{seeds}", "1"))
     (case,) = read_study(path).cases
     mine = tmp_path / "mine"
@@ -247,7 +267,9 @@ def test_what_stands_in_the_way(write_study, tmp_path, place, kind, capsys):
     assert main(["status", str(path), "--out", str(tmp_path / "out")]) == 0
 
 
-def test_a_folder_in_the_place_of_the_results(study, capsys):
+def test_a_folder_in_the_place_of_the_results(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = study / "out" / "few.h5"
     file.unlink()
     file.mkdir()
@@ -255,7 +277,7 @@ def test_a_folder_in_the_place_of_the_results(study, capsys):
     assert capsys.readouterr().err == f"inelastic: {file}: a folder is in the way; move it away\n"
 
 
-def test_a_run_that_was_moved_and_linked(study, capsys):
+def test_a_run_that_was_moved_and_linked(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = study / "few.toml", study / "out"
     read, folder = read_study(path), Folder(out)
     case = read.cases[0]
@@ -266,7 +288,7 @@ def test_a_run_that_was_moved_and_linked(study, capsys):
     assert "few: 1 done, 1 there before" in capsys.readouterr().out
 
 
-def test_collect_replaces_hdf5_files_only(study, capsys):
+def test_collect_replaces_hdf5_files_only(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = study / "few.toml", study / "out"
     text = path.read_text()
     assert main(["collect", str(path), "--out", str(out), "--file", str(path)]) == 2
@@ -274,8 +296,9 @@ def test_collect_replaces_hdf5_files_only(study, capsys):
     assert path.read_text() == text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [0, 1])
-def test_measuring_takes_too_long(study, ranks):
+def test_measuring_takes_too_long(study: Path, ranks: int) -> None:
     """What was run stays, and is measured when there is more time."""
     path, out = study / "few.toml", study / "out"
     text = path.read_text()

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import pytest
 
-from few_spheres import TINY
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.store import read_studies
-from small_disk import mounted
-from study_run import inelastic
+from tests.small_disk import mounted
+from tests.workflow.few_spheres import TINY
+from tests.workflow.study_run import inelastic
 
 EXPORTS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
 # What each of them needs to be small: 30 spheres, and no more than 27,000 voxels.
@@ -133,6 +133,7 @@ def test_results_of_a_study(size: int, study: Path, refused: Callable[..., str])
     assert contents(study) == before
 
 
+@pytest.mark.slow
 def test_a_measurement_that_cannot_be_kept(study: Path) -> None:
     """The run stays finished, and is measured when there is room."""
     (result,) = (study / "out" / "results" / "few").iterdir()
@@ -151,6 +152,7 @@ def test_a_measurement_that_cannot_be_kept(study: Path) -> None:
 
 
 # Less than a deck; a deck, but not its dumps.
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [3000, 10_000])
 def test_a_run_that_has_no_room(size: int, study: Path) -> None:
     """It fails as a case does, or with the workflow, and what is finished stays."""
@@ -198,6 +200,7 @@ def test_out_that_is_no_folder(study: Path, refused: Callable[..., str]) -> None
         assert said.endswith(": cannot be written: Not a directory")
 
 
+@pytest.mark.slow
 def test_tradeoff(tmp_path: Path, refused: Callable[..., str]) -> None:
     out = tmp_path / "out"
     arguments = ["tradeoff", "--out", str(out), "--particles", "20", "--diameter", "0.2"]

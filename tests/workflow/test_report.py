@@ -7,10 +7,14 @@ import csv
 import io
 import math
 import re
+from collections.abc import Sequence
 from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from PIL import Image
 
@@ -23,7 +27,7 @@ from lammps_inelastic.analysis.plots import (
     plot_wall_profile,
 )
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.report.blocks import Cell, Comparison, Table
+from lammps_inelastic.workflow.report.blocks import Cell, Comparison, Section, Table
 from lammps_inelastic.workflow.report.columns import Column, table
 from lammps_inelastic.workflow.report.contents import all_sections
 from lammps_inelastic.workflow.report.data import Data, paper_numbers, read_data
@@ -65,7 +69,7 @@ ANCHORS = {
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
 
-def png(colour="red"):
+def png(colour: str = "red") -> bytes:
     buffer = io.BytesIO()
     image = Image.new("RGB", (40, 30), "white")
     image.paste(colour, (15, 10, 25, 20))
@@ -73,7 +77,13 @@ def png(colour="red"):
     return buffer.getvalue()
 
 
-def result(deck="spheres", pictures=(), before=None, wall_seconds=30.0, **given):
+def result(
+    deck: str = "spheres",
+    pictures: Sequence[str] = (),
+    before: Result | None = None,
+    wall_seconds: float = 30.0,
+    **given: Any,
+) -> Result:
     """Return a result; names of schema.py with a slash as __ are values, others variables."""
     values = {
         name.replace("__", "/"): np.asarray(value, dtype=float)
@@ -115,7 +125,7 @@ def result(deck="spheres", pictures=(), before=None, wall_seconds=30.0, **given)
     return Result(values, {name: png() for name in pictures}, record, "{}", before)
 
 
-def measured(phi=0.63, z=6.0, **given):
+def measured(phi: float = 0.63, z: float = 6.0, **given: Any) -> Result:
     """Return a result with some of everything in it."""
     distance = np.linspace(0.5, 9.5, 10) * 0.1
     diameter = given.get("diameter", 0.11)
@@ -156,11 +166,13 @@ def measured(phi=0.63, z=6.0, **given):
     )
 
 
-def study(name, results, title=None, text="title = 'x'\n"):
+def study(
+    name: str, results: list[Result], title: str | None = None, text: str = "title = 'x'\n"
+) -> StoredStudy:
     return StoredStudy(name, title or f"Study {name}", text, results)
 
 
-def whole_paper():
+def whole_paper() -> list[StoredStudy]:
     """Return all studies of the paper, in miniature."""
     table_1 = [
         measured(phi=phi, tolerance=tolerance, random_force=force, seed=seed)
@@ -209,7 +221,7 @@ def whole_paper():
     ]
 
 
-def own_study():
+def own_study() -> StoredStudy:
     return study(
         "friction",
         [
@@ -224,16 +236,22 @@ def own_study():
 class Page(HTMLParser):
     """What a page links to and shows; fails where its elements do not match."""
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         super().__init__()
-        self.ids, self.links, self.sources, self.opened, self.text = [], [], [], [], ""
+        self.ids: list[str | None] = []
+        self.links: list[str | None] = []
+        self.sources: list[str | None] = []
+        self.opened: list[str] = []
+        self.text = ""
         # The style sheet; of each table, listing and figure its own rule's name and its parents'.
-        self.text_of_style, self.wide, self._names = "", [], []
+        self.text_of_style = ""
+        self.wide: list[list[str]] = []
+        self._names: list[list[str]] = []
         self.feed(text)
         self.close()
         assert self.opened == []
 
-    def handle_starttag(self, tag, attrs):
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = dict(attrs)
         names = [tag, *(f".{word}" for word in (values.get("class") or "").split())]
         if tag not in VOID:
@@ -250,11 +268,11 @@ class Page(HTMLParser):
             assert values["alt"]
             self.sources.append(values["src"])
 
-    def handle_endtag(self, tag):
+    def handle_endtag(self, tag: str) -> None:
         assert self.opened.pop() == tag
         self._names.pop()
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         if self.opened[-1:] != ["style"]:
             self.text += data
         else:
@@ -264,13 +282,13 @@ class Page(HTMLParser):
             assert "@import" not in data
 
 
-def write(path, *studies):
+def write(path: Path, *studies: StoredStudy) -> Path:
     write_studies(path, studies)
     return path
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def page(tmp_path_factory: pytest.TempPathFactory) -> Page:
     """Return the page of all studies and one more."""
     folder = tmp_path_factory.mktemp("report")
     file = write(folder / "all.h5", *whole_paper(), own_study())
@@ -278,25 +296,25 @@ def page(tmp_path_factory):
     return Page((folder / "r.html").read_text(encoding="utf-8"))
 
 
-def sections_of(*studies):
+def sections_of(*studies: StoredStudy) -> dict[str, Section]:
     """Return the sections of a report by their anchors."""
     data = Data({one.name: one for one in studies}, paper_numbers())
     return {section.anchor: section for section in all_sections(data, ["all.h5"])}
 
 
 @pytest.fixture(scope="module")
-def sections():
+def sections() -> dict[str, Section]:
     return sections_of(*whole_paper(), own_study())
 
 
-def rows_of(section, name):
+def rows_of(section: Section, name: str) -> list[dict[str, Any]]:
     """Return what the CSV file of a figure holds, as dictionaries."""
     (figure,) = (b for b in section.blocks if isinstance(b, Figure) and b.name == name)
     head, *rows = figure.rows()
     return [dict(zip(head, row, strict=True)) for row in rows]
 
 
-def test_every_section_is_there_and_in_the_contents(page):
+def test_every_section_is_there_and_in_the_contents(page: Page) -> None:
     wanted = ANCHORS | {"study-friction"}
     assert wanted <= set(page.ids)
     assert {f"#{anchor}" for anchor in wanted} <= set(page.links)
@@ -304,13 +322,13 @@ def test_every_section_is_there_and_in_the_contents(page):
     assert "not run yet" not in page.text.lower()
 
 
-def test_nothing_is_loaded_from_elsewhere(page):
+def test_nothing_is_loaded_from_elsewhere(page: Page) -> None:
     assert all(link.startswith("#") for link in page.links)
     assert all(source.startswith("data:image/") for source in page.sources)
     assert {link[1:] for link in page.links} <= set(page.ids)
 
 
-def test_pictures_can_be_decoded(page):
+def test_pictures_can_be_decoded(page: Page) -> None:
     kinds = {"svg+xml": 0, "png": 0}
     for source in page.sources:
         head, data = source.split(",", 1)
@@ -326,11 +344,11 @@ def test_pictures_can_be_decoded(page):
     assert kinds["svg+xml"] >= 15
 
 
-def test_words_of_a_study_do_not_become_elements(page):
+def test_words_of_a_study_do_not_become_elements(page: Page) -> None:
     assert "Size & shape (friction)" in page.text
 
 
-def test_how_to_repeat_is_said(page):
+def test_how_to_repeat_is_said(page: Page) -> None:
     assert "inelastic run table-1.toml --out DIR" in page.text
     assert "inelastic run friction.toml --out DIR" in page.text
     assert "inelastic report DIR/friction.h5" in page.text
@@ -338,17 +356,17 @@ def test_how_to_repeat_is_said(page):
     assert "# deck dimers" in page.text
 
 
-def test_computing_time_counts_ranks(page):
+def test_computing_time_counts_ranks(page: Page) -> None:
     # 12 cases of 30 s with two ranks.
     assert "12.0 min" in page.text
 
 
-def test_what_the_paper_does_not_state(page):
+def test_what_the_paper_does_not_state(page: Page) -> None:
     for word in ("9.81", "largest random acceleration, per direction (random_force)", "drag per"):
         assert word in page.text
 
 
-def test_each_figure_as_pdf_png_and_csv(tmp_path):
+def test_each_figure_as_pdf_png_and_csv(tmp_path: Path) -> None:
     wanted = ("figure-8", "protocol")
     file = write(tmp_path / "a.h5", *(one for one in whole_paper() if one.name in wanted))
     figures = tmp_path / "figures"
@@ -369,7 +387,7 @@ def test_each_figure_as_pdf_png_and_csv(tmp_path):
     assert Image.open(figures / "figure-8.png").size == (30, 30)
 
 
-def test_numbers_of_a_figure(sections):
+def test_numbers_of_a_figure(sections: dict[str, Section]) -> None:
     rows = rows_of(sections["figure-11"], "figure-11")
     raw = {float(row["aspect ratio L/d"]): row for row in rows if row["curve"] == "raw"}
     assert list(raw) == [1.0, 1.1, 1.5, 1.6, 1.8, 1.95]
@@ -377,7 +395,7 @@ def test_numbers_of_a_figure(sections):
     assert float(raw[1.5]["standard error of packing fraction"]) == 0
 
 
-def test_evolution_has_both_panels_in_one_file(sections):
+def test_evolution_has_both_panels_in_one_file(sections: dict[str, Section]) -> None:
     rows = rows_of(sections["figure-5"], "figure-5")
     # Two runs of 13 frames, twice: packing fraction, and contacts, not known in three frames.
     assert len(rows) == 4 * 13
@@ -385,14 +403,14 @@ def test_evolution_has_both_panels_in_one_file(sections):
     assert sum(row["coordination number"] != "" for row in rows) == 2 * 10
 
 
-def test_every_row_has_a_cell_for_each_column(sections):
+def test_every_row_has_a_cell_for_each_column(sections: dict[str, Section]) -> None:
     for section in sections.values():
         for block in section.blocks:
             if isinstance(block, Table):
                 assert {len(row) for row in block.rows} == {len(block.head)}, block.caption
 
 
-def test_comparison_with_a_series(sections):
+def test_comparison_with_a_series(sections: dict[str, Section]) -> None:
     first = sections["table-1"].comparisons[0]
     # 62, 63 and 64 %: standard deviation 1, standard error 1 / sqrt(3); the paper's 63.39 and
     # 0.41 / 3.
@@ -402,18 +420,18 @@ def test_comparison_with_a_series(sections):
     assert first.note == "3 runs, not 9"
 
 
-def test_comparison_in_our_errors_alone():
+def test_comparison_in_our_errors_alone() -> None:
     one = Comparison("phi", Stated(63.2), Sample(63.8, 0.4, 4))
     assert one.difference == pytest.approx(3.0, rel=1e-9)  # round-off
     assert one.is_large
 
 
-def test_single_run_has_no_difference():
+def test_single_run_has_no_difference() -> None:
     assert math.isnan(difference_in_errors(Sample(6.1, math.nan, 1), Stated(6.0)))
     assert math.isnan(difference_in_errors(Sample(6.1, math.nan, 1), Stated(6.0, 0.05)))
 
 
-def test_large_difference_is_marked():
+def test_large_difference_is_marked() -> None:
     runs = [measured(z=z, seed=seed) for seed, z in enumerate((6.9, 7.0, 7.1), 1)]
     summary = summarise(list(sections_of(study("table-1", runs)).values()))
     # Packing fraction and z; z at rest less z while agitated is 0.4 in each run: no scatter, and
@@ -425,7 +443,7 @@ def test_large_difference_is_marked():
     assert (z.text, z.marked) == ("+14.7", True)
 
 
-def test_why_is_said_of_large_differences_alone():
+def test_why_is_said_of_large_differences_alone() -> None:
     runs = [
         measured(phi=phi, z=5.97, seed=seed) for seed, phi in enumerate((0.62, 0.6322, 0.644), 1)
     ]
@@ -437,20 +455,20 @@ def test_why_is_said_of_large_differences_alone():
         assert "solver" not in z
 
 
-def test_more_seeds_are_compared_as_well():
+def test_more_seeds_are_compared_as_well() -> None:
     section = sections_of(*whole_paper())["table-1"]
     more = next(one for one in section.comparisons if "6 seeds" in one.what)
     # Seeds 1 to 6 of 0.632 + 0.001 (seed mod 5): 0.001 x 11 / 6 above.
     assert more.ours.mean == pytest.approx(63.2 + 1.1 / 6, rel=1e-12)  # round-off
 
 
-def test_table_2_has_the_scatter_of_table_1(sections):
+def test_table_2_has_the_scatter_of_table_1(sections: dict[str, Section]) -> None:
     whats = {one.what: one for one in sections["table-2"].comparisons}
     assert whats["φ, 1,000 spheres"].stated.error == pytest.approx(0.44 / 3, rel=1e-12)  # round-off
     assert math.isnan(whats["φ, 10,000 spheres"].stated.error)
 
 
-def test_orientation_of_runs_that_agree_by_chance():
+def test_orientation_of_runs_that_agree_by_chance() -> None:
     runs = [measured(deck="dimers", aspect_ratio=1.8, seed=seed) for seed in (1, 2)]
     x = sections_of(study("dimers", runs))["anisotropy"].comparisons[0]
     # The runs have the same a_x; 0.01 is what the number of dimers leaves of each.
@@ -458,14 +476,14 @@ def test_orientation_of_runs_that_agree_by_chance():
     assert x.stated.error == 0.01
 
 
-def test_overlap_is_compared_with_the_loosest_tolerance():
+def test_overlap_is_compared_with_the_loosest_tolerance() -> None:
     runs = [measured(tolerance_agitated=0.005, numbers__largest_overlap_of_all_steps=0.004)]
     (table,) = sections_of(study("table-1", runs))["checks"].blocks
     assert [cell.text for cell in table.rows[0][3:6]] == ["0.005", "0.004", "0.800"]
     assert not table.rows[0][5].marked
 
 
-def test_results_of_an_older_deck_group_with_newer_ones(tmp_path):
+def test_results_of_an_older_deck_group_with_newer_ones(tmp_path: Path) -> None:
     old = measured(seed=1)
     new = measured(seed=2, solver="apgd", tolerance_measuring=0.0001)
     data = read_data([write(tmp_path / "a.h5", study("own", [old, new]))])
@@ -474,7 +492,7 @@ def test_results_of_an_older_deck_group_with_newer_ones(tmp_path):
     assert first | {"seed": 2} == second
 
 
-def test_solvers_are_not_mixed():
+def test_solvers_are_not_mixed() -> None:
     runs = [
         measured(z=z, tolerance=0.005, solver=solver, seed=seed)
         for solver, z in (("apgd", 5.8), ("uzawa", 6.2))
@@ -487,7 +505,9 @@ def test_solvers_are_not_mixed():
     }
 
 
-def test_anisotropy_is_compared_with_the_consistent_aspect_ratio(sections):
+def test_anisotropy_is_compared_with_the_consistent_aspect_ratio(
+    sections: dict[str, Section],
+) -> None:
     whats = [one.what for one in sections["anisotropy"].comparisons]
     assert whats == [f"a_{axis} over isotropic, L/d = 1.8" for axis in "xyz"]
     x = sections["anisotropy"].comparisons[0]
@@ -496,14 +516,14 @@ def test_anisotropy_is_compared_with_the_consistent_aspect_ratio(sections):
     assert x.ours.mean == 1.08
 
 
-def test_table_2_takes_paper_and_ours_of_one_size(sections):
+def test_table_2_takes_paper_and_ours_of_one_size(sections: dict[str, Section]) -> None:
     whats = {one.what: one for one in sections["table-2"].comparisons}
     assert whats["φ, 10,000 spheres"].ours.n == 2
     assert math.isnan(whats["φ, 100,000 spheres"].difference)
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_any_single_study_is_enough(name):
+def test_any_single_study_is_enough(name: str) -> None:
     (one,) = (each for each in whole_paper() if each.name == name)
     sections = sections_of(one)
     assert set(sections) == ANCHORS - {"summary"}
@@ -512,7 +532,7 @@ def test_any_single_study_is_enough(name):
     assert not sections[shown_in.get(name, name)].is_missing
 
 
-def test_studies_without_any_result(tmp_path):
+def test_studies_without_any_result(tmp_path: Path) -> None:
     file = write(tmp_path / "a.h5", *(study(name, []) for name in STUDIES), study("own", []))
     out = tmp_path / "r.html"
     assert main(["report", str(file), "--out", str(out)]) == 0
@@ -523,12 +543,12 @@ def test_studies_without_any_result(tmp_path):
     assert "To make it: inelastic run own.toml --out DIR" in page.text
 
 
-def test_result_with_nothing_but_its_record():
+def test_result_with_nothing_but_its_record() -> None:
     sections = sections_of(*(study(n, [result(), result(seed=2)]) for n in (*STUDIES, "own")))
     assert sections["figure-11"].blocks
 
 
-def test_own_study_alone_has_no_sections_of_the_paper():
+def test_own_study_alone_has_no_sections_of_the_paper() -> None:
     sections = sections_of(own_study())
     assert list(sections) == ["study-friction", "provenance"]
     table = sections["study-friction"].blocks[0]
@@ -540,14 +560,16 @@ def test_own_study_alone_has_no_sections_of_the_paper():
     assert table.rows[0][1].text == "2"
 
 
-def test_parts_of_a_study_in_several_files(tmp_path):
+def test_parts_of_a_study_in_several_files(tmp_path: Path) -> None:
     one = write(tmp_path / "1.h5", study("own", [measured(seed=1), measured(seed=2)]))
     other = write(tmp_path / "2.h5", study("own", [measured(seed=2), measured(seed=3)]))
     data = read_data([one, other])
     assert len(data.studies["own"].results) == 3
 
 
-def test_two_studies_of_one_name_are_refused(tmp_path, capsys):
+def test_two_studies_of_one_name_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     one = write(tmp_path / "1.h5", study("own", [measured()]))
     other = write(tmp_path / "2.h5", study("own", [measured()], text="title = 'y'\n"))
     assert main(["report", str(one), str(other), "--out", str(tmp_path / "r.html")]) == 2
@@ -558,7 +580,9 @@ def test_two_studies_of_one_name_are_refused(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("content", "named"), [(None, "no such file"), (b"no HDF5", "not a file of studies")]
 )
-def test_file_that_is_no_study_file(tmp_path, capsys, content, named):
+def test_file_that_is_no_study_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: Any, named: str
+) -> None:
     path = tmp_path / "a.h5"
     if content is not None:
         path.write_bytes(content)
@@ -569,7 +593,7 @@ def test_file_that_is_no_study_file(tmp_path, capsys, content, named):
     assert not (tmp_path / "r.html").exists()
 
 
-def test_statistics_by_hand():
+def test_statistics_by_hand() -> None:
     values = sample([1.0, 2.0, 3.0, math.nan])
     assert (values.mean, values.std, values.n) == (2.0, 1.0, 3)
     assert values.error == 1 / math.sqrt(3)
@@ -586,7 +610,7 @@ def test_statistics_by_hand():
     assert shares.tolist() == [0, 0.5, 0.5]
 
 
-def test_peak_of_a_parabola():
+def test_peak_of_a_parabola() -> None:
     x = [1.0, 1.3, 1.5, 2.0]
     # Exact for a parabola, but for round-off.
     top, error = peak(x, [-((v - 1.42) ** 2) for v in x], [0.0] * 4)
@@ -597,9 +621,10 @@ def test_peak_of_a_parabola():
     assert math.isnan(error)
 
 
-def test_the_error_of_a_peak():
+def test_the_error_of_a_peak() -> None:
     """Beside what drawing the values again and again gives."""
-    x, errors = np.array([1.0, 1.2, 1.5, 1.6, 2.0]), np.array([1, 2, 1, 3, 1]) * 1e-3
+    x: Any = np.array([1.0, 1.2, 1.5, 1.6, 2.0])
+    errors: Any = np.array([1, 2, 1, 3, 1]) * 1e-3
     y = -((x - 1.42) ** 2)
     random = np.random.default_rng(1)
     drawn = [peak(x, y + random.normal(0, errors), errors, 2) for _ in range(4000)]
@@ -609,7 +634,7 @@ def test_the_error_of_a_peak():
     assert place == pytest.approx(1.42, abs=1e-9)
 
 
-def test_pooled_scatter():
+def test_pooled_scatter() -> None:
     """Of rows of two values; a row of four has its own, a row of one gets the others'."""
     samples = {
         "a": sample([1.0, 3.0]),
@@ -628,14 +653,14 @@ def test_pooled_scatter():
     assert pooled({"d": samples["d"]}) == {"d": samples["d"]}
 
 
-def test_numbers_as_text():
+def test_numbers_as_text() -> None:
     assert as_text(-0.001, 2) == "0.00"
     assert as_text(-1.5, 1) == "\N{MINUS SIGN}1.5"
     assert as_text(math.nan, 2) == "\N{EN DASH}"
     assert [as_short(v) for v in (5e-05, 0.11, 12345.0, 0.0)] == ["0.00005", "0.11", "12345", "0"]
 
 
-def test_numbers_of_the_paper_have_as_many_decimals_as_their_error():
+def test_numbers_of_the_paper_have_as_many_decimals_as_their_error() -> None:
     stated = Stated(63.7, 0.2), Stated(6, 0.05), Stated(1.0833, 0.0123), Stated(3, 0), Stated(0.5)
     assert [as_stated(one) for one in stated] == [
         "63.7 ± 0.2",
@@ -647,7 +672,7 @@ def test_numbers_of_the_paper_have_as_many_decimals_as_their_error():
     assert as_stated(Stated.of_series(63.39, 0.41, 9)) == "63.39 ± 0.41"
 
 
-def test_a_column_has_its_heading_and_its_cells():
+def test_a_column_has_its_heading_and_its_cells() -> None:
     columns = [
         Column("length", lambda row: as_text(row, 1), "d"),
         Column("is long", lambda row: Cell("yes" if row > 1 else "no", marked=row > 1)),
@@ -658,26 +683,26 @@ def test_a_column_has_its_heading_and_its_cells():
     assert [row[1].marked for row in made.rows] == [False, True]
 
 
-def test_parameters_as_text():
+def test_parameters_as_text() -> None:
     values = (5e-05, 0.0005, 0.11, 10_000, 2.0, "point")
     assert list(map(as_value, values)) == ["0.00005", "0.0005", "0.11", "10,000", "2", "point"]
 
 
-def test_paper_numbers_are_in_the_package():
+def test_paper_numbers_are_in_the_package() -> None:
     paper = paper_numbers()
     assert [row["z"]["mean"] for row in paper["table1"]] == [6.18, 5.97, 5.99, 5.93]
 
 
-def axis():
+def axis() -> Axes:
     return Canvas().subplots()
 
 
-def test_curves_differ_in_more_than_colour():
+def test_curves_differ_in_more_than_colour() -> None:
     assert len({style.line for style in STYLES}) == len(STYLES)
     assert len({style.marker for style in STYLES}) == len(STYLES)
 
 
-def test_plots_return_their_axis_and_name_it():
+def test_plots_return_their_axis_and_name_it() -> None:
     ax = axis()
     assert plot_wall_profile(ax, [0.5, 1.5], [0.1, 0.6], errors=[0.1, 0.1], label="a") is ax
     assert ax.get_xlabel() == "distance from the wall / d"
@@ -689,7 +714,7 @@ def test_plots_return_their_axis_and_name_it():
 
 
 @pytest.mark.parametrize("kind", ["curve", "profile", "points", "distribution"])
-def test_errors_on_a_logarithmic_axis_leave_no_wedge(kind):
+def test_errors_on_a_logarithmic_axis_leave_no_wedge(kind: Any) -> None:
     """A corner at 0 or below has no place there: others would be joined across the figure."""
     y = np.array([1, 0.1, 0.01, 0.002, 0.001])
     error = np.array([0.1, 0.05, 0.01, 0.003, math.nan])
@@ -708,7 +733,7 @@ def test_errors_on_a_logarithmic_axis_leave_no_wedge(kind):
         assert at.min() == pytest.approx(value - width) or at.min() < ax.get_ylim()[0]
 
 
-def test_what_is_wider_than_the_page_scrolls_in_a_box_of_its_own(page):
+def test_what_is_wider_than_the_page_scrolls_in_a_box_of_its_own(page: Page) -> None:
     style = page.text_of_style
     rules = dict(re.findall(r"^([.\w][^{}@]*?) \{([^{}]*)\}", style, re.MULTILINE))
     assert page.wide
@@ -721,7 +746,7 @@ def test_what_is_wider_than_the_page_scrolls_in_a_box_of_its_own(page):
     assert re.search(r"grid-template-columns: \w+ minmax\(0, 1fr\)", style)
 
 
-def test_neck_touches_the_rolling_sphere():
+def test_neck_touches_the_rolling_sphere() -> None:
     ax = draw_dimer_section(axis(), 1.8)
     upper = max(ax.patches[:2], key=lambda patch: patch.get_xy()[:, 1].max()).get_xy()
     low, high = (
@@ -734,7 +759,7 @@ def test_neck_touches_the_rolling_sphere():
     assert low == pytest.approx(math.sqrt(0.25 - 0.16), abs=1e-2)
 
 
-def test_dimer_is_as_long_as_it_is_said_to_be():
+def test_dimer_is_as_long_as_it_is_said_to_be() -> None:
     image = draw_dimer(axis(), 1.5, pixels=400).images[0]
     seen = np.flatnonzero(image.get_array()[..., 3].max(axis=0) > 0.5)
     left, right, *_ = image.get_extent()

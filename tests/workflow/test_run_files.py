@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from few_spheres import TINY
 from lammps_inelastic.analysis import AnalysisError, ParticleDump, open_run, read_run_log
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.measure import measure_case
 from lammps_inelastic.workflow.study import Outputs, read_study
-from study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same
+from tests.workflow.few_spheres import TINY
+from tests.workflow.study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same
 
 PARTICLES, CONTACTS, LOG = "particles.lammpsdump", "contacts.lammpsdump", "log.lammps"
 BOX = ["--box", "0", "1", "0", "0.5", "0", "1"]
@@ -114,65 +114,61 @@ def without_contact(run: Path) -> None:
     (run / CONTACTS).write_text("".join([*head, *rows[:-1]]))
 
 
+def of_frames(name: str, choose: Callable[[list[str]], list[str]], said: str) -> tuple[Damage, str]:
+    """Return the change of a dump's frames, and what is then said of the dump."""
+    return frames(name, choose), f"{name}: {said}"
+
+
 TOLD = r"that log\.lammps tells of"
 # What is damaged: what is said where the run is measured, looked at, exported. Runs that were
 # started by hand have no record; nothing else may say less.
 DAMAGES: dict[str, tuple[Damage, str]] = {
-    "no first frame": (
-        frames(PARTICLES, lambda f: f[1:]),
-        f"the frame of step 0 {TOLD} is missing",
+    "no first frame": of_frames(
+        PARTICLES, lambda f: f[1:], f"the frame of step 0 {TOLD} is missing"
     ),
-    "no middle frame": (
-        frames(PARTICLES, lambda f: f[:2] + f[3:]),
-        f"{PARTICLES}: the frame of step 40 {TOLD} is missing",
+    "no middle frame": of_frames(
+        PARTICLES, lambda f: f[:2] + f[3:], f"the frame of step 40 {TOLD} is missing"
     ),
-    "no last frame": (
-        frames(PARTICLES, lambda f: f[:-1]),
-        f"{PARTICLES}: the frame of step 135 {TOLD} is missing",
+    "no last frame": of_frames(
+        PARTICLES, lambda f: f[:-1], f"the frame of step 135 {TOLD} is missing"
     ),
-    "one frame": (
-        frames(PARTICLES, lambda f: f[:1]),
+    "one frame": of_frames(
+        PARTICLES,
+        lambda f: f[:1],
         rf"7 frames \(steps 20, 40, 60, 80, \.\.\., 135\) {TOLD} are missing",
     ),
-    "a frame twice": (
-        frames(PARTICLES, lambda f: [*f[:3], *f[2:]]),
-        f"{PARTICLES}: the frame of step 40 is there twice",
+    "a frame twice": of_frames(
+        PARTICLES, lambda f: [*f[:3], *f[2:]], "the frame of step 40 is there twice"
     ),
-    "last frame twice": (
-        frames(PARTICLES, lambda f: [*f, f[-1]]),
-        f"{PARTICLES}: the frame of step 135 is there twice",
+    "last frame twice": of_frames(
+        PARTICLES, lambda f: [*f, f[-1]], "the frame of step 135 is there twice"
     ),
-    "frames exchanged": (
-        frames(PARTICLES, lambda f: [f[1], f[0], *f[2:]]),
-        f"{PARTICLES}: the frame of step 0 comes after that of step 20",
+    "frames exchanged": of_frames(
+        PARTICLES, lambda f: [f[1], f[0], *f[2:]], "the frame of step 0 comes after that of step 20"
     ),
     "frame of another step": (
         replaced(PARTICLES, "^120$", "121"),
         f"{PARTICLES}: the frame of step 120 {TOLD} is missing",
     ),
-    "no first contacts": (
-        frames(CONTACTS, lambda f: f[1:]),
-        f"{CONTACTS}: the frame of step 130 {TOLD} is missing",
+    "no first contacts": of_frames(
+        CONTACTS, lambda f: f[1:], f"the frame of step 130 {TOLD} is missing"
     ),
-    "no middle contacts": (
-        frames(CONTACTS, lambda f: f[:1] + f[3:]),
-        rf"{CONTACTS}: 2 frames \(steps 131, 132\) {TOLD} are missing",
+    "no middle contacts": of_frames(
+        CONTACTS, lambda f: f[:1] + f[3:], rf"2 frames \(steps 131, 132\) {TOLD} are missing"
     ),
-    "contacts of one step": (
-        frames(CONTACTS, lambda f: f[:1]),
-        rf"{CONTACTS}: 5 frames \(steps 131, 132, 133, 134, 135\) {TOLD} are missing",
+    "contacts of one step": of_frames(
+        CONTACTS, lambda f: f[:1], rf"5 frames \(steps 131, 132, 133, 134, 135\) {TOLD} are missing"
     ),
-    "no last contacts": (
-        frames(CONTACTS, lambda f: f[:-1]),
-        f"{CONTACTS}: the frame of step 135 {TOLD} is missing",
+    "no last contacts": of_frames(
+        CONTACTS, lambda f: f[:-1], f"the frame of step 135 {TOLD} is missing"
     ),
-    "contacts twice": (
-        frames(CONTACTS, lambda f: [*f[:2], *f[1:]]),
-        f"{CONTACTS}: the frame of step 131 is there twice",
+    "contacts twice": of_frames(
+        CONTACTS, lambda f: [*f[:2], *f[1:]], "the frame of step 131 is there twice"
     ),
-    "contacts exchanged": (
-        frames(CONTACTS, lambda f: [*f[:-2], f[-1], f[-2]]),
-        f"{CONTACTS}: the frame of step 134 comes after that of step 135",
+    "contacts exchanged": of_frames(
+        CONTACTS,
+        lambda f: [*f[:-2], f[-1], f[-2]],
+        "the frame of step 134 comes after that of step 135",
     ),
     "contact of nobody": (
         replaced(CONTACTS, r"^\d+ (?=-?\d+ )", "999 "),
@@ -407,6 +403,7 @@ def test_a_result_of_another_run(
     assert "2026-01-01T00:00:00+00:00; delete it to measure that" in said
 
 
+@pytest.mark.slow
 def test_every_stage_of_a_run_is_compared(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,18 +7,20 @@ import signal
 import subprocess
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
-from few_spheres import TINY, write_data
 from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.schema import SCHEMA
-from lammps_inelastic.workflow.study import read_study
-from study_run import (
+from lammps_inelastic.workflow.study import Case, read_study
+from tests.workflow.few_spheres import TINY, write_data
+from tests.workflow.study_run import (
     ENVIRONMENT,
     PATIENCE,
     command,
@@ -32,7 +34,7 @@ from study_run import (
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of two cases that was run without trouble."""
     folder = tmp_path_factory.mktemp("undisturbed")
     study = folder / "few.toml"
@@ -43,31 +45,31 @@ def undisturbed(tmp_path_factory):
     return folder
 
 
-def one_case(folder, seed=1):
+def one_case(folder: Path, seed: int = 1) -> Path:
     path = folder / "few.toml"
     path.write_text(TINY.replace("{seeds}", f"{seed}"))
     return path
 
 
-def of_case(numbers, case):
+def of_case(numbers: dict[str, Any], case: Case) -> dict[str, Any]:
     """The numbers of one case in a study's file."""
     start = f"few/cases/{case.name}/"
     return {name.removeprefix(start): v for name, v in numbers.items() if name.startswith(start)}
 
 
-def equals_undisturbed(undisturbed, study_path, out):
+def equals_undisturbed(undisturbed: Path, study_path: Path, out: Path) -> bool:
     (case,) = read_study(study_path).cases
     wanted = of_case(numbers_of(undisturbed / "out" / "few.h5"), case)
     assert wanted
     return same(of_case(numbers_of(out / "few.h5"), case), wanted)
 
 
-def test_every_dataset_is_in_the_schema(undisturbed):
+def test_every_dataset_is_in_the_schema(undisturbed: Path) -> None:
     with h5py.File(undisturbed / "out" / "few.h5") as file:
         cases = file["few/cases"]
         assert len(cases) == 2
         for case in cases.values():
-            found = {}
+            found: dict[str, Any] = {}
             case.visititems(
                 lambda name, item, found=found: found.update(
                     {name: item} if isinstance(item, h5py.Dataset) else {}
@@ -82,7 +84,8 @@ def test_every_dataset_is_in_the_schema(undisturbed):
             assert record["stages"][0]["variables"]["seed"] in (1, 2)
 
 
-def test_what_is_measured_of_dimers(tmp_path, write_study):
+@pytest.mark.slow
+def test_what_is_measured_of_dimers(tmp_path: Path, write_study: Callable[..., Path]) -> None:
     dimers = TINY.replace('deck = "spheres"', 'deck = "dimers"').replace("{seeds}", "1")
     # Long enough to land on one another
     dimers = dimers.replace("settling = 60", "settling = 250").replace(
@@ -109,7 +112,7 @@ def test_what_is_measured_of_dimers(tmp_path, write_study):
     )
 
 
-def test_the_summary_is_a_table(undisturbed):
+def test_the_summary_is_a_table(undisturbed: Path) -> None:
     pandas = pytest.importorskip("pandas")
     with h5py.File(undisturbed / "out" / "few.h5") as file:
         table = pandas.DataFrame({name: v[()] for name, v in file["few/summary"].items()})
@@ -118,7 +121,7 @@ def test_the_summary_is_a_table(undisturbed):
     assert table["packing_fraction"].between(0.2, 0.7).all()
 
 
-def test_nothing_is_left_to_do(undisturbed, capsys):
+def test_nothing_is_left_to_do(undisturbed: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = undisturbed / "out"
     before = numbers_of(out / "few.h5")
     assert main(["run", str(undisturbed / "few.toml"), "--out", str(out)]) == 0
@@ -126,7 +129,7 @@ def test_nothing_is_left_to_do(undisturbed, capsys):
     assert same(before, numbers_of(out / "few.h5"))
 
 
-def test_status_tells_whole_names(undisturbed, capsys):
+def test_status_tells_whole_names(undisturbed: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = undisturbed / "few.toml", undisturbed / "out"
     assert main(["status", str(path), "--out", str(out)]) == 0
     output = capsys.readouterr().out
@@ -134,8 +137,18 @@ def test_status_tells_whole_names(undisturbed, capsys):
     assert "few: 2 measured" in output
 
 
-@pytest.mark.parametrize("moment", ["part", "dump", "finished", "result"])
-def test_killed_and_run_again(undisturbed, tmp_path, moment, capsys):
+@pytest.mark.parametrize(
+    "moment",
+    [
+        pytest.param("part", marks=pytest.mark.slow),
+        "dump",
+        pytest.param("finished", marks=pytest.mark.slow),
+        "result",
+    ],
+)
+def test_killed_and_run_again(
+    undisturbed: Path, tmp_path: Path, moment: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     path, out = one_case(tmp_path), tmp_path / "out"
     study = read_study(path)
     folder, (case,) = Folder(out), study.cases
@@ -159,7 +172,7 @@ SLOW = 'title = "slow"\ndeck = "slow.in"\n'
 
 
 @pytest.fixture
-def slow(tmp_path):
+def slow(tmp_path: Path) -> Path:
     """Return a study of a deck that never ends."""
     (tmp_path / "slow.in").write_text("variable x index 1\nprint 'here'\nshell sleep 1000\n")
     path = tmp_path / "slow.toml"
@@ -167,7 +180,7 @@ def slow(tmp_path):
     return path
 
 
-def test_sigterm_kills_what_runs(slow, tmp_path):
+def test_sigterm_kills_what_runs(slow: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     status = killed_when(
         lambda: len(processes_in(out)) > 1, "run", slow, "--out", out, by=signal.SIGTERM
@@ -176,7 +189,7 @@ def test_sigterm_kills_what_runs(slow, tmp_path):
     wait_for(lambda: not processes_in(out))
 
 
-def mapped(process, part):
+def mapped(process: subprocess.Popen[str], part: str) -> bool:
     """Whether a process has a library mapped whose path has this part: how far it has come."""
     try:
         return part in Path(f"/proc/{process.pid}/maps").read_text()
@@ -184,8 +197,17 @@ def mapped(process, part):
         return False
 
 
-@pytest.mark.parametrize("moment", ["imports", "imports, late", "pool", "twice", "together"])
-def test_interrupted(moment, tmp_path):
+@pytest.mark.parametrize(
+    "moment",
+    [
+        "imports",
+        pytest.param("imports, late", marks=pytest.mark.slow),
+        "pool",
+        pytest.param("twice", marks=pytest.mark.slow),
+        pytest.param("together", marks=pytest.mark.slow),
+    ],
+)
+def test_interrupted(moment: Any, tmp_path: Path) -> None:
     """At whatever moment: one line, and nothing is left running."""
     out = tmp_path / "out"
     (tmp_path / "slow.in").write_text("variable x index 1\nshell sleep 1000\n")
@@ -216,7 +238,7 @@ def test_interrupted(moment, tmp_path):
     assert processes_in(out) == []
 
 
-def test_what_nohup_ignores_stays_ignored(slow, tmp_path):
+def test_what_nohup_ignores_stays_ignored(slow: Path, tmp_path: Path) -> None:
     """A study goes on when the terminal is closed, and ends for another signal."""
     out = tmp_path / "out"
     process = subprocess.Popen(
@@ -236,7 +258,9 @@ def test_what_nohup_ignores_stays_ignored(slow, tmp_path):
         assert process.wait(PATIENCE) == 130
 
 
-def test_what_a_killed_workflow_leaves_is_stopped(slow, tmp_path, capsys):
+def test_what_a_killed_workflow_leaves_is_stopped(
+    slow: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
     killed_when(lambda: len(processes_in(out)) > 1, "run", slow, "--out", out)
     orphans = processes_in(out)
@@ -246,7 +270,9 @@ def test_what_a_killed_workflow_leaves_is_stopped(slow, tmp_path, capsys):
     wait_for(lambda: not processes_in(out))
 
 
-def test_failures_do_not_stop_the_others(tmp_path, capsys):
+def test_failures_do_not_stop_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     decks = {
         "wrong": "print 'so far so good'\nnonsense 5\n",
         "quits": "print 'bad input'\nif '1 > 0' then 'quit 1'\n",
@@ -274,7 +300,9 @@ def test_failures_do_not_stop_the_others(tmp_path, capsys):
     wait_for(lambda: not processes_in(out))
 
 
-def test_somebody_else_runs_it(undisturbed, tmp_path, capsys):
+def test_somebody_else_runs_it(
+    undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path, out = one_case(tmp_path), tmp_path / "out"
     (case,) = read_study(path).cases
     with Folder(out).lock(case) as mine:
@@ -283,7 +311,7 @@ def test_somebody_else_runs_it(undisturbed, tmp_path, capsys):
     assert "few: 1 run by somebody else" in capsys.readouterr().out
 
 
-def test_starts_from_a_data_file(tmp_path, capsys):
+def test_starts_from_a_data_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_data(tmp_path / "my.data", diameter=0.2)
     path = tmp_path / "few.toml"
     text = TINY.replace("{seeds}", "1").replace("[outputs]", "start = 'my.data'\n[outputs]")
@@ -295,7 +323,7 @@ def test_starts_from_a_data_file(tmp_path, capsys):
     assert numbers["few/summary/start"].tolist() == [b"inputs/my.data"]
 
 
-def test_groups_of_one_rank_give_the_same_numbers(undisturbed, tmp_path):
+def test_groups_of_one_rank_give_the_same_numbers(undisturbed: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = inelastic("run", undisturbed / "few.toml", "--out", out, "--mpi", ranks=2)
     assert done.returncode == 0, done.stderr
@@ -304,7 +332,8 @@ def test_groups_of_one_rank_give_the_same_numbers(undisturbed, tmp_path):
     assert same(numbers_of(out / "few.h5"), numbers_of(undisturbed / "out" / "few.h5"))
 
 
-def test_a_group_of_two_ranks(undisturbed, tmp_path):
+@pytest.mark.slow
+def test_a_group_of_two_ranks(undisturbed: Path, tmp_path: Path) -> None:
     path, out = one_case(tmp_path), tmp_path / "out"
     done = inelastic("run", path, "--out", out, "--mpi", "--ranks", 2, ranks=2)
     assert done.returncode == 0, done.stderr
@@ -318,7 +347,7 @@ def test_a_group_of_two_ranks(undisturbed, tmp_path):
         assert np.array_equal(together[name], alone[name])
 
 
-def test_an_error_on_one_rank_ends_the_job(tmp_path):
+def test_an_error_on_one_rank_ends_the_job(tmp_path: Path) -> None:
     start = time.monotonic()
     done = inelastic(
         # Where nobody can make a folder.
@@ -331,8 +360,9 @@ def test_an_error_on_one_rank_ends_the_job(tmp_path):
     assert time.monotonic() - start < 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timeout", ["0.3", "1.4"])
-def test_in_a_job_a_run_that_is_cut_short_is_late(tmp_path, timeout):
+def test_in_a_job_a_run_that_is_cut_short_is_late(tmp_path: Path, timeout: float) -> None:
     path = one_case(tmp_path)
     path.write_text(path.read_text().replace("steps_settling = 60", "steps_settling = 1000000"))
     done = inelastic("run", path, "--out", tmp_path / "out", "--mpi", "--timeout", timeout, ranks=1)
@@ -341,12 +371,12 @@ def test_in_a_job_a_run_that_is_cut_short_is_late(tmp_path, timeout):
     assert not list((tmp_path / "out" / "cases").glob("*/finished.json"))
 
 
-def test_a_look_does_not_keep_a_run_from_its_case(tmp_path):
+def test_a_look_does_not_keep_a_run_from_its_case(tmp_path: Path) -> None:
     (case,) = read_study(one_case(tmp_path)).cases
     folder = Folder(tmp_path / "out")
     looks = threading.Event()
 
-    def look():
+    def look() -> None:
         with folder.lock(case) as mine:
             assert mine
             looks.set()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -15,12 +17,12 @@ from lammps_inelastic.workflow.study import read_study
 STUDY = 'title = "t"\ndeck = "spheres"\n[parameters]\nseed = { from = 1, to = 3 }\n'
 
 
-def test_numbers_as_slurm_writes_them():
+def test_numbers_as_slurm_writes_them() -> None:
     assert _ranges([1, 2, 3, 5, 8, 9]) == "1-3,5,8-9"
     assert _ranges([4]) == "4"
 
 
-def test_script(write_study, tmp_path):
+def test_script(write_study: Callable[..., Path], tmp_path: Path) -> None:
     path = write_study(STUDY)
     text = job_script(read_study(path), path, Folder(tmp_path / "a b"), ranks=2, time="1:00:00")
     lines = text.splitlines()
@@ -33,7 +35,9 @@ def test_script(write_study, tmp_path):
     assert words[-2:] == ["--case", "$SLURM_ARRAY_TASK_ID"]
 
 
-def test_one_study_at_a_time(write_study, capsys):
+def test_one_study_at_a_time(
+    write_study: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     path = str(write_study(STUDY))
     assert main(["slurm", path, path]) == 2
     assert capsys.readouterr().err == "inelastic: slurm: one study at a time\n"
@@ -49,7 +53,13 @@ def test_one_study_at_a_time(write_study, capsys):
         ),
     ],
 )
-def test_limits_of_time(write_study, tmp_path, time, fine, capsys):
+def test_limits_of_time(
+    write_study: Callable[..., Path],
+    tmp_path: Path,
+    time: str,
+    fine: bool,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     arguments = ["slurm", str(write_study(STUDY)), "--out", str(tmp_path / "out")]
     assert main([*arguments, f"--time={time}"]) == (0 if fine else 2)
     captured = capsys.readouterr()
@@ -70,7 +80,9 @@ def test_limits_of_time(write_study, tmp_path, time, fine, capsys):
         ('a"', False),
     ],
 )
-def test_names_in_a_script(tmp_path, name, fine, capsys):
+def test_names_in_a_script(
+    tmp_path: Path, name: str, fine: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Neither a line nor a word of a name is taken for an option or a command."""
     folder = tmp_path / name
     folder.mkdir()

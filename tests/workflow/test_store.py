@@ -7,6 +7,7 @@ import io
 import random
 import re
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -25,7 +26,7 @@ from lammps_inelastic.workflow.store import (
 )
 
 
-def result_of(case, /, **variables):
+def result_of(case: str, /, **variables: Any) -> Result:
     stage = {"deck": "own", "folder": ".", "text": "", "variables": variables}
     values = {
         "numbers/packing_fraction": np.array(0.6),
@@ -34,7 +35,7 @@ def result_of(case, /, **variables):
     return Result(values, {"network": b"\x89PNG"}, {"case": case, "stages": [stage]}, "{}")
 
 
-def equal(one, other):
+def equal(one: Result, other: Result) -> bool:
     return (
         one.values.keys() == other.values.keys()
         and all(np.array_equal(v, other.values[name]) for name, v in one.values.items())
@@ -42,7 +43,7 @@ def equal(one, other):
     )
 
 
-def test_round_trip_of_a_result(tmp_path):
+def test_round_trip_of_a_result(tmp_path: Path) -> None:
     path = tmp_path / "folder" / "a.h5"
     result = result_of("a", seed=1)
     write_result(path, result)
@@ -51,7 +52,7 @@ def test_round_trip_of_a_result(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_round_trip_of_a_study_in_the_order_of_its_cases(tmp_path):
+def test_round_trip_of_a_study_in_the_order_of_its_cases(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     results = [result_of("b", seed=2), result_of("a", seed=1)]
     write_studies(path, [StoredStudy("s", "títle", "text", results)])
@@ -61,7 +62,7 @@ def test_round_trip_of_a_study_in_the_order_of_its_cases(tmp_path):
     assert all(equal(*pair) for pair in zip(study.results, results, strict=True))
 
 
-def test_columns_of_the_summary(tmp_path):
+def test_columns_of_the_summary(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     results = [result_of("a", case=1, word="x"), result_of("b", case=2, drag=0.5)]
     write_studies(path, [StoredStudy("s", "", "", results)])
@@ -75,7 +76,7 @@ def test_columns_of_the_summary(tmp_path):
 
 
 @pytest.mark.parametrize("size", [0, 100, -1])
-def test_a_truncated_file_is_no_result(tmp_path, size):
+def test_a_truncated_file_is_no_result(tmp_path: Path, size: int) -> None:
     path = tmp_path / "a.h5"
     write_result(path, result_of("a"))
     path.write_bytes(path.read_bytes()[:size])
@@ -83,7 +84,7 @@ def test_a_truncated_file_is_no_result(tmp_path, size):
         read_result(path)
 
 
-def test_another_version_is_said(tmp_path, monkeypatch):
+def test_another_version_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.h5"
     with monkeypatch.context() as patch:
         patch.setattr("lammps_inelastic.workflow.store.VERSION", 99)
@@ -93,7 +94,7 @@ def test_another_version_is_said(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("at", [0, 8, 60, 500, 2000, -200, -100, -40, -1])
-def test_one_changed_byte_is_noticed(tmp_path, at):
+def test_one_changed_byte_is_noticed(tmp_path: Path, at: int) -> None:
     """Wherever it is: HDF5 itself does not look whether numbers are as they were written."""
     path = tmp_path / "a.h5"
     write_result(path, result_of("a"))
@@ -106,7 +107,7 @@ def test_one_changed_byte_is_noticed(tmp_path, at):
         read_studies(path)
 
 
-def test_random_bytes_never_reach_hdf5(tmp_path):
+def test_random_bytes_never_reach_hdf5(tmp_path: Path) -> None:
     """A file that begins as one of HDF5 may keep it busy for minutes, or end the process."""
     path = tmp_path / "a.h5"
     write_result(path, result_of("a"))
@@ -118,7 +119,7 @@ def test_random_bytes_never_reach_hdf5(tmp_path):
 
 
 @pytest.mark.parametrize("lacks", ["outputs", "record", "case"])
-def test_a_sealed_file_of_something_else(tmp_path, lacks):
+def test_a_sealed_file_of_something_else(tmp_path: Path, lacks: str) -> None:
     path = tmp_path / "a.h5"
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
@@ -133,7 +134,7 @@ def test_a_sealed_file_of_something_else(tmp_path, lacks):
         read_result(path)
 
 
-def test_columns_whose_names_are_taken(tmp_path):
+def test_columns_whose_names_are_taken(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     taken = {"case": 1, "case_variable": 2, "packing_fraction": 3, "packing_fraction_measured": 4}
     write_studies(path, [StoredStudy("s", "", "", [result_of("a", **taken)])])
@@ -149,7 +150,7 @@ def test_columns_whose_names_are_taken(tmp_path):
     }
 
 
-def test_the_document_lists_the_schema():
+def test_the_document_lists_the_schema() -> None:
     """workflow/README.md has a line for each dataset, as the schema says it."""
     document = (Path(__file__).parents[2] / "workflow" / "README.md").read_text()
     rows = [line for line in document.splitlines() if re.match(r"\| `\w+/\w+` \|", line)]

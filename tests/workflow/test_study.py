@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,7 +18,7 @@ HEAD = 'title = "t"\ndeck = "spheres"\n'
 DIGITS = "9" * 400
 
 
-def mistakes_of(path):
+def mistakes_of(path: Path) -> list[str]:
     with pytest.raises(StudyError) as caught:
         read_study(path)
     assert all(line.startswith(f"{path}: ") for line in caught.value.mistakes)
@@ -124,7 +127,9 @@ def mistakes_of(path):
         (HEAD + "[outputs.profile]\naxes = 'x'", "allowed are axis, thickness, reach, points"),
     ],
 )
-def test_one_line_for_one_mistake(write_study, text, message, capsys):
+def test_one_line_for_one_mistake(
+    write_study: Callable[..., Path], text: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = write_study(text)
     (line,) = mistakes_of(path)
     assert message in line
@@ -181,7 +186,9 @@ def test_one_line_for_one_mistake(write_study, text, message, capsys):
         ("clusters own.in", "", None),
     ],
 )
-def test_decks_that_fit_together(write_study, tmp_path, decks, parameters, message):
+def test_decks_that_fit_together(
+    write_study: Callable[..., Path], tmp_path: Path, decks: str, parameters: str, message: str
+) -> None:
     (tmp_path / "own.in").write_text("variable diameter index 0.2\nvariable out index out\n")
     # As the study's deck, and as that of a row.
     for head in ("deck = {}", 'deck = "spheres"\nrows = [{{ deck = {} }}]'):
@@ -197,7 +204,7 @@ def test_decks_that_fit_together(write_study, tmp_path, decks, parameters, messa
         assert where in ("deck", "rows[1].deck", message.split(":")[0])
 
 
-def test_a_row_whose_deck_does_not_fit(write_study):
+def test_a_row_whose_deck_does_not_fit(write_study: Callable[..., Path]) -> None:
     text = (
         'title="t"\ndeck=["spheres", "settling"]\n[[rows]]\n[[rows]]\ndeck=["dimers", "settling"]'
     )
@@ -208,7 +215,7 @@ def test_a_row_whose_deck_does_not_fit(write_study):
     assert line.endswith(" (at line 5)")
 
 
-def test_pictures_of_the_longest_case(write_study):
+def test_pictures_of_the_longest_case(write_study: Callable[..., Path]) -> None:
     """Of a shorter one the last frame is drawn, so that a study may mix them."""
     text = HEAD + "[parameters]\nsteps_settling = [100, 2000]\n[outputs]\npictures = [0, 2470]"
     assert len(read_study(write_study(text)).cases) == 2
@@ -227,7 +234,9 @@ def test_pictures_of_the_longest_case(write_study):
         ("漢.toml", None),
     ],
 )
-def test_names_of_study_files(tmp_path, name, message, capsys):
+def test_names_of_study_files(
+    tmp_path: Path, name: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / name
     path.write_text(HEAD)
     assert main(["validate", str(path)]) == (0 if message is None else 2)
@@ -237,7 +246,9 @@ def test_names_of_study_files(tmp_path, name, message, capsys):
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder", "link", "large"])
-def test_what_is_no_file(write_study, tmp_path, kind, capsys):
+def test_what_is_no_file(
+    write_study: Callable[..., Path], tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     """As a study, a deck and a start: a line each, and nobody waits."""
     odd = tmp_path / "odd"
     if kind == "pipe":
@@ -263,7 +274,9 @@ def test_what_is_no_file(write_study, tmp_path, kind, capsys):
 @pytest.mark.parametrize(
     "name", ["spheres.in", "log.lammps", "lmp.out", "finished.json", "inputs", "random", "a b"]
 )
-def test_a_start_may_have_any_name(write_study, tmp_path, name):
+def test_a_start_may_have_any_name(
+    write_study: Callable[..., Path], tmp_path: Path, name: str
+) -> None:
     """It lies in a folder of its own, and is a file also where a deck has a word of its name."""
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / name).write_text("data")
@@ -279,13 +292,13 @@ def test_a_start_may_have_any_name(write_study, tmp_path, name):
     assert (part / "spheres.in").read_text() == case.stages[0].deck.text
 
 
-def test_a_word_of_a_deck_is_no_file(write_study, tmp_path):
+def test_a_word_of_a_deck_is_no_file(write_study: Callable[..., Path], tmp_path: Path) -> None:
     (tmp_path / "random").write_text("data")
     (case,) = read_study(write_study(HEAD + "[parameters]\nstart = 'random'")).cases
     assert (case.inputs, case.variables["start"]) == ({}, "random")
 
 
-def test_two_files_of_one_name(write_study, tmp_path):
+def test_two_files_of_one_name(write_study: Callable[..., Path], tmp_path: Path) -> None:
     (tmp_path / "own.in").write_text("variable start index a\nvariable shape index b\n")
     for folder in "ab":
         (tmp_path / folder).mkdir()
@@ -298,7 +311,9 @@ def test_two_files_of_one_name(write_study, tmp_path):
     assert list(case.inputs) == ["x"]
 
 
-def test_a_start_that_changes_before_it_is_used(write_study, tmp_path):
+def test_a_start_that_changes_before_it_is_used(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
     (tmp_path / "my.data").write_text("one")
     (case,) = read_study(write_study(HEAD + '[parameters]\nstart = "my.data"')).cases
     (tmp_path / "my.data").write_text("two")
@@ -309,7 +324,7 @@ def test_a_start_that_changes_before_it_is_used(write_study, tmp_path):
 @pytest.mark.parametrize(
     "names", [".hidden.in", "a b.in", "$a.in", "inputs.in a.in", "a.in.in a.in"]
 )
-def test_names_of_own_decks(write_study, tmp_path, names):
+def test_names_of_own_decks(write_study: Callable[..., Path], tmp_path: Path, names: str) -> None:
     decks = names.split(".in ")
     decks = [f"{each.removesuffix('.in')}.in" for each in decks]
     for each in decks:
@@ -318,7 +333,7 @@ def test_names_of_own_decks(write_study, tmp_path, names):
     assert line.startswith("deck: ")
 
 
-def test_a_deck_without_a_parameter(write_study, tmp_path):
+def test_a_deck_without_a_parameter(write_study: Callable[..., Path], tmp_path: Path) -> None:
     (tmp_path / "own.in").write_text("print 'x'\n")
     (case,) = read_study(write_study('title="t"\ndeck="own.in"')).cases
     assert case.variables == {}
@@ -339,7 +354,9 @@ def test_a_deck_without_a_parameter(write_study, tmp_path):
         ("if 1 then 'variable out equal 1'\n", False, False),
     ],
 )
-def test_where_an_own_deck_writes(write_study, tmp_path, text, given, fits):
+def test_where_an_own_deck_writes(
+    write_study: Callable[..., Path], tmp_path: Path, text: str, given: bool, fits: bool
+) -> None:
     (tmp_path / "own.in").write_text(text)
     (case,) = read_study(write_study('title="t"\ndeck="own.in"')).cases
     (command,) = case.commands()
@@ -352,44 +369,46 @@ def test_where_an_own_deck_writes(write_study, tmp_path, text, given, fits):
         assert line.startswith("deck: the next deck could not find what own leaves: own must write")
 
 
-def test_all_mistakes_at_once_in_the_order_of_the_file(write_study):
+def test_all_mistakes_at_once_in_the_order_of_the_file(write_study: Callable[..., Path]) -> None:
     path = write_study(HEAD + "[parameters]\nzoo = 1\nseed = 0\ndrag = -1\nfoo = 1\nbar = 2\n")
     keys = [line.split(":")[0] for line in mistakes_of(path)]
     assert keys == [f"parameters.{name}" for name in ("seed", "drag", "zoo", "foo", "bar")]
 
 
-def test_no_such_file(tmp_path):
+def test_no_such_file(tmp_path: Path) -> None:
     assert mistakes_of(tmp_path / "no.toml") == ["No such file or directory"]
     assert mistakes_of(tmp_path) == ["Is a directory"]
 
 
-def test_mistakes_in_outputs_do_not_hide_others(write_study):
+def test_mistakes_in_outputs_do_not_hide_others(write_study: Callable[..., Path]) -> None:
     path = write_study(HEAD + "[parameters]\nseed = 0\n[outputs]\npoint = 1000\n")
     keys = [line.split(":")[0] for line in mistakes_of(path)]
     assert keys == ["outputs.point", "parameters.seed"]
 
 
-def test_study_that_is_neither_a_file_nor_shipped(capsys):
+def test_study_that_is_neither_a_file_nor_shipped(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "table_1"]) == 2
     error = capsys.readouterr().err
     assert error.startswith("inelastic: no study table_1: it must be a TOML file or ")
     assert "table-1, table-2" in error
 
 
-def test_a_deck_that_is_no_text(write_study, tmp_path):
+def test_a_deck_that_is_no_text(write_study: Callable[..., Path], tmp_path: Path) -> None:
     (tmp_path / "own.in").write_bytes(b"# caf\xe9\nvariable x index 1\n")
     (line,) = mistakes_of(write_study('title = "t"\ndeck = "own.in"'))
     assert "own.in: not UTF-8" in line
 
 
 @pytest.mark.parametrize("value", ["", "a b", "$x", "a&", "a\\u0000", "a\\u001b"])
-def test_words_that_lammps_cannot_take(write_study, tmp_path, value):
+def test_words_that_lammps_cannot_take(
+    write_study: Callable[..., Path], tmp_path: Path, value: str
+) -> None:
     (tmp_path / "own.in").write_text("variable x index 1\n")
     (line,) = mistakes_of(write_study(f'title="t"\ndeck="own.in"\n[parameters]\nx = "{value}"'))
     assert line.startswith("parameters.x: ")
 
 
-def values_of(path, name):
+def values_of(path: Path, name: str) -> list[Any]:
     return [case.variables[name] for case in read_study(path).cases]
 
 
@@ -405,11 +424,11 @@ def values_of(path, name):
         ("{ from = 2, to = 2 }", [2]),
     ],
 )
-def test_values(write_study, written, values):
+def test_values(write_study: Callable[..., Path], written: str, values: list[Any]) -> None:
     assert values_of(write_study(f"{HEAD}[parameters]\ndrag = {written}"), "drag") == values
 
 
-def test_combinations_row_by_row(write_study):
+def test_combinations_row_by_row(write_study: Callable[..., Path]) -> None:
     path = write_study(
         'title="t"\ndeck="dimers"\n[parameters]\nseed=[1,2]\naspect_ratio=[1.1,1.2]\n'
         '[[rows]]\naspect_ratio=1.3\n[[rows]]\n[[rows]]\ndeck="spheres"\n'
@@ -430,7 +449,7 @@ def test_combinations_row_by_row(write_study):
     ]
 
 
-def test_names_are_those_of_before_when_a_study_grows(write_study):
+def test_names_are_those_of_before_when_a_study_grows(write_study: Callable[..., Path]) -> None:
     before = read_study(write_study(HEAD + "[parameters]\nseed = [1, 2]")).cases
     # Another order, a variable at its default, more values, more rows, and a row twice.
     grown = HEAD + "[parameters]\ndt = 0.01\nseed = [3, 2, 1]\n[[rows]]\n[[rows]]\n[[rows]]\ndrag=2"
@@ -441,7 +460,7 @@ def test_names_are_those_of_before_when_a_study_grows(write_study):
     assert all(name.startswith("spheres_particles=1000_") for name in names)
 
 
-def test_names_are_fit_for_folders(write_study, tmp_path):
+def test_names_are_fit_for_folders(write_study: Callable[..., Path], tmp_path: Path) -> None:
     (tmp_path / "own.in").write_text("variable x index 1\n")
     words = ["a/b", "[/b]", "漢" * 200, "..", "a:b"]
     path = write_study(f'title="t"\ndeck="own.in"\n[parameters]\nx = {words}')
@@ -451,7 +470,9 @@ def test_names_are_fit_for_folders(write_study, tmp_path):
         (tmp_path / f"{name}.failed").mkdir()
 
 
-def test_own_decks_of_one_name_are_different_cases(write_study, tmp_path):
+def test_own_decks_of_one_name_are_different_cases(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
     for folder, default in (("a", 1), ("b", 2)):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "own.in").write_text(f"variable x index {default}\n")
@@ -459,7 +480,9 @@ def test_own_decks_of_one_name_are_different_cases(write_study, tmp_path):
     assert len({case.name for case in read_study(path).cases}) == 2
 
 
-def test_a_data_file_counts_by_its_content(write_study, tmp_path):
+def test_a_data_file_counts_by_its_content(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
     path = write_study(HEAD + '[parameters]\nstart = "my.data"')
     data = tmp_path / "my.data"
     data.write_text("one")
@@ -470,7 +493,9 @@ def test_a_data_file_counts_by_its_content(write_study, tmp_path):
     assert case.variables["start"] == "inputs/my.data"
 
 
-def test_commands(write_study, capsys, tmp_path):
+def test_commands(
+    write_study: Callable[..., Path], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     path = write_study(HEAD + "[parameters]\nseed = 7\ndrag = 1.5")
     (case,) = read_study(path).cases
     own = ["lmp", "-nonbuf", "-in", "spheres.in", "-var", "drag", "1.5"]
@@ -485,7 +510,7 @@ def test_commands(write_study, capsys, tmp_path):
     assert not (tmp_path / "a b").exists()
 
 
-def test_stages_hand_on_their_packing(write_study):
+def test_stages_hand_on_their_packing(write_study: Callable[..., Path]) -> None:
     path = write_study('title="t"\ndeck=["spheres", "response"]\n[parameters]\nangle = -5')
     (case,) = read_study(path).cases
     first, second = case.commands()

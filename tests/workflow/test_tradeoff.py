@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
-from few_spheres import write_data
 from lammps_inelastic.analysis import (
     InputError,
     ParticleFrame,
@@ -17,6 +18,7 @@ from lammps_inelastic.analysis import (
     network_difference,
     read_run_log,
 )
+from lammps_inelastic.analysis.geometry import FloatArray
 from lammps_inelastic.workflow.cli import tradeoff as tradeoff_command
 from lammps_inelastic.workflow.launch import cores
 from lammps_inelastic.workflow.main import main
@@ -26,8 +28,9 @@ from lammps_inelastic.workflow.study import Case
 from lammps_inelastic.workflow.thermo import read_thermo
 from lammps_inelastic.workflow.tradeoff.advice import recommendations
 from lammps_inelastic.workflow.tradeoff.comparison import compare, reference_of
-from lammps_inelastic.workflow.tradeoff.plan import Configuration, Run
-from study_run import killed_when, numbers_of, same
+from lammps_inelastic.workflow.tradeoff.plan import Configuration, Plan, Run
+from tests.workflow.few_spheres import write_data
+from tests.workflow.study_run import killed_when, numbers_of, same
 
 # Deep enough to fill the measuring box, few enough for a second a run.
 FEW = ["--particles", "60", "--diameter", "0.3"]
@@ -39,12 +42,12 @@ TIMES = np.arange(41) * 0.05
 DIAMETER = 0.1
 
 
-def fallen_by(time):
+def fallen_by(time: Any) -> FloatArray:
     """Height of the centre of mass in a fall from 2.5 that a floor ends at 0.5."""
     return np.maximum(2.5 - 9.81 * time**2 / 2, 0.5)
 
 
-def test_at_rest_when_fallen_and_steady():
+def test_at_rest_when_fallen_and_steady() -> None:
     landed = math.sqrt(2 * 2 / 9.81)
     share = np.where(landed + 0.1 < TIMES, 0.6, 0.14)
     index = first_at_rest(TIMES, share, fallen_by(TIMES), DIAMETER)
@@ -52,21 +55,21 @@ def test_at_rest_when_fallen_and_steady():
     assert TIMES[index] == pytest.approx(1.0)
 
 
-def test_a_falling_cloud_keeps_its_packing_fraction_and_is_not_at_rest():
+def test_a_falling_cloud_keeps_its_packing_fraction_and_is_not_at_rest() -> None:
     share = np.full(len(TIMES), 0.14)
     index = first_at_rest(TIMES, share, fallen_by(TIMES), DIAMETER)
     # It lands at 0.64.
     assert TIMES[index] == pytest.approx(0.9)
 
 
-def test_a_change_that_is_too_large_is_not_at_rest():
+def test_a_change_that_is_too_large_is_not_at_rest() -> None:
     height = np.full(len(TIMES), 0.5)
     slow, fast = (0.6 * (1 + rate * TIMES) for rate in (0.0039, 0.0042))
     assert first_at_rest(TIMES, slow, height, DIAMETER) == 5
     assert first_at_rest(TIMES, fast, height, DIAMETER) is None
 
 
-def test_a_packing_that_is_shaken_is_not_at_rest():
+def test_a_packing_that_is_shaken_is_not_at_rest() -> None:
     # The period is 0.25, so that the packing fraction is always that of 0.25 ago.
     swing = np.where(np.arange(len(TIMES)) % 5 == 2, 1.0, 0.0)
     share, height = 0.6 + 0.02 * swing, 0.5 + 0.05 * DIAMETER * swing
@@ -74,7 +77,7 @@ def test_a_packing_that_is_shaken_is_not_at_rest():
     assert first_at_rest(TIMES, share, 0.5 + 0.9 * (height - 0.5), DIAMETER) == 5
 
 
-def test_never_at_rest():
+def test_never_at_rest() -> None:
     still = np.full(len(TIMES), 0.5)
     # An empty box, a run that is too short, and times that are not known.
     assert first_at_rest(TIMES, np.zeros(len(TIMES)), still, DIAMETER) is None
@@ -82,7 +85,7 @@ def test_never_at_rest():
     assert first_at_rest(np.full(len(TIMES), np.nan), still, still, DIAMETER) is None
 
 
-def test_frames_need_not_be_evenly_spaced():
+def test_frames_need_not_be_evenly_spaced() -> None:
     times = np.array([0.0, 0.3, 0.5, 0.6])
     share = np.array([0.5, 0.6, 0.6, 0.6])
     # At 0.5 the time 0.25 before lies within the rise from 0 to 0.3.
@@ -92,7 +95,7 @@ def test_frames_need_not_be_evenly_spaced():
 # What is read from logs and frames
 
 
-def test_a_log_between_and_after_its_lines(tmp_path):
+def test_a_log_between_and_after_its_lines(tmp_path: Path) -> None:
     log = tmp_path / "log.lammps"
     runs = [
         "   Step  \n     0\nLoop time of 1 on 1 procs for 0 steps with 3 atoms\n",
@@ -111,7 +114,7 @@ def test_a_log_between_and_after_its_lines(tmp_path):
     assert np.isnan(at_steps([1], *read_thermo(read, "CPU").values())).all()
 
 
-def test_overlaps_are_the_contacts_of_soft_spheres():
+def test_overlaps_are_the_contacts_of_soft_spheres() -> None:
     frame = ParticleFrame(
         step=7,
         ids=np.array([4, 2, 9]),
@@ -130,12 +133,12 @@ def test_overlaps_are_the_contacts_of_soft_spheres():
 # How networks and packings are compared
 
 
-def test_networks_that_are_the_same_up_to_units_and_order():
+def test_networks_that_are_the_same_up_to_units_and_order() -> None:
     one = network_difference([[1, 2], [3, -1]], [1, 3], [[-1, 3], [2, 1]], [30, 10])
     assert (one.forces, one.shared) == (0, 1)
 
 
-def test_networks_that_differ():
+def test_networks_that_differ() -> None:
     # Shares 1/4, 3/4, 0 against 1/2, 0, 1/2
     one = network_difference([[1, 2], [2, 3]], [1, 3], [[1, 2], [3, 4]], [2, 2])
     assert one.forces == pytest.approx(1 / 4 + 3 / 4 + 1 / 2)
@@ -154,17 +157,24 @@ def test_networks_that_differ():
         (np.empty((0, 2)), [], "must be positive"),
     ],
 )
-def test_networks_that_cannot_be_compared(ids, forces, message):
+def test_networks_that_cannot_be_compared(ids: Any, forces: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         network_difference([[1, 2]], [1], ids, forces)
 
 
-def configuration(contacts="hard", tolerance=0.005, dt=0.01, ranks=1):
+def configuration(
+    contacts: Literal["hard", "soft"] = "hard",
+    tolerance: float = 0.005,
+    dt: float = 0.01,
+    ranks: int = 1,
+) -> Configuration:
     hard = contacts == "hard"
     return Configuration(contacts, tolerance, "apgd" if hard else None, dt if hard else None, ranks)
 
 
-def made_up(one, start, seconds=1.0, share=0.6, contacts=6.0):
+def made_up(
+    one: Configuration, start: str, seconds: float = 1.0, share: float = 0.6, contacts: float = 6.0
+) -> tuple[Run, Result]:
     """A run and its result, with a network that is the same for all."""
     numbers = {
         "plateau_seconds": seconds,
@@ -178,7 +188,7 @@ def made_up(one, start, seconds=1.0, share=0.6, contacts=6.0):
     return Run(one, start, Case((), {})), Result(values, {}, {}, "{}")
 
 
-def made_up_study():
+def made_up_study() -> list[tuple[Run, Result]]:
     """Three starts; the loose tolerance is off in contacts alone; soft spheres take six times."""
     tight, loose, soft = (
         configuration(tolerance=0.0005),
@@ -196,7 +206,7 @@ def made_up_study():
     return results
 
 
-def test_rows_errors_and_ratios():
+def test_rows_errors_and_ratios() -> None:
     comparison = compare(made_up_study())
     tight, loose, _ = comparison.rows
     assert comparison.reference() is tight
@@ -209,7 +219,7 @@ def test_rows_errors_and_ratios():
     assert len(tight.slower) == 0
 
 
-def test_recommendations():
+def test_recommendations() -> None:
     share, contacts, speed = recommendations(compare(made_up_study()))
     assert "a tolerance of 0.005 r is enough as far as 3 starts can tell, and takes 2 s" in share
     assert "+0.0050 from that of the tightest, 0.0005 r, which takes 4 s" in share
@@ -217,7 +227,7 @@ def test_recommendations():
     assert speed.endswith("take: 3 (2 to 6) times as long at 0.005 r.")
 
 
-def test_recommendations_that_the_numbers_do_not_carry():
+def test_recommendations_that_the_numbers_do_not_carry() -> None:
     one = [pair for pair in made_up_study() if pair[0].start == "1"]
     share, contacts, _ = recommendations(compare(one))
     assert "cannot be judged by one start" in share
@@ -227,7 +237,7 @@ def test_recommendations_that_the_numbers_do_not_carry():
     assert all("no run with hard contacts" in line for line in recommendations(compare([]))[:2])
 
 
-def test_a_start_without_a_reference_or_not_at_rest_counts_where_it_can():
+def test_a_start_without_a_reference_or_not_at_rest_counts_where_it_can() -> None:
     results = made_up_study()
     # Of start 1 the reference has failed, and start 2 never comes to rest at the loose tolerance.
     results = [p for p in results if (p[0].start, p[0].configuration.tolerance) != ("1", 0.0005)]
@@ -248,7 +258,7 @@ def test_a_start_without_a_reference_or_not_at_rest_counts_where_it_can():
     assert (len(loose.outcomes), len(loose.values("plateau_time"))) == (3, 2)
 
 
-def test_the_reference_is_the_tightest_with_the_shortest_step():
+def test_the_reference_is_the_tightest_with_the_shortest_step() -> None:
     best = configuration(tolerance=1e-6, dt=0.005)
     others = [configuration(tolerance=1e-6), configuration("soft", 1e-7), configuration()]
     assert reference_of([*others, best, configuration(tolerance=1e-8, ranks=2)], 1) == best
@@ -283,7 +293,10 @@ def test_the_reference_is_the_tightest_with_the_shortest_step():
         (["--start", "a", "--seeds", "2"], "argument --seeds: not allowed with argument --start"),
     ],
 )
-def test_bad_options(arguments, message, tmp_path, capsys):
+def test_bad_options(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status: object
     try:
         status = main(["tradeoff", "--out", str(tmp_path / "out"), *arguments])
     except SystemExit as end:  # argparse's own
@@ -296,7 +309,7 @@ def test_bad_options(arguments, message, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_line_for_each_bad_option(tmp_path, capsys):
+def test_a_line_for_each_bad_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--tolerances", "0,-1", "--seeds", "x", "--dts", "0"]
     assert main(["tradeoff", "--out", str(tmp_path), *arguments]) == 2
     names = [line.split(":")[1].strip() for line in capsys.readouterr().err.splitlines()]
@@ -304,7 +317,7 @@ def test_a_line_for_each_bad_option(tmp_path, capsys):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], Path]:
     """Return the arguments and the folder of a small comparison."""
     out = tmp_path_factory.mktemp("tradeoff") / "out"
     arguments = ["tradeoff", "--out", str(out), *FEW, "--seeds", "2", "--time", "3"]
@@ -314,7 +327,7 @@ def finished(tmp_path_factory):
 
 
 @pytest.fixture
-def again(finished, tmp_path):
+def again(finished: tuple[list[str], Path], tmp_path: Path) -> tuple[list[str], Path]:
     """Return the arguments that run half of it, that of seed 1, in another folder."""
     arguments, undisturbed = finished
     words = [str(tmp_path / "out") if word == str(undisturbed) else word for word in arguments]
@@ -322,12 +335,12 @@ def again(finished, tmp_path):
     return words, tmp_path / "out"
 
 
-def rows_of(out):
+def rows_of(out: Path) -> list[dict[str, str]]:
     with (out / "tradeoff.csv").open() as file:
         return list(csv.DictReader(file))
 
 
-def test_what_a_comparison_writes(finished):
+def test_what_a_comparison_writes(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     assert {path.name for path in out.iterdir()} == {
         "ranks-1",
@@ -351,7 +364,7 @@ def test_what_a_comparison_writes(finished):
     assert "Soft spheres" in page
 
 
-def test_numbers_of_a_comparison(finished):
+def test_numbers_of_a_comparison(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     for row in rows_of(out):
         words = ("contacts", "solver", "case")
@@ -374,10 +387,10 @@ def test_numbers_of_a_comparison(finished):
         assert (row["network_error"] != "") == compared
 
 
-def test_all_runs_of_a_seed_have_the_same_start(finished):
+def test_all_runs_of_a_seed_have_the_same_start(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     (study,) = read_studies(out / "tradeoff.h5")
-    heights = {}
+    heights: dict[object, set[float]] = {}
     for result in study.results:
         key = result.variables["seed"]
         heights.setdefault(key, set()).add(float(result.values["evolution/centre_height"][0]))
@@ -385,7 +398,9 @@ def test_all_runs_of_a_seed_have_the_same_start(finished):
     assert heights[1] != heights[2]
 
 
-def test_nothing_is_left_to_do(finished, capsys):
+def test_nothing_is_left_to_do(
+    finished: tuple[list[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     arguments, out = finished
     before = numbers_of(out / "tradeoff.h5"), (out / "tradeoff.csv").read_text()
     assert main(arguments) == 0
@@ -394,7 +409,12 @@ def test_nothing_is_left_to_do(finished, capsys):
     assert before[1] == (out / "tradeoff.csv").read_text()
 
 
-def test_killed_and_run_again(finished, again, capsys):
+@pytest.mark.slow
+def test_killed_and_run_again(
+    finished: tuple[list[str], Path],
+    again: tuple[list[str], Path],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     arguments, out = again
     killed_when(lambda: list(out.glob("ranks-1/results/*/*.h5")), *arguments)
     done = len(list(out.glob("ranks-1/results/*/*.h5")))
@@ -413,11 +433,16 @@ def test_killed_and_run_again(finished, again, capsys):
     assert one == other
 
 
-def test_a_failed_run_is_left_out_and_said(again, capsys, monkeypatch):
+@pytest.mark.slow
+def test_a_failed_run_is_left_out_and_said(
+    again: tuple[list[str], Path],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     arguments, out = again
     runs_of = tradeoff_command.runs_of
 
-    def with_a_bad_one(plan):
+    def with_a_bad_one(plan: Plan) -> list[Run]:
         runs = runs_of(plan)
         # A variable that the deck refuses.
         runs[0].case.stages[1].values["particle"] = "cubes"
@@ -433,7 +458,8 @@ def test_a_failed_run_is_left_out_and_said(again, capsys, monkeypatch):
     assert "left out: " in (out / "tradeoff.md").read_text()
 
 
-def test_dimers_and_time_steps(tmp_path, capsys):
+@pytest.mark.slow
+def test_dimers_and_time_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--particle", "dimers", "--particles", "30", "--diameter", "0.3", "--seeds", "1"]
     arguments += ["--tolerances", "0.005", "--dts", "0.01,0.005", "--soft-tolerances", "0.05"]
     assert main(["tradeoff", "--out", str(tmp_path / "out"), *arguments]) == 0
@@ -447,7 +473,8 @@ def test_dimers_and_time_steps(tmp_path, capsys):
     assert "cannot be judged by one start" in capsys.readouterr().out
 
 
-def test_starts_from_data_files(tmp_path):
+@pytest.mark.slow
+def test_starts_from_data_files(tmp_path: Path) -> None:
     for name in ("a.data", "b.data"):
         write_data(tmp_path / name, diameter=0.28)
     files = [str(tmp_path / name) for name in ("a.data", "b.data")]
@@ -459,7 +486,8 @@ def test_starts_from_data_files(tmp_path):
     assert (out / "tradeoff.png").stat().st_size > 0
 
 
-def test_two_ranks_are_kept_apart(tmp_path):
+@pytest.mark.slow
+def test_two_ranks_are_kept_apart(tmp_path: Path) -> None:
     if cores() < 2:
         # The command refuses more ranks than cores, whose times would say nothing.
         pytest.skip("two ranks need two cores")
@@ -471,7 +499,8 @@ def test_two_ranks_are_kept_apart(tmp_path):
     assert [study.name for study in read_studies(out / "tradeoff.h5")] == ["ranks-1", "ranks-2"]
 
 
-def test_settling_in_a_study(write_study, tmp_path):
+@pytest.mark.slow
+def test_settling_in_a_study(write_study: Callable[..., Path], tmp_path: Path) -> None:
     study = write_study(
         'title = "t"\ndeck = ["spheres", "settling"]\n[parameters]\nparticles = 60\n'
         "diameter = 0.3\nsteps_agitated = 0\nsteps_settling = 0\nsteps_tightening = 0\n"
