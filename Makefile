@@ -33,7 +33,7 @@ report: setup
 style: setup
 	ruff check .
 	ruff format --check .
-	clang-format --dry-run -Werror --style=file $$(find src_fix tests/core -name '*.h' -o -name '*.cpp')
+	clang-format --dry-run -Werror --style=file $$(find src_fix tests/core tests/npz -name '*.h' -o -name '*.cpp')
 	mypy -p lammps_inelastic.analysis -p lammps_inelastic.workflow -p tests
 
 test: style

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -271,7 +272,7 @@ def test_a_step_through_a_whole_periodic_box(
     inertia: str, ranks: int, tmp_path: Path, lmp: Runner
 ) -> None:
     """LAMMPS brings an atom back from the next image only: further, it would lose the atom."""
-    options = {
+    options: dict[str, Any] = {
         "tolerance": EPS,
         "box": ((0, 1),) * 3,
         "boundary": "p p p",

@@ -673,7 +673,7 @@ def test_numbers_of_the_paper_have_as_many_decimals_as_their_error() -> None:
 
 
 def test_a_column_has_its_heading_and_its_cells() -> None:
-    columns = [
+    columns: list[Column[float]] = [
         Column("length", lambda row: as_text(row, 1), "d"),
         Column("is long", lambda row: Cell("yes" if row > 1 else "no", marked=row > 1)),
     ]
