@@ -23,25 +23,28 @@ from tests.fix.lammps_run import without_launcher
 ROOT = Path(__file__).parents[2]
 REPEATS = 9
 
-FIX_HEADER, FIX = "src_fix/lammps/fix_inelastic.h", "src_fix/lammps/fix_inelastic.cpp"
+LAMMPS = "src_fix/lammps"
 PACKED = "src_fix/core/packed_iterations.cpp"
 # File, what is there, and what takes its place.
 Cut = tuple[str, str, str]
 
 BODIES: list[Cut] = [
-    (
-        FIX_HEADER,
-        "std::unique_ptr<RigidMotion> rigid_;",
-        "static constexpr RigidMotion *rigid_ = nullptr;",
-    ),
-    (FIX, "rigid_ = std::make_unique<RigidMotion>(", "(void) std::make_unique<RigidMotion>("),
+    (f"{LAMMPS}/fix_settings.h", "return !rigid_fix.empty();", "return false;"),
     ("src_fix/core/rigid_bodies.h", "return inverse_mass.empty();", "return true;"),
     (PACKED, "if (!rods_.empty() || !bodies_.empty())", "if (false)"),
 ]
-WALLS: list[Cut] = [("src_fix/lammps/region_walls.h", "return ids_.empty();", "return true;")]
+WALLS: list[Cut] = [(f"{LAMMPS}/region_walls.h", "return ids_.empty();", "return true;")]
 OUTPUT: list[Cut] = [
-    (FIX, "double *const out = array_local[row++];", "static double out[10];"),
-    (FIX, "if (evflag) {", "if (false) {"),
+    (
+        f"{LAMMPS}/contact_output.cpp",
+        "double *const out = local_[local_rows_++];",
+        "static double out[LOCAL_COLUMNS];",
+    ),
+    (
+        f"{LAMMPS}/contact_output.cpp",
+        "if (virial.global || virial.per_atom) {",
+        "if (false) {",
+    ),
 ]
 CUTS = {
     "bodies, walls and output together": BODIES + WALLS + OUTPUT,
