@@ -603,6 +603,11 @@ class _Part:
         quiet = new.deepest <= 1.999 * self.eps and (
             last is None or last.deepest <= 1.999 * self.eps
         )
+        # The velocities of bodies in a restart file of a step that pushes hold a part of the push.
+        may_hold_push = "restart within a run" in self.facts["words"] and (
+            self.facts["bad_start"] or self.facts["warn"]
+        )
+        quiet = quiet and not (last is None and may_hold_push)
         # A run ends by taking the push out; and begins without.
         accelerate = self.to_v / new.mass[:, None]
         after = new.v + 0.5 * new.h * accelerate * new.force
@@ -772,7 +777,9 @@ class _Part:
         if last is None:
             kept_v, kept_l = new.bodies["vx vy vz"], new.bodies["angmomx angmomy angmomz"]
             # A restart file of a step that pushes holds a part of the push in these velocities.
-            self.push_unknown = not settled and "restart within a run" in self.facts["words"]
+            self.push_unknown = "restart within a run" in self.facts["words"] and (
+                not settled or not new.quiet
+            )
             self.lines_unknown = self.push_unknown
         else:
             kept_v, kept_l = last.kept_v, last.kept_l
