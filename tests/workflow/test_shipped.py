@@ -66,6 +66,9 @@ def test_a_named_folder_comes_before_others(
 def test_without_results_one_line_says_where_they_were_looked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    # The program runs from no clone.
+    package = tmp_path / "lammps_inelastic" / "workflow" / "shipped.py"
+    monkeypatch.setattr("lammps_inelastic.workflow.shipped.__file__", str(package))
     # A folder for runs of one's own may have this name, too.
     (tmp_path / "results" / "cases").mkdir(parents=True)
     assert main(["reproduce", "--stored-only", "--out", "paper"]) == 2
