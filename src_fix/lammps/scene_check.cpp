@@ -61,77 +61,74 @@ bool SceneCheck::any(bool here) const
   return all != 0;
 }
 
+// Whether pairs between spheres of two sides are hidden from the fix, other than pairs of two frozen
+// spheres. Collective.
+template <typename One, typename Other>
+bool SceneCheck::hides(const Group &group, One &&on_one_side, Other &&on_the_other) const
+{
+  bool one = false, other = false, one_moves = false, other_moves = false;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & group.bit)) continue;
+    const bool moves = !(atom->mask[i] & group.frozen_bit);
+    if (on_one_side(i)) {
+      one = true;
+      one_moves = one_moves || moves;
+    }
+    if (on_the_other(i)) {
+      other = true;
+      other_moves = other_moves || moves;
+    }
+  }
+  const bool sides = any(one) && any(other);
+  return (any(one_moves) || any(other_moves)) && sides;
+}
+
+void SceneCheck::warn_of_hidden(const std::string &what) const
+{
+  if (comm->me == 0)
+    error->warning(FLERR,
+                   "Fix inelastic does not see pairs of its group that {} keeps out of the "
+                   "neighbour list: they can overlap",
+                   what);
+}
+
 void SceneCheck::warn_of_hidden_pairs(const Group &group) const
 {
-  // Pairs of two frozen spheres may be hidden.
-  auto hides = [&](auto &&on_one_side, auto &&on_the_other) {
-    bool one = false, other = false, one_moves = false, other_moves = false;
-    for (int i = 0; i < atom->nlocal; ++i) {
-      if (!(atom->mask[i] & group.bit)) continue;
-      const bool moves = !(atom->mask[i] & group.frozen_bit);
-      if (on_one_side(i)) {
-        one = true;
-        one_moves = one_moves || moves;
-      }
-      if (on_the_other(i)) {
-        other = true;
-        other_moves = other_moves || moves;
-      }
-    }
-    const bool sides = any(one) && any(other);
-    return (any(one_moves) || any(other_moves)) && sides;
-  };
-  auto warn = [&](const std::string &what) {
-    if (comm->me == 0)
-      error->warning(FLERR,
-                     "Fix inelastic does not see pairs of its group that {} keeps out of the "
-                     "neighbour list: they can overlap",
-                     what);
-  };
-
   // LAMMPS has the bits of excluded groups only after this.
-  auto in_group = [&](int i, int number) {
-    return (atom->mask[i] & this->group->bitmask[number]) != 0;
+  auto member_of = [this](int number) {
+    return [this, number](int i) {
+      return (atom->mask[i] & this->group->bitmask[number]) != 0;
+    };
   };
+  auto of_type = [this](int type) {
+    return [this, type](int i) {
+      return atom->type[i] == type;
+    };
+  };
+  const char *const *const names = this->group->names;
   for (int k = 0; k < neighbor->nex_group; ++k) {
     const int one = neighbor->ex1_group[k], other = neighbor->ex2_group[k];
-    if (hides(
-            [&](int i) {
-              return in_group(i, one);
-            },
-            [&](int i) {
-              return in_group(i, other);
-            }))
-      warn(fmt::format("neigh_modify exclude group {} {}", this->group->names[one],
-                       this->group->names[other]));
+    if (hides(group, member_of(one), member_of(other)))
+      warn_of_hidden(fmt::format("neigh_modify exclude group {} {}", names[one], names[other]));
   }
-  for (int k = 0; k < neighbor->nex_type; ++k)
-    if (hides(
-            [&](int i) {
-              return atom->type[i] == neighbor->ex1_type[k];
-            },
-            [&](int i) {
-              return atom->type[i] == neighbor->ex2_type[k];
-            }))
-      warn(fmt::format("neigh_modify exclude type {} {}", neighbor->ex1_type[k],
-                       neighbor->ex2_type[k]));
+  for (int k = 0; k < neighbor->nex_type; ++k) {
+    const int one = neighbor->ex1_type[k], other = neighbor->ex2_type[k];
+    if (hides(group, of_type(one), of_type(other)))
+      warn_of_hidden(fmt::format("neigh_modify exclude type {} {}", one, other));
+  }
   for (int k = 0; k < neighbor->nex_mol; ++k) {
     // The spheres of one body are kept apart anyway; free spheres are looked at with the bodies.
     if (neighbor->ex_mol_intra[k] && group.bodies) continue;
-    auto chosen = [&](int i) {
-      return in_group(i, neighbor->ex_mol_group[k]);
-    };
-    if (hides(chosen, chosen))
-      warn(fmt::format("neigh_modify exclude molecule/{} {}",
-                       neighbor->ex_mol_intra[k] ? "intra" : "inter",
-                       this->group->names[neighbor->ex_mol_group[k]]));
+    const auto chosen = member_of(neighbor->ex_mol_group[k]);
+    if (hides(group, chosen, chosen))
+      warn_of_hidden(fmt::format("neigh_modify exclude molecule/{} {}",
+                                 neighbor->ex_mol_intra[k] ? "intra" : "inter",
+                                 names[neighbor->ex_mol_group[k]]));
   }
   const bool bonds = atom->nbonds > 0 || atom->nangles > 0 || atom->ndihedrals > 0;
   for (int k = 1; k <= 3 && bonds; ++k)
-    if (force->special_lj[k] == 0.0 && force->special_coul[k] == 0.0) {
-      warn("special_bonds with a factor of 0");
-      break;
-    }
+    if (force->special_lj[k] == 0.0 && force->special_coul[k] == 0.0)
+      return warn_of_hidden("special_bonds with a factor of 0");
 }
 
 std::vector<double> SceneCheck::box() const

@@ -42,6 +42,9 @@ class SceneCheck : protected Pointers {
 
   bool changes_periods(const Fix *fix) const;
   void warn_of_hidden_pairs(const Group &group) const;
+  template <typename One, typename Other>
+  bool hides(const Group &group, One &&on_one_side, Other &&on_the_other) const;
+  void warn_of_hidden(const std::string &what) const;
   bool any(bool here) const;
 
   std::vector<double> box_at_start_;
