@@ -29,7 +29,7 @@ namespace inelastic {
 
 struct ContactProblem {
   double timestep = 0.0;    // h [time]
-  // Counts the particles that this rank owns and its copies of particles (host.h), owned ones
+  // Counts the particles that this rank owns and its ghosts (host.h), owned ones
   // first.
   int particles = 0;
   std::vector<double> predicted_velocity;    // 3 per particle and 3 zeros [length / time]

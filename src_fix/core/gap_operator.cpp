@@ -90,7 +90,7 @@ void GapOperator::velocity_change(const ContactProblem &problem, const double *i
   double *const change = change_.data();
   std::fill(change_.begin(), change_.end(), 0.0);
   scatter_impulses(problem.contacts, impulse, change);
-  host.sum_over_copies(change);
+  host.sum_over_ghosts(change);
   auto divide_by_mass = [&](std::size_t i) {
     const double w = problem.inverse_mass[i];
     change[3 * i] *= w;
@@ -113,7 +113,7 @@ GapOperator::ImpulseNorm GapOperator::impulse_norm(const ContactProblem &problem
   // round-off that is left of a particle's sum is squared.
   std::vector<double> sum(change_.size(), 0.0);
   scatter_impulses(problem.contacts, impulse, sum.data());
-  host.sum_over_copies(sum.data());
+  host.sum_over_ghosts(sum.data());
   velocity_change(problem, impulse, host);
   ImpulseNorm result = {0.0, 0.0};
   std::vector<char> pushed(static_cast<std::size_t>(problem.particles) + 1, 0);

@@ -26,7 +26,7 @@ class GapOperator {
   // Writes w(impulse) [length], one per constraint.
   void apply(const ContactProblem &problem, const double *impulse, double *gap_at_end, Host &host);
 
-  // Writes V* + M^-1 G^T impulse, 3 per particle [length / time], copies included.
+  // Writes V* + M^-1 G^T impulse, 3 per particle [length / time], ghosts included.
   void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
 
   // Writes the same for the impulses of the last call of apply(), without communication.
@@ -40,7 +40,7 @@ class GapOperator {
     double mass;
   };
 
-  // Returns this rank's share. Every copy of a particle counts like the particle itself.
+  // Returns this rank's share. Every ghost of a particle counts like the particle itself.
   ImpulseNorm impulse_norm(const ContactProblem &problem, const double *impulse, Host &host);
 
  private:

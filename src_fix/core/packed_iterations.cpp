@@ -53,11 +53,11 @@ namespace {
     return across >= 0.0;
   }
 
-  // Chooses the copies that are in constraints of this rank, and all members of a body of which one
-  // is. Most copies are in none.
-  void choose_copies(const ContactProblem &problem, Host &host)
+  // Chooses the ghosts that are in constraints of this rank, and all members of a body of which one
+  // is. Most ghosts are in none.
+  void choose_ghosts(const ContactProblem &problem, Host &host)
   {
-    if (!host.has_copies()) return;
+    if (!host.has_ghosts()) return;
     std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
     for (const int i : problem.contacts.first) chosen[i] = 1;
     for (const int i : problem.contacts.second) chosen[i] = 1;
@@ -67,7 +67,7 @@ namespace {
       for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) any |= chosen[bodies.member[k]];
       for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) chosen[bodies.member[k]] = any;
     }
-    host.choose_copies(chosen);
+    host.choose_ghosts(chosen);
   }
 
   template <typename Real>
@@ -101,7 +101,7 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   sum_.assign(particles, Vector{});
   velocity_.assign(particles, Vector{});
   ahead_.assign(particles, Vector{});
-  choose_copies(problem, host);
+  choose_ghosts(problem, host);
   packed::add_impulses(pass(0.0, 0.0));
   finish(host, 0.0);
 }
@@ -116,7 +116,7 @@ packed::Passed PackedIterations<Real>::advance(double momentum, double step)
 
 template <typename Real> void PackedIterations<Real>::finish(Host &host, double momentum)
 {
-  host.sum_over_chosen_copies(reinterpret_cast<Real *>(sum_.data()));
+  host.sum_over_chosen_ghosts(reinterpret_cast<Real *>(sum_.data()));
   if (!rods_.empty() || !bodies_.empty())
     packed::turn_bodies(rods_, bodies_, members_.data(), sum_.data());
   packed::move_particles(packed::Move<Real>{velocity_.size(), inverse_mass_.data(), sum_.data(),

@@ -53,7 +53,7 @@ inline Status worse(Status a, Status b)
 { return std::max(a, b); }
 
 // Projects problem.predicted_velocity in one to `max_rounds` rounds. On return `velocity` (3 per
-// particle, copies included) holds the projection and problem.contacts.impulse the impulses. If the
+// particle, ghosts included) holds the projection and problem.contacts.impulse the impulses. If the
 // last round added constraints, `velocity` knows nothing of them and their impulses are 0.
 // Collective.
 ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,

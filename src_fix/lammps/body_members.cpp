@@ -106,7 +106,7 @@ std::string BodyMembers::find()
   in_body_.assign(3 * static_cast<std::size_t>(nall), 0.0);
   for (int i = 0; i < nlocal; ++i)
     in_body_[3 * i] = body[i] >= 0 && step_.in_group(atom, i) ? 1.0 : 0.0;
-  host_.share_with_copies(in_body_.data());
+  host_.share_with_ghosts(in_body_.data());
 
   std::string message;
   std::vector<int> next(nall, NONE);

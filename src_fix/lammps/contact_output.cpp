@@ -47,7 +47,7 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   share(virial);
 
   double sums[3] = {counts_[0], counts_[1], static_cast<double>(contacts.size())};
-  ranks_.reduce(sums, 3, &largest_kick_, 1);
+  ranks_.reduce(sums, 3, &largest_change_, 1);
   vector_[PARTICLE_CONTACTS] = sums[0];
   vector_[WALL_CONTACTS] = sums[1];
   vector_[CONSTRAINTS] = sums[2];
@@ -74,7 +74,7 @@ void ContactOutput::clear_sums(bool virial_per_atom)
   wall_force_step_ = -1;
   local_rows_ = 0;
   counts_[0] = counts_[1] = 0.0;
-  largest_kick_ = 0.0;
+  largest_change_ = 0.0;
 }
 
 // `strength` is the force of the contact.
@@ -87,8 +87,8 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   const Side &side = step_.sides[c];
   const bool is_wall = side.wall != 0;
   counts_[is_wall] += 1.0;
-  largest_kick_ =
-      std::max(largest_kick_,
+  largest_change_ =
+      std::max(largest_change_,
                problem.contacts.impulse[c] * (problem.inverse_mass[i] + problem.inverse_mass[j]));
   contact_count_[3 * i + is_wall] += 1.0;
   for (int d = 0; d < 3; ++d) {
@@ -146,16 +146,16 @@ void ContactOutput::add_virial(std::size_t c, double weight, const VirialTarget 
 void ContactOutput::share(const VirialTarget &virial)
 {
   if (virial.per_atom) {
-    ranks_.sum_over_copies(virial_diagonal_.data());
-    ranks_.sum_over_copies(virial_off_diagonal_.data());
+    ranks_.sum_over_ghosts(virial_diagonal_.data());
+    ranks_.sum_over_ghosts(virial_off_diagonal_.data());
     for (int i = 0; i < atom->nlocal; ++i)
       for (int k = 0; k < 3; ++k) {
         virial.atoms[i][k] += virial_diagonal_[3 * i + k];
         virial.atoms[i][3 + k] += virial_off_diagonal_[3 * i + k];
       }
   }
-  ranks_.sum_over_copies(contact_force_.data());
-  ranks_.sum_over_copies(contact_count_.data());
+  ranks_.sum_over_ghosts(contact_force_.data());
+  ranks_.sum_over_ghosts(contact_count_.data());
   for (int i = 0; i < atom->nlocal; ++i) {
     per_atom_[i][0] = contact_count_[3 * i];
     per_atom_[i][1] = contact_count_[3 * i + 1];

@@ -1,5 +1,6 @@
 // What the fix gives to LAMMPS's output: the global vector, contacts and forces per atom, the local list
-// of contacts, the forces on walls and the virial. Nothing here steers the fix.
+// of contacts, the forces on walls and the virial. Movers and the check of the motion take the contact
+// forces from here.
 
 #ifndef INELASTIC_CONTACT_OUTPUT_H
 #define INELASTIC_CONTACT_OUTPUT_H
@@ -57,7 +58,7 @@ class ContactOutput : protected Pointers {
   // 3 per particle: the force of all contacts, on ghosts that of their owned atom.
   const double *contact_force() const { return contact_force_.data(); }
   // The largest change of a velocity that one of the contacts made, on any rank.
-  double largest_kick() const { return largest_kick_; }
+  double largest_change() const { return largest_change_; }
 
   double vector(int n) const { return vector_[n]; }
   // One component of the force on a wall (0 = the first one), on all ranks. Collective.
@@ -94,7 +95,7 @@ class ContactOutput : protected Pointers {
   std::vector<double> wall_force_;    // 3 per wall, this rank's share
   std::vector<double> wall_force_total_;
   bigint wall_force_step_ = -1;
-  double largest_kick_ = 0.0;
+  double largest_change_ = 0.0;
 };
 
 }    // namespace LAMMPS_NS

@@ -354,7 +354,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
     size_local_rows = output_.local_rows();
     summary_.add_step(result);
     for (Mover *mover : movers_) mover->apply(output_.contact_force());
-    check_.after_step(output_.largest_kick());
+    check_.after_step(output_.largest_change());
   }
   const bool solved = result.status == inelastic::Status::CONVERGED;
   overlaps.end_step(solved && constraints_.entangled().empty());

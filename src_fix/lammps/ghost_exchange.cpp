@@ -48,34 +48,34 @@ GhostExchange::~GhostExchange()
   MPI_Type_free(&reduction_type_);
 }
 
-bool GhostExchange::has_copies() const
+bool GhostExchange::has_ghosts() const
 { return comm->nprocs > 1 || atom->nghost > 0; }
 
-void GhostExchange::sum_over_copies(double *per_particle)
+void GhostExchange::sum_over_ghosts(double *per_particle)
 {
   exchanged_ = per_particle;
   exchange(Exchange::VECTORS, true, true);
 }
 
-void GhostExchange::share_with_copies(double *per_particle)
+void GhostExchange::share_with_ghosts(double *per_particle)
 {
   exchanged_ = per_particle;
   exchange(Exchange::VECTORS, false, true);
 }
 
-void GhostExchange::choose_copies(const std::vector<char> &chosen)
+void GhostExchange::choose_ghosts(const std::vector<char> &chosen)
 {
-  chosen_copies_.begin(chosen);
+  chosen_ghosts_.begin(chosen);
   exchange(Exchange::CHOICE, true, false);
 }
 
-void GhostExchange::sum_over_chosen_copies(double *per_particle)
+void GhostExchange::sum_over_chosen_ghosts(double *per_particle)
 {
   exchanged_ = per_particle;
   exchange(Exchange::CHOSEN, true, true);
 }
 
-void GhostExchange::sum_over_chosen_copies(float *per_particle)
+void GhostExchange::sum_over_chosen_ghosts(float *per_particle)
 {
   exchanged_single_ = per_particle;
   exchange(Exchange::CHOSEN_SINGLE, true, true);
@@ -91,7 +91,7 @@ void GhostExchange::gather_memory(ContactMemory &memory)
 // owned atoms tell their ghosts.
 void GhostExchange::exchange(Exchange what, bool reverse, bool forward)
 {
-  if (!has_copies()) return;
+  if (!has_ghosts()) return;
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
   exchanging_ = what;
   if (reverse) comm->reverse_comm(fix_);
@@ -101,10 +101,9 @@ void GhostExchange::exchange(Exchange what, bool reverse, bool forward)
 int GhostExchange::pack_forward(int n, const int *list, double *buffer) const
 {
   if (n == 0) return 0;
-  if (exchanging_ == Exchange::CHOSEN)
-    return chosen_copies_.pack_originals(list, exchanged_, buffer);
+  if (exchanging_ == Exchange::CHOSEN) return chosen_ghosts_.pack_owned(list, exchanged_, buffer);
   if (exchanging_ == Exchange::CHOSEN_SINGLE)
-    return chosen_copies_.pack_originals(list, exchanged_single_, buffer);
+    return chosen_ghosts_.pack_owned(list, exchanged_single_, buffer);
   for (int k = 0; k < n; ++k) std::copy_n(exchanged_ + 3 * list[k], 3, buffer + 3 * k);
   return 3 * n;
 }
@@ -113,9 +112,9 @@ void GhostExchange::unpack_forward(int n, int first, const double *buffer)
 {
   if (n == 0) return;
   if (exchanging_ == Exchange::CHOSEN)
-    chosen_copies_.set_copies(first, buffer, exchanged_);
+    chosen_ghosts_.set_ghosts(first, buffer, exchanged_);
   else if (exchanging_ == Exchange::CHOSEN_SINGLE)
-    chosen_copies_.set_copies(first, buffer, exchanged_single_);
+    chosen_ghosts_.set_ghosts(first, buffer, exchanged_single_);
   else
     std::copy_n(buffer, 3 * n, exchanged_ + 3 * first);
 }
@@ -130,11 +129,11 @@ int GhostExchange::pack_reverse(int n, int first, double *buffer)
                                 ContactMemory::SHARED_PARTNERS);
       return n * REVERSE_SIZE;
     case Exchange::CHOICE:
-      return chosen_copies_.pack_choice(n, first, buffer);
+      return chosen_ghosts_.pack_choice(n, first, buffer);
     case Exchange::CHOSEN:
-      return chosen_copies_.pack_copies(first, exchanged_, buffer);
+      return chosen_ghosts_.pack_ghosts(first, exchanged_, buffer);
     case Exchange::CHOSEN_SINGLE:
-      return chosen_copies_.pack_copies(first, exchanged_single_, buffer);
+      return chosen_ghosts_.pack_ghosts(first, exchanged_single_, buffer);
     case Exchange::VECTORS:
       break;
   }
@@ -150,13 +149,13 @@ void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
       for (int k = 0; k < n; ++k) exchanged_memory_->unpack(list[k], buffer + k * REVERSE_SIZE);
       return;
     case Exchange::CHOICE:
-      chosen_copies_.unpack_choice(n, list, buffer);
+      chosen_ghosts_.unpack_choice(n, list, buffer);
       return;
     case Exchange::CHOSEN:
-      chosen_copies_.add_to_originals(list, buffer, exchanged_);
+      chosen_ghosts_.add_to_owned(list, buffer, exchanged_);
       return;
     case Exchange::CHOSEN_SINGLE:
-      chosen_copies_.add_to_originals(list, buffer, exchanged_single_);
+      chosen_ghosts_.add_to_owned(list, buffer, exchanged_single_);
       return;
     case Exchange::VECTORS:
       break;

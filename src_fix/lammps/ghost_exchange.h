@@ -4,7 +4,7 @@
 #ifndef INELASTIC_GHOST_EXCHANGE_H
 #define INELASTIC_GHOST_EXCHANGE_H
 
-#include "chosen_copies.h"
+#include "chosen_ghosts.h"
 #include "contact_memory.h"
 #include "host.h"
 #include "phase_clock.h"
@@ -31,13 +31,13 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   static constexpr int FORWARD_SIZE = 3;
   static constexpr int REVERSE_SIZE = ContactMemory::packed_size(ContactMemory::SHARED_PARTNERS);
 
-  void sum_over_copies(double *per_particle) override;
-  void choose_copies(const std::vector<char> &chosen) override;
-  void sum_over_chosen_copies(double *per_particle) override;
-  void sum_over_chosen_copies(float *per_particle) override;
-  void share_with_copies(double *per_particle) override;
+  void sum_over_ghosts(double *per_particle) override;
+  void choose_ghosts(const std::vector<char> &chosen) override;
+  void sum_over_chosen_ghosts(double *per_particle) override;
+  void sum_over_chosen_ghosts(float *per_particle) override;
+  void share_with_ghosts(double *per_particle) override;
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override;
-  bool has_copies() const override;
+  bool has_ghosts() const override;
 
   // Adds to each owned atom the contacts that its ghosts remember.
   void gather_memory(ContactMemory &memory);
@@ -74,7 +74,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   double *exchanged_ = nullptr;          // VECTORS: 3 numbers per particle; CHOSEN: 4
   float *exchanged_single_ = nullptr;    // 4 numbers per particle
   ContactMemory *exchanged_memory_ = nullptr;
-  ChosenCopies chosen_copies_;
+  ChosenGhosts chosen_ghosts_;
 };
 
 }    // namespace LAMMPS_NS

@@ -62,10 +62,11 @@ void MotionCheck::before_step()
   if (step_.continues) compare_all();
 }
 
-void MotionCheck::after_step(double largest_kick)
+void MotionCheck::after_step(double largest_change)
 {
   // The angular momentum of a body is carried along: so is its round-off.
-  largest_kick_ = bodies_ && step_.continues ? std::max(largest_kick_, largest_kick) : largest_kick;
+  largest_change_ = bodies_ && step_.continues ? std::max(largest_change_, largest_change)
+                                               : largest_change;
   for (int i = 0; i < atom->nlocal; ++i)
     state_.expected_radius(i) = step_.in_group(atom, i) ? atom->radius[i] : AtomState::OUTSIDE;
   step_.continues = true;
@@ -141,7 +142,7 @@ std::string MotionCheck::compare(int i) const
                             atom->v[i][2] - expected_v[2]};
   const bool frozen = (atom->mask[i] & step_.settings.frozen_bit) != 0;
   const double round_off = EXPECTED_RELATIVE *
-      (norm(atom->x[i]) + step_.largest_radius + h * (norm(expected_v) + largest_kick_)) *
+      (norm(atom->x[i]) + step_.largest_radius + h * (norm(expected_v) + largest_change_)) *
       (bodies_ ? state_.momenta().round_off_growth(i) : 1.0);
   const double allowed = (frozen ? 1.0 : EXPECTED_IN_EPS) * step_.settings.tolerance + round_off;
   const double position_error = norm(off);

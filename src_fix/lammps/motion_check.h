@@ -36,8 +36,8 @@ class MotionCheck : protected Pointers {
   void before_step();
 
   // After a step: notes which atoms are in the group, and how large, and that there is a prediction. The
-  // largest kick [velocity] is that which one of the contacts gave.
-  void after_step(double largest_kick);
+  // largest change [velocity] is that which one of the contacts made.
+  void after_step(double largest_change);
 
  private:
   std::string break_in_run();
@@ -58,7 +58,7 @@ class MotionCheck : protected Pointers {
   bool goes_on_ = false;    // between setup and the end of the run
   bool ended_pushing_ =
       false;    // velocities lack the push that the last run's end took out of them
-  double largest_kick_ = 0.0;    // [velocity] on any rank
+  double largest_change_ = 0.0;    // [velocity] on any rank
 };
 
 }    // namespace LAMMPS_NS

@@ -1,7 +1,7 @@
 // Where the time of the projections goes, phase by phase, for the summary of a run.
 
-#ifndef LMP_PHASE_CLOCK_H
-#define LMP_PHASE_CLOCK_H
+#ifndef INELASTIC_PHASE_CLOCK_H
+#define INELASTIC_PHASE_CLOCK_H
 
 #include <array>
 #include <chrono>

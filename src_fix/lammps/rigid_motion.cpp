@@ -75,9 +75,9 @@ void RigidMotion::gather_momenta()
     }
     take_carried(i);
   }
-  ranks_.share_with_copies(linear_.data());
-  ranks_.share_with_copies(change_.data());
-  ranks_.share_with_copies(carried_part_.data());
+  ranks_.share_with_ghosts(linear_.data());
+  ranks_.share_with_ghosts(change_.data());
+  ranks_.share_with_ghosts(carried_part_.data());
 }
 
 // The angular momentum that a body has beside that of forces at its members' arms: the first member holds

@@ -25,7 +25,7 @@ void SphereMotion::predict()
       problem.predicted_velocity[3 * i + d] =
           atom->v[i][d] - (whole ? push[d] : 0.0) + kick_per_force * atom->f[i][d];
   }
-  ranks_.share_with_copies(problem.predicted_velocity.data());
+  ranks_.share_with_ghosts(problem.predicted_velocity.data());
 }
 
 void SphereMotion::apply(const double *)

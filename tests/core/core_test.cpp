@@ -901,7 +901,7 @@ class Ranks {
       give_up("one rank waits in " + name + " for the others");
   }
 
-  void sum_over_copies()
+  void sum_over_ghosts()
   {
     std::vector<double> sums(3 * static_cast<std::size_t>(particles_), 0.0);
     for_each_value(false, [&](double &mine, std::size_t k) {
@@ -912,9 +912,9 @@ class Ranks {
     });
   }
 
-  void choose_copies() {}    // every host keeps its own choice
+  void choose_ghosts() {}    // every host keeps its own choice
 
-  void share_with_copies()
+  void share_with_ghosts()
   {
     std::vector<double> owned(3 * static_cast<std::size_t>(particles_), 0.0);
     for_each_value(true, [&](double &mine, std::size_t k) {
@@ -980,22 +980,22 @@ class RankHost final : public Host {
  public:
   RankHost(Ranks &ranks, std::size_t rank) : ranks_(ranks), rank_(rank) {}
 
-  void sum_over_copies(double *per_particle) override { sum(per_particle, 3, nullptr); }
+  void sum_over_ghosts(double *per_particle) override { sum(per_particle, 3, nullptr); }
 
-  bool has_copies() const override { return true; }
-  void choose_copies(const std::vector<char> &chosen) override
+  bool has_ghosts() const override { return true; }
+  void choose_ghosts(const std::vector<char> &chosen) override
   {
     chosen_ = chosen;
-    ranks_.call("choose_copies", rank_, {}, &Ranks::choose_copies);
+    ranks_.call("choose_ghosts", rank_, {}, &Ranks::choose_ghosts);
   }
-  void sum_over_chosen_copies(double *per_particle) override { sum(per_particle, 4, &chosen_); }
-  void sum_over_chosen_copies(float *per_particle) override { sum(per_particle, 4, &chosen_); }
+  void sum_over_chosen_ghosts(double *per_particle) override { sum(per_particle, 4, &chosen_); }
+  void sum_over_chosen_ghosts(float *per_particle) override { sum(per_particle, 4, &chosen_); }
 
-  void share_with_copies(double *per_particle) override
+  void share_with_ghosts(double *per_particle) override
   {
     Ranks::Arrays arrays;
     arrays.per_particle = per_particle;
-    ranks_.call("share_with_copies", rank_, arrays, &Ranks::share_with_copies);
+    ranks_.call("share_with_ghosts", rank_, arrays, &Ranks::share_with_ghosts);
   }
 
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override
@@ -1016,7 +1016,7 @@ class RankHost final : public Host {
     Ranks::Arrays arrays;
     arrays.per_particle = packed.data();
     arrays.chosen = chosen;
-    ranks_.call("sum_over_copies", rank_, arrays, &Ranks::sum_over_copies);
+    ranks_.call("sum_over_ghosts", rank_, arrays, &Ranks::sum_over_ghosts);
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t d = 0; d < 3; ++d)
         per_particle[stride * i + d] = static_cast<Real>(packed[3 * i + d]);
@@ -1108,7 +1108,7 @@ std::vector<RankOutcome> solve_on_ranks(const ContactProblem &whole, Ranks &rank
     threads.emplace_back([&, rank] {
       RankHost host(ranks, rank);
       ContactProblem problem = part_of(whole, ranks.shares()[rank], contacts[rank]);
-      host.share_with_copies(problem.predicted_velocity.data());
+      host.share_with_ghosts(problem.predicted_velocity.data());
       const auto solver = make_solver(solver_name);
       RankOutcome &outcome = outcomes[rank];
       if (hide_contacts) {
@@ -1260,7 +1260,7 @@ void test_bodies_on_two_ranks(double tolerance)
         check_agreement(outcomes, ranks, solve_on_one_rank(whole, name, tolerance), bound);
         CHECK_EQUAL(outcomes[0].result.rounds > 1, hide_contacts);
         if (name == "apgd")    // bodies need no exchange of their own
-          check_calls(count_calls(ranks, "sum_over_copies"), outcomes[0].result,
+          check_calls(count_calls(ranks, "sum_over_ghosts"), outcomes[0].result,
                       EXCHANGES_PER_ROUND);
       }
 }
@@ -1296,10 +1296,10 @@ void test_two_ranks(double tolerance)
         CHECK_EQUAL(outcomes[0].result.rounds > 1, hide_contacts);
 
         // Only the test itself shares the predicted velocities.
-        CHECK_EQUAL(count_calls(ranks, "share_with_copies"), 1L);
+        CHECK_EQUAL(count_calls(ranks, "share_with_ghosts"), 1L);
         if (name == "apgd") {
           const ProjectionResult &result = outcomes[0].result;
-          check_calls(count_calls(ranks, "sum_over_copies"), result, EXCHANGES_PER_ROUND);
+          check_calls(count_calls(ranks, "sum_over_ghosts"), result, EXCHANGES_PER_ROUND);
           check_calls(count_calls(ranks, "reduce"), result, REDUCTIONS_PER_ROUND);
           CHECK_EQUAL(count_calls(ranks, "reduce 1 sums and 0 maxima"), long{result.rounds});
         }
@@ -1355,7 +1355,7 @@ void test_periodic_images(bool joined)
     }
     Ranks ranks({share}, COUNT);
     RankHost host(ranks, 0);
-    host.share_with_copies(problem.predicted_velocity.data());
+    host.share_with_ghosts(problem.predicted_velocity.data());
     AllContactsKnown source;
     std::vector<double> velocity;
     const auto solver = make_solver(name);

@@ -1,11 +1,11 @@
-// The copies of other ranks' atoms whose values a projection needs, a small part of those that the
+// The ghosts of other ranks' atoms whose values a projection needs, a small part of those that the
 // neighbour list needs. Every message between ranks carries these alone, in their own precision.
 //
 // The functions are called by a fix's pack and unpack functions: `first` and `list` are what LAMMPS
-// hands to those, the first copy of a message and the atoms that its copies are of.
+// hands to those, the first ghost of a message and the owned atoms of its ghosts.
 
-#ifndef INELASTIC_CHOSEN_COPIES_H
-#define INELASTIC_CHOSEN_COPIES_H
+#ifndef INELASTIC_CHOSEN_GHOSTS_H
+#define INELASTIC_CHOSEN_GHOSTS_H
 
 #include <cstring>
 #include <map>
@@ -13,56 +13,55 @@
 
 namespace LAMMPS_NS {
 
-class ChosenCopies {
+class ChosenGhosts {
  public:
-  // Begins a choice: `chosen` is per atom, copies included. A reverse communication of one number
+  // Begins a choice: `chosen` is per atom, ghosts included. A reverse communication of one number
   // per atom must follow, which tells the other side.
   void begin(const std::vector<char> &chosen)
   {
     chosen_ = chosen;
-    copies_.clear();
-    originals_.clear();
+    ghosts_.clear();
+    owned_.clear();
   }
 
   int pack_choice(int n, int first, double *buffer)
   {
-    std::vector<int> &copies = copies_[first];
+    std::vector<int> &ghosts = ghosts_[first];
     for (int k = 0; k < n; ++k) {
       buffer[k] = chosen_[first + k];
-      if (chosen_[first + k]) copies.push_back(first + k);
+      if (chosen_[first + k]) ghosts.push_back(first + k);
     }
     return n;
   }
 
   void unpack_choice(int n, const int *list, const double *buffer)
   {
-    std::vector<int> &originals = originals_[list];
+    std::vector<int> &owned = owned_[list];
     for (int k = 0; k < n; ++k)
       if (buffer[k] != 0.0) {
-        originals.push_back(list[k]);
-        chosen_[list[k]] = 1;    // this may be a copy itself, of a message yet to come
+        owned.push_back(list[k]);
+        chosen_[list[k]] = 1;    // this may be a ghost itself, of a message yet to come
       }
   }
 
   // Vectors of 4 numbers per atom, of which 3 travel.
-  template <typename Real> int pack_copies(int first, const Real *values, double *buffer) const
-  { return pack(copies_.at(first), values, buffer); }
+  template <typename Real> int pack_ghosts(int first, const Real *values, double *buffer) const
+  { return pack(ghosts_.at(first), values, buffer); }
 
-  template <typename Real>
-  int pack_originals(const int *list, const Real *values, double *buffer) const
-  { return pack(originals_.at(list), values, buffer); }
+  template <typename Real> int pack_owned(const int *list, const Real *values, double *buffer) const
+  { return pack(owned_.at(list), values, buffer); }
 
-  template <typename Real> void set_copies(int first, const double *buffer, Real *values) const
+  template <typename Real> void set_ghosts(int first, const double *buffer, Real *values) const
   {
-    for_each(copies_.at(first), buffer, values, [](Real &mine, Real other) {
+    for_each(ghosts_.at(first), buffer, values, [](Real &mine, Real other) {
       mine = other;
     });
   }
 
   template <typename Real>
-  void add_to_originals(const int *list, const double *buffer, Real *values) const
+  void add_to_owned(const int *list, const double *buffer, Real *values) const
   {
-    for_each(originals_.at(list), buffer, values, [](Real &mine, Real other) {
+    for_each(owned_.at(list), buffer, values, [](Real &mine, Real other) {
       mine += other;
     });
   }
@@ -94,8 +93,8 @@ class ChosenCopies {
   }
 
   std::vector<char> chosen_;
-  std::map<int, std::vector<int>> copies_;               // by `first`
-  std::map<const int *, std::vector<int>> originals_;    // by `list`
+  std::map<int, std::vector<int>> ghosts_;           // by `first`
+  std::map<const int *, std::vector<int>> owned_;    // by `list`
 };
 
 }    // namespace LAMMPS_NS
