@@ -1,4 +1,4 @@
-// What the fix remembers of every atom from step to step, and what therefore follows the atoms when LAMMPS
+// This room holds the memory of every atom from step to step, which therefore follows the atoms when LAMMPS
 // sorts them, hands them to other ranks and writes them to restart files.
 
 #ifndef INELASTIC_ATOM_STATE_H

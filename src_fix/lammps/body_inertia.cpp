@@ -21,7 +21,7 @@ using inelastic::norm;
 namespace {
 
 constexpr double COLLINEAR = 1.0e-7;    // smallest moment over the others; LAMMPS drops it there
-// Of the largest coordinate, times the machine epsilon: point masses nearer to one another than this
+// Point masses nearer to one another than this part of the largest coordinate, times the machine epsilon,
 // have an inertia, and turn, as the round-off of their positions will have it.
 constexpr double RESOLVED_ARM = 1.0e7;
 constexpr double AGREEMENT = 1.0e-6;    // relative, of masses and moments computed in two ways

@@ -19,7 +19,7 @@ using inelastic::dot;
 
 namespace {
 
-// Per owned atom: its body, -1 = in none.
+// Returns the body of each owned atom, -1 = in none.
 const int *bodies_of_atoms(Fix *fix)
 {
   int dimension;

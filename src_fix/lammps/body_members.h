@@ -1,5 +1,5 @@
-// Which spheres belong to which body of a fix rigid/small, ghosts included, and whether every rank sees
-// its bodies whole.
+// This room knows which spheres belong to which body of a fix rigid/small, ghosts included, and checks that
+// every rank sees its bodies whole.
 
 #ifndef INELASTIC_BODY_MEMBERS_H
 #define INELASTIC_BODY_MEMBERS_H
@@ -32,7 +32,7 @@ class BodyMembers : protected Pointers {
   // The first call of a run counts the bodies afresh.
   std::string find();
 
-  // After the bodies were measured in the first call of a run. Errors: ghosts that do not reach far
+  // The first call of a run checks this when the bodies were measured. Errors: ghosts that do not reach far
   // enough. Collective.
   void check_reach() const;
 

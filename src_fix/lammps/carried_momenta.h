@@ -1,5 +1,5 @@
-// What the steps of bodies carry along, kept per atom so that it follows the atoms: every atom of a body
-// has a copy of its body's values.
+// These are the momenta that the steps of bodies carry along, kept per atom so that they follow the atoms:
+// every atom of a body has a copy of its body's values.
 
 #ifndef INELASTIC_CARRIED_MOMENTA_H
 #define INELASTIC_CARRIED_MOMENTA_H

@@ -43,12 +43,13 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   // walls curve. Returns how many constraints this rank added or changed. Collective, same errors.
   long refine(const std::vector<double> &velocity, inelastic::ContactProblem &problem) override;
 
-  // Whether gaps were set by the end of the step, and whether the last solve knew of such gaps.
+  // The first tells whether gaps were set by the end of the step, the second whether the last solve knew of
+  // such gaps.
   bool relinearised() const { return relinearised_; }
   bool solved_relinearised() const { return solved_relinearised_; }
 
-  // After a step: takes more pairs at once when the last projection had to come back for some, fewer
-  // otherwise. `reach` [length] is that of the neighbour list.
+  // This is called after a step: it takes more pairs at once when the last projection had to come back
+  // for some, fewer otherwise. `reach` [length] is that of the neighbour list.
   void adapt_margin(double reach);
 
  private:

@@ -1,6 +1,6 @@
-// What the fix gives to LAMMPS's output: the global vector, contacts and forces per atom, the local list
-// of contacts, the forces on walls and the virial. Movers and the check of the motion take the contact
-// forces from here.
+// This room makes what LAMMPS's output shows of the fix: the global vector, contacts and forces per
+// atom, the local list of contacts, the forces on walls and the virial. Movers and the check of the
+// motion take the contact forces from here.
 
 #ifndef INELASTIC_CONTACT_OUTPUT_H
 #define INELASTIC_CONTACT_OUTPUT_H
@@ -43,7 +43,7 @@ class ContactOutput : protected Pointers {
 
   void begin_run(int number_of_walls);
 
-  // Which virial LAMMPS wants in this step, and where it is added.
+  // LAMMPS says which virial it wants in this step, and where it is to be added.
   struct VirialTarget {
     bool global;
     bool per_atom;
@@ -51,7 +51,7 @@ class ContactOutput : protected Pointers {
     double **atoms;    // 6 per atom
   };
 
-  // After a step. Collective.
+  // Takes the contacts of a step that is solved. Collective.
   void take(const inelastic::ProjectionResult &result, long shortened_steps,
             const VirialTarget &virial);
 

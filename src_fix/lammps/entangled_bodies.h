@@ -23,7 +23,7 @@ class EntangledBodies {
   // Finds them among the constraints of the step.
   void find();
 
-  // Whether particles i and j belong to two entangled bodies, in the phase in which these are pushed.
+  // Tells whether particles i and j belong to two entangled bodies, in the phase in which these are pushed.
   bool contains(int i, int j) const
   { return step_.phase == Phase::PUSH && !pairs_.empty() && pairs_.count(pair(i, j)); }
 

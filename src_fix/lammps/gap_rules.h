@@ -1,5 +1,5 @@
-// Which gap a constraint asks for: at the start of a step, in a bad start, and where the end of the step
-// differs from the linearised gap because bodies turn or walls curve.
+// This room decides which gap a constraint asks for: at the start of a step, in a bad start, and where
+// the end of the step differs from the linearised gap because bodies turn or walls curve.
 
 #ifndef INELASTIC_GAP_RULES_H
 #define INELASTIC_GAP_RULES_H
@@ -24,7 +24,7 @@ class GapRules {
   // The gap [length] at the end of the step for which the constraint is just met.
   double wanted_gap(double gap_now, double size) const;
 
-  // Whether the end of the step is so deep that the constraint must change. The excess is noted as well:
+  // Tells whether the end of the step is so deep that the constraint must change. The excess is noted as well:
   // what starts with a bad overlap may keep it, but not get deeper. It is asked for more, which costs no
   // shorter step where it is not to be had.
   bool ends_too_deep(double gap_now, double size, double gap_at_end);

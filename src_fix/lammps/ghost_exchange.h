@@ -1,4 +1,4 @@
-// What ranks tell one another: the forward and reverse communication of ghosts that the core's solvers
+// Ranks talk to one another here: the forward and reverse communication of ghosts that the core's solvers
 // need (host.h), global sums and maxima, and errors, which all ranks give together.
 
 #ifndef INELASTIC_GHOST_EXCHANGE_H
@@ -61,7 +61,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   std::vector<double> gather(std::vector<double> mine) const;
 
  private:
-  // What the pack and unpack functions work on.
+  // The pack and unpack functions work on one of these.
   enum class Exchange { VECTORS, MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
 
   void exchange(Exchange what, bool reverse, bool forward);

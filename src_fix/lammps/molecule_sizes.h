@@ -1,5 +1,5 @@
-// How many spheres the body of each molecule has, over all ranks. Every rank knows all molecules; what
-// that costs depends on their number, not on how large their IDs are.
+// A MoleculeSizes knows how many spheres the body of each molecule has, over all ranks. Every rank knows
+// all molecules; what that costs depends on their number, not on how large their IDs are.
 
 #ifndef INELASTIC_MOLECULE_SIZES_H
 #define INELASTIC_MOLECULE_SIZES_H
@@ -49,7 +49,7 @@ class MoleculeSizes {
   // Ascending by ID.
   const std::vector<Molecule> &all() const { return molecules_; }
 
-  // Where a molecule stands among all; NONE if it had no body when they were counted.
+  // Returns the place of a molecule among all; NONE if it had no body when they were counted.
   int place(tagint id) const
   {
     if (molecules_.empty() || id < molecules_.front().id || id > molecules_.back().id) return NONE;

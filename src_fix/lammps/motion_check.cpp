@@ -157,7 +157,7 @@ std::string MotionCheck::compare(int i) const
   return moved_otherwise(i, position_error, velocity_error, norm(faster));
 }
 
-// Whether the atom itself is another one than in the last step.
+// Says how the atom itself is another one than in the last step; empty if it is not.
 std::string MotionCheck::changed_before(int i) const
 {
   const double expected_radius = state_.expected_radius(i);

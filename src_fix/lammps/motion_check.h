@@ -1,5 +1,5 @@
-// Whether the scene is as the fix left it: LAMMPS moved what the last step predicted, nothing was added or
-// changed during the run, and forces and velocities are numbers.
+// This room checks that the scene is as the fix left it: LAMMPS moved what the last step predicted,
+// nothing was added or changed during the run, and forces and velocities are numbers.
 
 #ifndef INELASTIC_MOTION_CHECK_H
 #define INELASTIC_MOTION_CHECK_H
@@ -35,8 +35,8 @@ class MotionCheck : protected Pointers {
   // did not move as predicted. Collective.
   void before_step();
 
-  // After a step: notes which atoms are in the group, and how large, and that there is a prediction. The
-  // largest change [velocity] is that which one of the contacts made.
+  // This is called after a step: it notes which atoms are in the group, and how large, and that there is
+  // a prediction. The largest change [velocity] is that which one of the contacts made.
   void after_step(double largest_change);
 
  private:

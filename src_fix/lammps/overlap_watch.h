@@ -35,7 +35,7 @@ class OverlapWatch : protected Pointers {
   // Collective: warns of an overlap that no step has left, once a run, and counts such steps.
   void warn_of_unexpected();
 
-  // After a step: which overlaps it may have left behind. `certain` says that it was solved, and that
+  // Notes after a step which overlaps it may have left behind. `certain` says that it was solved, and that
   // every bad start in it was treated.
   void end_step(bool certain);
 
@@ -43,7 +43,7 @@ class OverlapWatch : protected Pointers {
   long unexpected_steps() const { return unexpected_steps_; }
   void begin_count() { unexpected_steps_ = 0; }
 
-  // Whether this step or the one before pushed spheres apart: a whole-step velocity holds half of each
+  // Tells whether this step or the one before pushed spheres apart: a whole-step velocity holds half of each
   // push.
   bool pushes_in_velocity() const { return pushes_in_velocity_; }
 

@@ -20,10 +20,10 @@ using inelastic::norm;
 
 namespace {
 
-// Of the largest radius: pairs whose gap is smaller are looked at in every round of a step.
+// Pairs whose gap is smaller than this part of the largest radius are looked at in every round of a step.
 constexpr double NEAR = 0.2;
 
-// Whether the distance at the end of the step, linearised, |a| + h a.o / |a|, is more than `reach` > 0,
+// Tells whether the distance at the end of the step, linearised, |a| + h a.o / |a|, is more than `reach` > 0,
 // for a = `away` and o = `opening`, the relative velocity. It takes no root for pairs of the list.
 bool ends_beyond(double reach, const double *away, double h, const double *opening)
 {

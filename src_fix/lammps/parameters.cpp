@@ -26,7 +26,7 @@ namespace {
 
 // The variable that holds the list of parameters as text. It is there from the first table on.
 constexpr char LIST[] = "parameters";
-// Of a word or a file, this variable says which of both it is.
+// This variable says whether a value is a word or a file.
 constexpr char IS_FILE[] = "_is_file";
 constexpr std::size_t LONGEST_SHOWN = 100;
 
@@ -55,7 +55,7 @@ bool is_integer(const std::string &text)
   return are_digits(at) && !*at;
 }
 
-// What LAMMPS understands everywhere as a number: `if` knows neither a leading + nor hexadecimals.
+// A number is what LAMMPS understands everywhere as one: `if` knows neither a leading + nor hexadecimals.
 bool is_number(const std::string &text)
 {
   const char *at = text.c_str();
@@ -253,7 +253,7 @@ Parameters::Rule Parameters::read_rule(const std::vector<std::string> &words,
   if (words[0] == "integer" || words[0] == "number") {
     rule.kind = words[0] == "integer" ? Rule::INTEGER : Rule::NUMBER;
     if (rule.kind == Rule::INTEGER) {
-      // What an integer of LAMMPS holds.
+      // An integer of LAMMPS holds this.
       rule.low = {std::to_string(INT_MIN), INT_MIN, true};
       rule.high = {std::to_string(INT_MAX), INT_MAX, true};
     }
@@ -409,7 +409,7 @@ std::string Parameters::make_folder(const Parameter &parameter) const
                      std::strerror(failed));
 }
 
-// Of a log file that was opened after the table was read.
+// A log file may have been opened after the table was read.
 void Parameters::write_to_log() const
 {
   if (!is_there_a_list())

@@ -51,9 +51,10 @@ class RegionWalls : protected Pointers {
     double reach;
   };
 
-  // Calls found(viewpoint, view) for every wall within reach. outside(viewpoint, region) is called instead for a
-  // centre that lies on the wrong side of a region, from where LAMMPS sees no wall. `inexact_only`
-  // leaves out the regions whose constraints are exact. Collective (variables of moving regions).
+  // Calls found(viewpoint, view) for every wall within reach. outside(viewpoint, region) is called
+  // instead for a centre that lies on the wrong side of a region, from where LAMMPS sees no wall.
+  // `inexact_only` leaves out the regions whose constraints are exact. Collective (variables of moving
+  // regions).
   void view(const std::vector<Viewpoint> &viewpoints, bool inexact_only,
             const std::function<void(const Viewpoint &, const WallView &)> &found,
             const std::function<void(const Viewpoint &, const std::string &region)> &outside);

@@ -47,7 +47,7 @@ void RigidMotion::predict()
   pushing_ = false;
 }
 
-// What each member has of its body's momenta, ghosts included.
+// Sets each member's part of its body's momenta, ghosts included.
 void RigidMotion::gather_momenta()
 {
   const std::size_t size = 3 * static_cast<std::size_t>(step_.problem.particles);

@@ -48,15 +48,15 @@ class RigidMotion final : public Mover, protected Pointers {
   std::string disagreement()
   { return inertias_.disagreement(step_.problem, step_.settings.rigid_fix); }
 
-  // Whether a particle belongs to a body of which this rank sees a part only.
+  // Tells whether a particle belongs to a body of which this rank sees a part only.
   bool is_incomplete(int i) const { return members_.is_incomplete(i); }
 
   // At the start of a run (the step does not continue one) momenta are the atoms'.
   void predict() override;
   void apply(const double *contact_force) override;
 
-  // Where the velocities (3 per particle) that solve the problem take the particles: `motion` becomes
-  // their mean velocities during the step.
+  // Follows the particles to where the velocities (3 per particle) that solve the problem take them:
+  // `motion` becomes their mean velocities during the step.
   void turn(const inelastic::ContactProblem &problem, const std::vector<double> &velocity,
             std::vector<double> &motion);
 

@@ -61,7 +61,7 @@ bool SceneCheck::any(bool here) const
   return all != 0;
 }
 
-// Whether pairs between spheres of two sides are hidden from the fix, other than pairs of two frozen
+// Tells whether pairs between spheres of two sides are hidden from the fix, other than pairs of two frozen
 // spheres. Collective.
 template <typename One, typename Other>
 bool SceneCheck::hides(const Group &group, One &&on_one_side, Other &&on_the_other) const

@@ -1,5 +1,5 @@
-// What other commands and fixes of a deck must not do, because fix inelastic would not see it: hide
-// spheres or pairs from it, or change the box or the radii while a run lasts.
+// This room refuses what other commands and fixes of a deck must not do, because fix inelastic would not
+// see it: hide spheres or pairs from it, or change the box or the radii while a run lasts.
 
 #ifndef INELASTIC_SCENE_CHECK_H
 #define INELASTIC_SCENE_CHECK_H

@@ -47,7 +47,7 @@ struct Step {
 
   const Settings &settings;
 
-  // Whether a step of this run came before, so that momenta are carried along and its prediction can be
+  // A step of this run came before, so that momenta are carried along and its prediction can be
   // compared with what moved.
   bool continues = false;
   Kick kick = Kick::WHOLE;
@@ -63,7 +63,7 @@ struct Step {
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
 
-  // What is known after constraints were collected.
+  // This is known after constraints were collected.
   Phase phase = Phase::CONTACT;
   bool bad_start = false;          // some overlap at the start is beyond the regular ones
   double largest_overlap = 0.0;    // [length] at the start
@@ -75,7 +75,7 @@ struct Step {
   bool is_mobile(const Atom *atom, int i) const
   { return in_group(atom, i) && !(atom->mask[i] & settings.frozen_bit); }
 
-  // Whether a particle belongs to a body.
+  // Tells whether a particle belongs to a body.
   bool is_member(int i) const { return settings.has_bodies() && problem.bodies.body[i] >= 0; }
 
   const std::vector<double> &motion() const

@@ -26,10 +26,11 @@ namespace {
 
 constexpr double SHORTEST_STEP = 1.0e-6;    // of the regular one: below, something else is wrong
 constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
-// Of the largest coordinate: an overlap of two spheres is not known better than that. Each of the
+// An overlap of two spheres is not known better than this part of the largest coordinate. Each of the
 // three coordinates of either is rounded by up to half of the machine epsilon.
 constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon();
-// Of the part of the box that a rank owns: LAMMPS brings an atom back from the next part alone.
+// An atom may stray by this part of what its rank owns of the box: LAMMPS brings it back from the next part
+// alone.
 constexpr double MOST_STRAYED = 0.5;
 
 }    // namespace

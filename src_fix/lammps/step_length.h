@@ -1,5 +1,6 @@
-// How long a step may be. Pairs that the neighbour list lacks must not meet during it, LAMMPS must be able
-// to follow every atom, and, with the keyword shorten, no overlap may be left at its end.
+// This room decides how long a step may be. Pairs that the neighbour list lacks must not meet during it,
+// LAMMPS must be able to follow every atom, and, with the keyword shorten, no overlap may be left at its
+// end.
 
 #ifndef INELASTIC_STEP_LENGTH_H
 #define INELASTIC_STEP_LENGTH_H
@@ -34,17 +35,17 @@ class StepLength : protected Pointers {
   // no use in solving first. Collective.
   void fit_to_list(Kick kick);
 
-  // Whether the step, solved, may be made. Otherwise it is shorter now, or there is an error. `named`
+  // Tells whether the step, solved, may be made. Otherwise it is shorter now, or there is an error. `named`
   // tells of the constraint that is farthest from being met, if any. Collective.
   bool accepts(const std::string &named);
 
   // Makes the time step shorter. Errors: it is so short already that something else is wrong.
   void shorten(double factor, const std::string &named);
 
-  // Whether the keyword allows a shorter step for one that could not be solved.
+  // Tells whether the keyword allows a shorter step for one that could not be solved.
   bool may_shorten_unsolved() const;
 
-  // Whether the list must be built before the next step, which may be half as fast again. Collective.
+  // Tells whether the list must be built before the next step, which may be half as fast again. Collective.
   bool needs_new_list();
 
   void restore();
@@ -74,7 +75,7 @@ class StepLength : protected Pointers {
   double strayed_ = 0.0;    // largest displacement since then, of the width that a rank owns
   // [length] The part of the box that this rank owns; no limit where nothing is beyond.
   double own_width_[3] = {EXTREME, EXTREME, EXTREME};
-  // Of the box, in each direction: LAMMPS loses an atom that goes further between two lists.
+  // LAMMPS loses an atom that goes further than this part of the box, in one direction, between two lists.
   double farthest_[3] = {EXTREME, EXTREME, EXTREME};
   std::vector<double> position_at_build_, radius_at_build_;
   std::vector<double> displacement_, unhindered_;    // room

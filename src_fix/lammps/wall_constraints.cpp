@@ -240,7 +240,7 @@ long WallConstraints::add_planes_within(const Viewpoints &beyond)
   return changed;
 }
 
-// How far along the step each of these centres is still inside, by bisection. Collective.
+// Finds by bisection how far along the step each of these centres is still inside. Collective.
 WallConstraints::Viewpoints WallConstraints::last_inside(const Viewpoints &beyond)
 {
   constexpr int BISECTIONS = 12;

@@ -27,7 +27,7 @@ class WallConstraints : protected Pointers {
   WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, RegionWalls &walls,
                   GhostExchange &ranks, const ContactMemory &memory, const RigidMotion *bodies);
 
-  // Whether the end of a step must be looked at: bodies turn, or walls curve.
+  // Tells whether the end of a step must be looked at: bodies turn, or walls curve.
   bool need_relinearising() const { return !walls_.empty() && (bodies_ || !walls_.exact()); }
 
   // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
