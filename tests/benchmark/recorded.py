@@ -12,7 +12,7 @@ from __future__ import annotations
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lammps_inelastic import core
+from lammps_inelastic.analysis import read_run_log
 from tests.pouring import Recorded, read_record, recording, records, run_deck, shipped_deck
 
 TOLERANCE = 0.0005  # of the runs that are recorded [radii]
@@ -74,7 +75,7 @@ def record(scene: Scene, folder: Path) -> dict[str, Recorded]:
     run_deck(
         folder / "start", shipped_deck(scene.particle), values | {f"steps_{p}": 0 for p in phases}
     )
-    log = run_deck(
+    run_deck(
         folder,
         recording(shipped_deck("settling"), RECORD_EVERY),
         {
@@ -85,22 +86,15 @@ def record(scene: Scene, folder: Path) -> dict[str, Recorded]:
             "time_settling": max(MOMENTS.values()),
         },
     )
-    times = dict(_times(log))
+    # The deck's last run, of no steps, only completes the dump.
+    settling = read_run_log(folder / "log.lammps").runs[-2].thermo
+    times = dict(zip(settling["Step"], settling["Time"], strict=True))
     paths = {int(path.name.split(".")[1]): path for path in records(folder)}
     chosen = {
         moment: min(paths, key=lambda step: abs(times[step] - when))
         for moment, when in MOMENTS.items()
     }
     return {moment: read_record(paths[step]) for moment, step in chosen.items()}
-
-
-def _times(log: str) -> Iterator[tuple[int, float]]:
-    """Yield step and time of the lines of thermo output."""
-    _, _, rows = log.rpartition("Step")
-    for line in rows.splitlines():
-        words = line.split()
-        if len(words) > 1 and words[0].isdigit():
-            yield int(words[0]), float(words[1])
 
 
 @dataclass(frozen=True)
