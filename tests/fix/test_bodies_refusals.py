@@ -33,6 +33,7 @@ BODIES = random_bodies(
     [dimer(1.5), SPHERE, BENT] * 5, RADIUS, np.array(BOX) + np.array([RADIUS, -RADIUS]), seed=1
 )
 Refused = Callable[..., str]
+PAGE = (Path(__file__).parents[2] / "src_fix/doc/fix_inelastic.md").read_text()
 
 
 def deck(folder: Path, inertia: str = "solid", **options: Any) -> str:
@@ -306,6 +307,19 @@ def test_radii_that_changed_after_the_bodies(ranks: int, tmp_path: Path, refused
     error = refused(text + f"run 3\n{slim}run 0\nrun 3\n", ranks=ranks)
     assert "molecule" in error, error
     assert "moments of inertia" in error, error
+
+
+@pytest.mark.parametrize(
+    "change", ["diameter 0.1", "density 1", "mass 1", "mol 3", "image 0 0 0", "x 0.2"]
+)
+def test_set_after_the_bodies(change: str, tmp_path: Path, lmp: Runner) -> None:
+    """One line says what is wrong; or LAMMPS crashes in the command, and the page warns of it."""
+    result = lmp(deck(tmp_path) + f"run 1\nset atom 1 {change}\nrun 1\n", must_pass=False)
+    assert result.status != 0
+    if not result.errors:
+        warning = re.search(r"- `set` with (.*?) crashes this LAMMPS", " ".join(PAGE.split()))
+        assert warning is not None
+        assert f"`{change.split()[0]}`" in warning[1]
 
 
 @pytest.mark.parametrize("inertia", INERTIAS)

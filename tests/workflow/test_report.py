@@ -746,6 +746,15 @@ def test_what_is_wider_than_the_page_scrolls_in_a_box_of_its_own(page: Page) -> 
     assert re.search(r"grid-template-columns: \w+ minmax\(0, 1fr\)", style)
 
 
+def test_tables_have_the_whole_page_at_1200_pixels(page: Page) -> None:
+    """Table 1 is cut off there where the contents stand beside it, at 16 pixels a rem."""
+    beside = re.findall(
+        r"@media \(min-width: ([\d.]+)rem\) \{\s*\.layout \{ display: grid;", page.text_of_style
+    )
+    assert len(beside) == page.text_of_style.count(".layout { display: grid;") == 1
+    assert 16 * float(beside[0]) > 1200
+
+
 def test_neck_touches_the_rolling_sphere() -> None:
     ax = draw_dimer_section(axis(), 1.8)
     upper = max(ax.patches[:2], key=lambda patch: patch.get_xy()[:, 1].max()).get_xy()
