@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from .files import whole
+from .files import whole, writing
 
 
 def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None:
@@ -31,7 +31,8 @@ def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None
     if summary is not None:
         print(f"{summary.large} of {summary.compared} differences are above two standard errors")
     if figures is not None:
-        figures.mkdir(parents=True, exist_ok=True)
+        with writing(figures):
+            figures.mkdir(parents=True, exist_ok=True)
         drawn = [b for one in sections for b in one.blocks if isinstance(b, Figure | Pictures)]
         for figure in drawn:
             figure.write(figures)
