@@ -65,3 +65,19 @@ def particles_inside(positions: ArrayLike, box: ArrayLike) -> BoolArray:
     centres, bounds = as_positions(positions), as_box(box)
     inside: BoolArray = np.all((centres >= bounds[:, 0]) & (centres <= bounds[:, 1]), axis=1)
     return inside
+
+
+def spheres_reaching(positions: FloatArray, radii: FloatArray, box: FloatArray) -> BoolArray:
+    """Say which spheres may have a part in a box, (n,): none of them lies beyond one of its faces.
+
+    Parameters
+    ----------
+    positions : (n, 3), length
+    radii : (n,), length
+    box : (3, 2), length
+    """
+    size = radii[:, None]
+    reaching: BoolArray = np.all(
+        (positions + size > box[:, 0]) & (positions - size < box[:, 1]), axis=1
+    )
+    return reaching

@@ -162,10 +162,8 @@ def draw_network(
 
     Raises InputError for axes that are not two of x, y and z.
     """
-    # These take a second to import, and those who only count contacts need not wait for them.
-    from matplotlib.collections import LineCollection
+    # This takes a second to import, and those who only count contacts need not wait for it.
     from mpl_toolkits.mplot3d import Axes3D
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     if not (up in (0, 1, 2) and across in (0, 1, 2) and up != across):
         raise InputError(f"up and across must be two of the axes 0, 1, 2, not {up} and {across}")
@@ -178,23 +176,12 @@ def draw_network(
     share = np.zeros(len(lines))
     if force is not None and len(force):
         share = np.minimum(force[rank] / force.mean(), LARGEST_SHOWN)
-    style: dict[str, Any] = {
-        "linewidths": MEAN_WIDTH if force is None else np.maximum(share, 0.15) * MEAN_WIDTH,
-        "cmap": palette,
-    }
-    collection: LineCollection
-    if isinstance(ax, Axes3D):
-        collection = Line3DCollection(lines, **style)
-        ax.add_collection3d(collection)
-        ax.set_zlabel("xyz"[up])
-        ax.set_ylabel("xyz"[depth])
-    else:
-        collection = LineCollection(list(lines), **style)
-        ax.add_collection(collection)
-        ax.set_ylabel("xyz"[up])
-    collection.set_array(share)
-    collection.set_clim(0, LARGEST_SHOWN)
+    widths = MEAN_WIDTH if force is None else np.maximum(share, 0.15) * MEAN_WIDTH
+    _add_lines(ax, lines, share, linewidths=widths, cmap=palette)
     ax.set_xlabel("xyz"[across])
+    ax.set_ylabel("xyz"[depth if isinstance(ax, Axes3D) else up])
+    if isinstance(ax, Axes3D):
+        ax.set_zlabel("xyz"[up])
     if len(lines):
         # Depth runs away from the viewer: an order that would mirror the packing is turned.
         _fit_axes(ax, lines, mirrored=(across, depth, up) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)))
@@ -226,6 +213,31 @@ def _edges(graph: networkx.Graph, lower_half: int | None) -> tuple[FloatArray, F
         shown = below[pairs].all(axis=1)
         pairs, force = pairs[shown], None if force is None else force[shown]
     return centres[pairs], force
+
+
+def _add_lines(ax: Axes, lines: FloatArray, share: FloatArray, **style: Any) -> None:
+    """Draw lines whose colours show their forces.
+
+    Parameters
+    ----------
+    ax : flat or 3-D axes
+    lines : (m, 2, 2) or (m, 2, 3), ends of the lines
+    share : (m,), force of each, in mean forces
+    style : as matplotlib's collections of lines have it
+    """
+    from matplotlib.collections import LineCollection
+    from mpl_toolkits.mplot3d import Axes3D
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    collection: LineCollection
+    if isinstance(ax, Axes3D):
+        collection = Line3DCollection(lines, **style)
+        ax.add_collection3d(collection)
+    else:
+        collection = LineCollection(list(lines), **style)
+        ax.add_collection(collection)
+    collection.set_array(share)
+    collection.set_clim(0, LARGEST_SHOWN)
 
 
 def _fit_axes(ax: Axes, lines: FloatArray, *, mirrored: bool) -> None:

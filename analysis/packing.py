@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 
 from .bodies import Particles
 from .errors import InputError
-from .geometry import BoolArray, FloatArray, as_box, as_spheres
+from .geometry import BoolArray, FloatArray, as_box, as_spheres, spheres_reaching
 from .neighbours import near_pairs
 from .volumes import Pieces, pieces_of, split
 
@@ -133,14 +133,10 @@ def packing_fraction(
     Raises InputError for arrays of other shapes, and for fewer points than one.
     """
     centres, radius, bounds = as_measurable_by_points(positions, radii, box, points)
-    size = radius[:, None]
-    reaches_box = np.all(
-        (centres + size > bounds[:, 0]) & (centres - size < bounds[:, 1]),
-        axis=1,
-    )
-    if not reaches_box.any():
+    reaching = spheres_reaching(centres, radius, bounds)
+    if not reaching.any():
         return PackingFraction(0.0, 0.0, points)
-    cover = Cover(centres[reaches_box], radius[reaches_box])
+    cover = Cover(centres[reaching], radius[reaching])
     return share_of_points(cover.holds, bounds, points, seed)
 
 
@@ -172,8 +168,7 @@ def exact_packing_fraction(
     volume = float(pieces.volumes_in(lower, upper).sum())
 
     common = 0.0
-    size = radius[:, None]
-    near = np.flatnonzero(((centres + size > lower) & (centres - size < upper)).all(axis=1))
+    near = np.flatnonzero(spheres_reaching(centres, radius, bounds))
     if len(near):
         one, other = near[near_pairs(centres[near], radius[near], 0.0)].T
         if particles is not None:

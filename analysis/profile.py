@@ -15,7 +15,7 @@ from scipy.special import j0
 
 from .bodies import Particles
 from .errors import InputError
-from .geometry import FloatArray, IntArray, as_box, as_spheres
+from .geometry import FloatArray, IntArray, as_box, as_spheres, spheres_reaching
 from .overlaps import FACES
 from .packing import packing_fraction
 from .volumes import pieces_of
@@ -81,9 +81,8 @@ def wall_profile(
     inwards = slabs.distance_from_wall(pieces.centres)
     first = np.floor((inwards - pieces.radii) / thickness).clip(0, slabs.count).astype(np.int64)
     last = np.ceil((inwards + pieces.radii) / thickness).clip(0, slabs.count).astype(np.int64)
-    size = pieces.radii[:, None]
-    reaches = (pieces.centres + size > slabs.box[:, 0]) & (pieces.centres - size < slabs.box[:, 1])
-    numbers = np.where(reaches.all(axis=1), last - first, 0)
+    reaching = spheres_reaching(pieces.centres, pieces.radii, slabs.box)
+    numbers = np.where(reaching, last - first, 0)
 
     volumes = np.zeros(slabs.count)
     used = np.flatnonzero(numbers > 0)

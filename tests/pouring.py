@@ -24,6 +24,7 @@ from lammps_inelastic.analysis import (
     measure_packing,
     read_particle_frame,
 )
+from tests.fix.lammps_run import without_launcher
 
 BULK = np.array([[0.25, 0.75]] * 3)  # the paper's box
 
@@ -33,20 +34,26 @@ def shipped_deck(name: str) -> str:
     return (files("lammps_inelastic.inputs") / f"{name}.in").read_text()
 
 
-def run_deck(folder: Path, deck: str, variables: Mapping[str, object]) -> str:
+def run_deck(
+    folder: Path, deck: str, variables: Mapping[str, object], plugin: Path | None = None
+) -> str:
     """Run a deck on one core in `folder`, which becomes its `out`; return the log.
 
-    Raises RuntimeError with the end of the output when lmp fails.
+    The plugin is the installed one, or that in the folder `plugin`. Raises RuntimeError with the
+    end of the output when lmp fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.in").write_text(deck)
-    command = [str(Path(sys.executable).parent / "lmp"), "-in", "deck.in", "-var", "out", "."]
+    program, environment = str(Path(sys.executable).parent / "lmp"), dict[str, str]()
+    if plugin is not None:
+        program, environment = without_launcher(plugin)
+    command = [program, "-in", "deck.in", "-var", "out", "."]
     for name, value in variables.items():
         command += ["-var", name, str(value)]
     done = subprocess.run(
         command,
         cwd=folder,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        env=os.environ | environment | {"OMP_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
         check=False,
@@ -62,16 +69,18 @@ class Projections:
 
     projections: int
     iterations: int
+    overlap: float  # the largest
     seconds: float
 
 
 def projections(log: str) -> list[Projections]:
     """One entry for every `run` of a log."""
     pattern = re.compile(
-        r"^Fix inelastic: (\d+) projections, (\d+) iterations.*?^Loop time of ([-+.\de]+)",
+        r"^Fix inelastic: (\d+) projections, (\d+) iterations, largest overlap (\S+) =.*?"
+        r"^Loop time of ([-+.\de]+)",
         re.MULTILINE | re.DOTALL,
     )
-    return [Projections(int(a), int(b), float(c)) for a, b, c in pattern.findall(log)]
+    return [Projections(int(a), int(b), float(c), float(d)) for a, b, c, d in pattern.findall(log)]
 
 
 @dataclass(frozen=True)

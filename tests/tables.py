@@ -3,7 +3,8 @@
 `python -m tests.tables NAME` prints one of them. `contacts` shows the coordination number of
 spheres against time step, tolerance and solver, `near` that of dimers that are almost spheres
 against the tolerance, `start` a regular start of dimers beside a random one, `inertia` point masses
-beside solid spheres. Every row is nine seeds unless --seeds says otherwise. The paper's numbers are
+beside solid spheres, `turning` the look at the end of the step beside a program without it, which
+is built for this. Every row is nine seeds unless --seeds says otherwise. The paper's numbers are
 studies.
 """
 
@@ -13,11 +14,13 @@ import argparse
 import statistics
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from tests.benchmark.scenes_without import TURNING, build
 from tests.pouring import (
     Packing,
+    Projections,
     measure,
     measuring_at,
     projections,
@@ -159,11 +162,45 @@ def inertia(seeds: int) -> Iterator[str]:
             yield f"| {ratio} | {kind} | {row(packings)} | {spread(iterations, 0)} |"
 
 
+def turning(seeds: int) -> Iterator[str]:
+    yield "| L/d | iterations without | with | largest overlap / `EPS` without | with |"
+    yield "|---|---|---|---|---|"
+    # The dimers are shaken and slowed, at one tolerance.
+    phases = {"steps_agitated": 400, "steps_settling": 200}
+    phases |= {"steps_tightening": 0, "steps_measuring": 0}
+    with tempfile.TemporaryDirectory() as name:
+        plugins = [build(Path(name) / f"{len(cuts)}", cuts) for cuts in (TURNING, [])]
+        for ratio in (1.05, 1.5, 2.0):
+            runs: list[list[Projections]] = [[], []]
+            for seed in range(1, seeds + 1):
+                variables = {"aspect_ratio": ratio, "seed": seed, "dump_every": 100000} | phases
+                for plugin, found in zip(plugins, runs, strict=True):
+                    with tempfile.TemporaryDirectory() as folder:
+                        log = run_deck(Path(folder), shipped_deck("dimers"), variables, plugin)
+                    # The start is pushed apart before the steps are counted from 0.
+                    found.append(summed(projections(log.rpartition("reset_timestep")[2])))
+            iterations = [spread([float(run.iterations) for run in found], 0) for found in runs]
+            eps = 0.0005 * RADIUS
+            overlaps = [spread([run.overlap / eps for run in found], 2) for found in runs]
+            yield f"| {ratio} | {' | '.join([*iterations, *overlaps])} |"
+
+
+def summed(runs: Sequence[Projections]) -> Projections:
+    """Return several runs of a log as one."""
+    return Projections(
+        sum(run.projections for run in runs),
+        sum(run.iterations for run in runs),
+        max(run.overlap for run in runs),
+        sum(run.seconds for run in runs),
+    )
+
+
 TABLES = {
     "contacts": contacts,
     "near": near,
     "start": start,
     "inertia": inertia,
+    "turning": turning,
 }
 
 

@@ -30,6 +30,7 @@ FILES = ("start", "shape")
 
 _VARIABLE = re.compile(r"^variable\s+(\w+)\s+index\s+(\S+)", re.MULTILINE)
 _TABLE = re.compile(r'^[ \t]*parameters[ \t]+"""(.*?)"""', re.MULTILINE | re.DOTALL)
+_GRAVITY = re.compile(r"^variable[ \t]+gravity[ \t]+equal[ \t]+(\S+)", re.MULTILINE)
 _NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 # An integer of LAMMPS is in this range.
 _INTEGERS = (-(2**31), 2**31 - 1)
@@ -221,6 +222,15 @@ class Deck:
         if rule is None:
             return name in FILES
         return rule.file and value not in rule.words
+
+
+def gravity_of(text: str) -> float | None:
+    """Return the gravity that a deck's text sets; None where it is a formula, 0 or not set."""
+    found = _GRAVITY.search(text)
+    value = as_value(found.group(1)) if found else 0
+    if isinstance(value, str) or not 0 < abs(value) < math.inf:
+        return None
+    return float(value)
 
 
 def as_value(text: str) -> Value:

@@ -33,7 +33,7 @@ from lammps_inelastic.analysis import (
     write_xyz,
 )
 from lammps_inelastic.analysis.export import Progress
-from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray
+from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray, spheres_reaching
 
 from .finished import CONTACTS as CONTACT_DUMP
 from .finished import LOG, unchanged
@@ -147,22 +147,13 @@ def write_spheres(
             out,
             positions,
             radii,
-            ids=columns.ids,
-            bodies=columns.bodies,
-            contacts=columns.contacts,
+            **columns.arrays,
             box=frame.box,
             periodic=["p" in flags for flags in frame.boundaries],
             step=frame.step,
         )
     else:
-        write_vtk(
-            out,
-            positions,
-            radii,
-            ids=columns.ids,
-            bodies=columns.bodies,
-            contacts=columns.contacts,
-        )
+        write_vtk(out, positions, radii, **columns.arrays)
     return [*rows, ("columns", columns.names), _as_file("file", out)]
 
 
@@ -190,6 +181,11 @@ class _Columns:
             bodies=None if frame.bodies is None else frame.bodies[chosen],
             contacts=None if contacts is None else contacts[chosen],
         )
+
+    @property
+    def arrays(self) -> dict[str, IntArray | None]:
+        """The columns by the names that the writers give them."""
+        return {"ids": self.ids, "bodies": self.bodies, "contacts": self.contacts}
 
     @property
     def names(self) -> str:
@@ -240,9 +236,7 @@ def write_image(
             "through its faces are not drawn on the other side yet"
         )
     bounds = frame.box if box is None else box
-    radii = frame.radii[:, None]
-    reaches = (frame.positions + radii > bounds[:, 0]) & (frame.positions - radii < bounds[:, 1])
-    if not reaches.all(axis=1).any():
+    if not spheres_reaching(frame.positions, frame.radii, bounds).any():
         raise AnalysisError(f"{path}: no sphere reaches into the box at step {frame.step}")
     edge = float(frame.radii.min()) / VOXELS_PER_RADIUS if voxel is None else voxel
     slices, rows, columns = voxel_shape(bounds, edge)

@@ -32,6 +32,12 @@ def whole(path: Path) -> Iterator[Path]:
                 temporary.unlink()
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file that is either whole or not there; raise WorkflowError as `whole` does."""
+    with whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Raise WorkflowError with the file or folder that could not be written.

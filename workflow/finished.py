@@ -20,6 +20,8 @@ from .shipped import DECKS, SETTLING
 FINISHED = "finished.json"
 PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
 LOG = "log.lammps"
+# So begins a line of the measuring process about a number that a result lacks.
+NOT_MEASURED = "not measured: "
 # These files of a finished run are read.
 FILES = (LOG, PARTICLES, CONTACTS)
 # Numbers that differ by less, relatively, are the same: dumps keep 12 digits and more.

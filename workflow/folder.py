@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from .errors import WorkflowError
-from .files import digest_of, is_file, read_regular, whole, writing
+from .files import digest_of, is_file, read_regular, write_text, writing
 from .finished import CONTACTS, FINISHED, PARTICLES, checksums
 from .store import origin_of
 from .study import INPUTS, Case, Study
@@ -290,8 +290,7 @@ def _renamed(path: Path) -> Path:
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write a JSON file, which is either whole or not there."""
-    with whole(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=2))
+    write_text(path, json.dumps(content, indent=2))
 
 
 def last_lines(path: Path, count: int = 8) -> list[str]:

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +20,7 @@ from types import FrameType
 from typing import Any
 
 from .errors import StudyError
+from .finished import NOT_MEASURED
 from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record
@@ -28,7 +29,7 @@ from .study import Case, Study, steps_of
 POLL = 0.05
 # The step of a run is read from its output at most so often [seconds].
 READ_EVERY = 1.0
-# The measuring process prints into this file; nothing if all goes well.
+# The measuring process prints into this file: what went wrong, or what the result lacks.
 MEASURED = "measure.out"
 # Our own decks write this file last.
 LAST_FILE = "packing.restart"
@@ -156,15 +157,16 @@ class _Job:
         # It may have left processes behind, such as an lmp whose launcher was killed.
         kill_group(self._process)
         if self._measuring:
+            lines = last_lines(self._folder.case(self._case) / MEASURED)
             if code == 0 and self._folder.is_measured(self._study, self._case):
+                show_lacking(name, lines, display)
                 outcome.measured.append(name)
                 if self._study.outputs.keep == "results":
                     self._folder.drop_dumps(self._case)
                 display.ended(name, f"done in {self._seconds:.0f} s: {name}")
                 self._held.close()
                 return False
-            lines = last_lines(self._folder.case(self._case) / MEASURED)
-            reason = lines[-1] if lines else exit_reason(code)
+            reason = failure_in(lines) or exit_reason(code)
             reason = unmeasurable(reason, self._folder.case(self._case))
             return self._leave(reason, lines, outcome, display)
         if code != 0:
@@ -271,8 +273,20 @@ def measured_too_long(limit: float) -> str:
     )
 
 
+def failure_in(lines: Sequence[str]) -> str:
+    """Return the line in which the measuring process says what went wrong; empty if none does."""
+    return next((line for line in reversed(lines) if not line.startswith(NOT_MEASURED)), "")
+
+
+def show_lacking(case: str, lines: Iterable[str], display: Display) -> None:
+    """Show those lines of the measuring process in which it says what a result lacks."""
+    for line in lines:
+        if line.startswith(NOT_MEASURED):
+            display.say(f"{line}: {case}")
+
+
 def measure_finished(
-    study: Study, case: Case, folder: Folder, limit: float | None = None
+    study: Study, case: Case, folder: Folder, display: Display, limit: float | None = None
 ) -> str | None:
     """Measure a finished run, and wait for it; return what went wrong, None if nothing did.
 
@@ -289,12 +303,13 @@ def measure_finished(
         check=False,
         timeout=limit,
     )
+    lines = done.stderr.splitlines()
     if done.returncode == 0 and folder.is_measured(study, case):
+        show_lacking(case.name, lines, display)
         if study.outputs.keep == "results":
             folder.drop_dumps(case)
         return None
-    lines = done.stderr.splitlines()
-    return lines[-1] if lines else exit_reason(done.returncode)
+    return failure_in(lines) or exit_reason(done.returncode)
 
 
 def prepare_stage(case: Case, stage: int, part: Path) -> None:

@@ -110,10 +110,6 @@ def look_at(
     the numbers do not need it.
     """
     particle_dump = ParticleDump(dump, radius=radius)
-    if contact_gap is None and not contact_dump.exists():
-        raise AnalysisError(
-            f"{contact_dump}: no such file; --contact-gap GAP counts contacts by distance"
-        )
     files = _files(particle_dump, contact_dump if contact_gap is None else None)
     frame = particle_dump[-1]
     _check_frame(dump, frame, box)
@@ -124,8 +120,8 @@ def look_at(
     steps, counts = _count_contacts(files, frame, gap, walls)
     failure = None if picture is None else _draw(picture, frame, walls, counts[-1])
     packing = measure_packing(frame, counts, box, points=points, seed=seed, walls=walls)
-    if packing.coordination is None:
-        raise AnalysisError(f"{contact_dump}: at least one frame of contacts is needed")
+    # There is a frame of contacts, and a particle in the box.
+    assert packing.coordination is not None
     return Look(
         dump=dump,
         contact_dump=contact_dump if gap is None else None,
@@ -157,6 +153,10 @@ def _draw(
 
 def _files(particles: ParticleDump, contacts: Path | None) -> RunFiles:
     """Open the files of a run, which must belong together, as far as there is a log to tell."""
+    if contacts is not None and not contacts.exists():
+        raise AnalysisError(
+            f"{contacts}: no such file; --contact-gap GAP counts contacts by distance"
+        )
     folder = particles.path.parent
     log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
     try:

@@ -2,8 +2,9 @@
 
     python -m lammps_inelastic.workflow.measure FOLDER TARGET OUTPUTS
 
-writes TARGET, an HDF5 file, and prints nothing; OUTPUTS is JSON. It is a process of its own, so
-that it can be killed, and leaves no memory in use.
+writes TARGET, an HDF5 file; OUTPUTS is JSON. It prints a line for each number that the packing does
+not have, and nothing else. It is a process of its own, so that it can be killed, and leaves no
+memory in use.
 """
 
 from __future__ import annotations
@@ -51,8 +52,9 @@ from lammps_inelastic.analysis import (
 )
 from lammps_inelastic.analysis.run_files import AGAIN
 
+from .decks import gravity_of
 from .errors import WorkflowError
-from .finished import CONTACTS, FINISHED, LOG, PARTICLES, check_stage
+from .finished import CONTACTS, FINISHED, LOG, NOT_MEASURED, PARTICLES, check_stage
 from .pictures import pictures_of
 from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
@@ -271,17 +273,26 @@ def _structure(
         around = radial_distribution(centres, box, largest=largest, bins=bins)
         values["structure/distance"] = around.middles
         values["structure/radial_distribution"] = around.values
+    else:
+        _say_not_measured("radial distribution", "the box is too near to the outermost particles")
     if particles.composite:
         return {}
     try:
         order = bond_order(centres, box)
-    except AnalysisError:  # too few spheres for twelve neighbours
+    except AnalysisError as error:
+        # There are too few spheres for twelve neighbours.
+        _say_not_measured("q4, q6, crystalline", str(error))
         return {}
     return {
         "q4": float(order.q4.mean()),
         "q6": float(order.q6.mean()),
         "crystalline": order.crystalline_share,
     }
+
+
+def _say_not_measured(what: str, why: str) -> None:
+    """Say what a result lacks, in a line that the process around this one shows."""
+    print(f"{NOT_MEASURED}{what}: {why}", file=sys.stderr)
 
 
 def _evolution(
@@ -337,13 +348,15 @@ def _effort(log: RunLog, smallest_radius: float) -> dict[str, float]:
 
 
 def _resolution(stage: Mapping[str, Any], radius: float) -> float | None:
-    """Return eps / (g h^2) of the measuring phase, where the deck has these variables."""
-    variables = stage["variables"]
-    gravity = re.search(r"^variable\s+gravity\s+equal\s+([\d.]+)", stage["text"], re.MULTILINE)
-    if gravity is None or not {"tolerance_measuring", "dt"} <= variables.keys():
+    """Return eps / (g h^2) of the measuring phase, where the deck has these as numbers."""
+    gravity = gravity_of(stage["text"])
+    tolerance, step = (stage["variables"].get(name) for name in ("tolerance_measuring", "dt"))
+    if gravity is None or not isinstance(tolerance, int | float):
         return None
-    eps = variables["tolerance_measuring"] * radius
-    return float(eps / (float(gravity.group(1)) * variables["dt"] ** 2))
+    if not isinstance(step, int | float):
+        return None
+    fall = abs(gravity) * step * step
+    return float(tolerance * radius / fall) if fall > 0 else None
 
 
 def _profile(

@@ -152,7 +152,8 @@ def _lead(
     left = None if options.timeout is None else options.timeout - (time.time() - began)
     try:
         # There is a moment at least, as there may be next to nothing to measure.
-        reason = measure_finished(study, case, folder, None if left is None else max(left, 0.01))
+        limit = None if left is None else max(left, 0.01)
+        reason = measure_finished(study, case, folder, display, limit)
     except subprocess.TimeoutExpired:
         assert options.timeout is not None
         outcome.failed[case.name] = measured_too_long(options.timeout)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from .files import whole
+from .files import write_text, writing
 
 
 def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None:
@@ -25,13 +25,13 @@ def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None
     data = read_data(files)
     sections = all_sections(data, [path.name for path in files])
     text = render(data, sections)
-    with whole(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(out, text)
     summary = summarise(sections)
     if summary is not None:
         print(f"{summary.large} of {summary.compared} differences are above two standard errors")
     if figures is not None:
-        figures.mkdir(parents=True, exist_ok=True)
+        with writing(figures):
+            figures.mkdir(parents=True, exist_ok=True)
         drawn = [b for one in sections for b in one.blocks if isinstance(b, Figure | Pictures)]
         for figure in drawn:
             figure.write(figures)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import stat
 from collections.abc import Iterator, Mapping, Sequence
@@ -69,7 +70,12 @@ class Result:
     def number(self, name: str) -> float:
         """Return one of the numbers; NaN where it was not measured."""
         value = self.values.get(f"numbers/{name}")
-        return float("nan") if value is None else float(value)
+        return math.nan if value is None else float(value)
+
+    def setting(self, name: str, default: float = math.nan) -> float:
+        """Return the value of a variable; the default where the deck has none, or a word."""
+        value = self.variables.get(name)
+        return float(value) if isinstance(value, int | float) else default
 
 
 def write_result(path: Path, result: Result) -> None:

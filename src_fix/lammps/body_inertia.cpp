@@ -72,7 +72,7 @@ bool same_moments(const double *inertia, const double *moments)
 
 }    // namespace
 
-void BodyInertias::measure(inelastic::ContactProblem &problem, const std::vector<int> &copy_of)
+void BodyInertias::measure(inelastic::ContactProblem &problem, const std::vector<int> &original_of)
 {
   inelastic::RigidBodies &bodies = problem.bodies;
   inertias_.resize(bodies.size());
@@ -81,7 +81,7 @@ void BodyInertias::measure(inelastic::ContactProblem &problem, const std::vector
     measure_masses(bodies, b);
     const int begin = bodies.start[b];
     for (int k = begin + bodies.originals[b]; k < bodies.start[b + 1]; ++k)
-      std::copy_n(arm + 3 * (begin + copy_of[k]), 3, arm + 3 * k);
+      std::copy_n(arm + 3 * (begin + original_of[k]), 3, arm + 3 * k);
     bodies.inverse_mass[b] = 1.0 / inertias_[b].mass;
     invert_inertia(inertias_[b].inertia, &bodies.inverse_inertia[6 * b]);
   }

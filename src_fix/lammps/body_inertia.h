@@ -32,9 +32,9 @@ class BodyInertias : protected Pointers {
   const BodyInertia &operator[](std::size_t body) const { return inertias_[body]; }
   Inertia kind() const { return kind_; }
 
-  // Sets arms, inverse masses and inverse inertias of the problem's bodies. `copy_of` tells of each member
+  // Sets arms, inverse masses and inverse inertias of the problem's bodies. `original_of` tells of each member
   // which of its body's originals it is.
-  void measure(inelastic::ContactProblem &problem, const std::vector<int> &copy_of);
+  void measure(inelastic::ContactProblem &problem, const std::vector<int> &original_of);
 
   // Compares mass and moments of the bodies of a fix rigid/small with these. Says which are otherwise;
   // empty if none of this rank's are.

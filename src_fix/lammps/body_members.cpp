@@ -113,7 +113,7 @@ std::string BodyMembers::find()
   incomplete_.assign(nall, 0);
   const std::vector<int> first = first_spheres(next, message);
   step_.problem.bodies.clear(nall);
-  copy_of_.clear();
+  original_of_.clear();
   for (const int first_sphere : first) {
     const std::string missing = add_body(first_sphere, next);
     if (!missing.empty()) message = missing;
@@ -152,7 +152,7 @@ std::string BodyMembers::add_body(int first_sphere, const std::vector<int> &next
   const tagint id = atom->molecule[first_sphere];
   const int place = molecules_.place(id);
   last_sphere_[place] = NONE;
-  std::vector<int> spheres, originals, copies, copy_of;
+  std::vector<int> spheres, originals, copies, original_of;
   for (int i = first_sphere; i != NONE; i = next[i]) spheres.push_back(i);
   // The owned sphere before its ghosts.
   std::sort(spheres.begin(), spheres.end(), [&](int a, int b) {
@@ -163,7 +163,7 @@ std::string BodyMembers::add_body(int first_sphere, const std::vector<int> &next
       originals.push_back(i);
     } else {
       copies.push_back(i);
-      copy_of.push_back(static_cast<int>(originals.size()) - 1);
+      original_of.push_back(static_cast<int>(originals.size()) - 1);
     }
   }
   const int number = static_cast<int>(originals.size());
@@ -178,8 +178,8 @@ std::string BodyMembers::add_body(int first_sphere, const std::vector<int> &next
                               id, all, number);
     return message;
   }
-  for (int k = 0; k < number; ++k) copy_of_.push_back(k);
-  copy_of_.insert(copy_of_.end(), copy_of.begin(), copy_of.end());
+  for (int k = 0; k < number; ++k) original_of_.push_back(k);
+  original_of_.insert(original_of_.end(), original_of.begin(), original_of.end());
   originals.insert(originals.end(), copies.begin(), copies.end());
   const std::vector<double> nothing(3 * originals.size() + 6, 0.0);
   step_.problem.bodies.add(originals.data(), nothing.data(), static_cast<int>(originals.size()),

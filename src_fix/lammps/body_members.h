@@ -40,7 +40,7 @@ class BodyMembers : protected Pointers {
   void begin_steps() { first_of_run_ = false; }
 
   bool is_incomplete(int i) const { return incomplete_[i]; }
-  const std::vector<int> &copy_of() const { return copy_of_; }
+  const std::vector<int> &original_of() const { return original_of_; }
 
  private:
   void count_spheres();
@@ -56,7 +56,7 @@ class BodyMembers : protected Pointers {
   static constexpr int NONE = -1;
   MoleculeSizes molecules_;
   std::vector<int> last_sphere_;    // per molecule: room for find, NONE between its calls
-  std::vector<int> copy_of_;        // per member: which of the body's originals it is
+  std::vector<int> original_of_;    // per member: which of the body's originals it is
   std::vector<char> incomplete_;    // per particle: of a body of which this rank has only a part
   std::vector<double>
       in_body_;    // 3 per particle, of which the first tells whether it is in a body

@@ -42,7 +42,7 @@ class RigidMotion final : public Mover, protected Pointers {
   std::string find_bodies();
 
   // Arms and inertia at the present positions.
-  void measure() { inertias_.measure(step_.problem, members_.copy_of()); }
+  void measure() { inertias_.measure(step_.problem, members_.original_of()); }
 
   // Says which of LAMMPS's bodies have other masses or moments; empty if none of this rank's have.
   std::string disagreement()

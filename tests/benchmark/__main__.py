@@ -46,7 +46,7 @@ FULL = Size(10_000, 0.052, 2, 1.8, (1_000, 10_000, 100_000), 100_000, True)
 def main() -> int:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmark", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="smaller scenes: under 15 minutes")
+    parser.add_argument("--quick", action="store_true", help="smaller scenes: 9 minutes")
     parser.add_argument("--out", type=Path, default=Path("benchmark"), help="folder for the runs")
     parser.add_argument(
         "parts", nargs="*", help="of: machine settling recorded growth parts million"

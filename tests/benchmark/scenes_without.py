@@ -46,6 +46,19 @@ OUTPUT: list[Cut] = [
         "if (false) {",
     ),
 ]
+# Bodies that turn are followed to the end of the step by this code; tests/tables.py shows its work.
+TURNING: list[Cut] = [
+    (
+        f"{LAMMPS}/constraints.cpp",
+        "if (bodies_ || wall_constraints_.need_relinearising()) {",
+        "if (false) {",
+    ),
+    (
+        f"{LAMMPS}/pair_constraints.cpp",
+        "!(bodies_ && square_at_end(i, j) < distance * distance)",
+        "true",
+    ),
+]
 CUTS = {
     "bodies, walls and output together": BODIES + WALLS + OUTPUT,
     "bodies": BODIES,

@@ -1,7 +1,8 @@
-"""Writes study files."""
+"""Writes study files, and copies the folder of one that has been run."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,3 +19,10 @@ def write_study(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def study(done: Path, tmp_path: Path) -> Path:
+    """Return a copy of the folder of a study that has been run, the fixture `done` of a module."""
+    shutil.copytree(done, tmp_path / "study")
+    return tmp_path / "study"

@@ -14,6 +14,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from tests.workflow.few_spheres import TINY
+
 BIN = Path(sys.executable).parent
 # An mpiexec around pytest must not reach the runs (they would join its job).
 OF_A_LAUNCHER = ("PMI_", "PMIX_", "HYDI_", "HYDRA_", "MPI_", "MPICH_", "OMPI_")
@@ -44,6 +46,14 @@ def inelastic(
         check=False,
         preexec_fn=preparation,
     )
+
+
+def run_few(folder: Path, seeds: str) -> Path:
+    """Run the study of a few spheres with some seeds in a folder; return the folder."""
+    (folder / "few.toml").write_text(TINY.replace("{seeds}", seeds))
+    result = inelastic("run", folder / "few.toml", "--out", folder / "out")
+    assert result.returncode == 0, result.stderr
+    return folder
 
 
 def numbers_of(path: Path) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,24 +15,13 @@ from lammps_inelastic.workflow.folder import FAILED, Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.study import read_study
 from tests.workflow.few_spheres import TINY
-from tests.workflow.study_run import inelastic, numbers_of, same
+from tests.workflow.study_run import inelastic, numbers_of, run_few, same
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of two cases that has been run."""
-    folder = tmp_path_factory.mktemp("done")
-    (folder / "few.toml").write_text(TINY.replace("{seeds}", "[1, 2]"))
-    result = inelastic("run", folder / "few.toml", "--out", folder / "out")
-    assert result.returncode == 0, result.stderr
-    return folder
-
-
-@pytest.fixture
-def study(done: Path, tmp_path: Path) -> Path:
-    """Return a copy of it."""
-    shutil.copytree(done, tmp_path / "study")
-    return tmp_path / "study"
+    return run_few(tmp_path_factory.mktemp("done"), "[1, 2]")
 
 
 def cut(path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.decks import Deck, find_deck, read_rule
+from lammps_inelastic.workflow.decks import Deck, find_deck, gravity_of, read_rule
 from lammps_inelastic.workflow.errors import StudyError
 from lammps_inelastic.workflow.shipped import DECKS
 from lammps_inelastic.workflow.study import read_study
@@ -121,3 +121,22 @@ def test_comments_in_a_table_do_not_change_a_deck() -> None:
     other = TABLE.replace("# how many", "# of them").replace("  grains  ", " grains ")
     assert Deck("own", other, shipped=False).fingerprint == before
     assert Deck("own", TABLE.replace("50", "51"), shipped=False).fingerprint != before
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("variable gravity equal 9.81", 9.81),
+        ("units lj\nvariable  gravity\tequal 1e-3  # along -y\n", 1e-3),
+        ("variable gravity equal -9.81", -9.81),
+        ("variable gravity equal 9.81*2", None),
+        ("variable gravity equal v_g", None),
+        ("variable gravity equal 1.2.3", None),
+        ("variable gravity equal 0", None),
+        ("variable gravity equal inf", None),
+        ("variable gravity index 9.81", None),
+        ("", None),
+    ],
+)
+def test_gravity_is_a_number_or_not_known(text: str, expected: float | None) -> None:
+    assert gravity_of(text) == expected

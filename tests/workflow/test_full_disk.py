@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import resource
-import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,7 +20,7 @@ from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.store import read_studies
 from tests.small_disk import mounted
 from tests.workflow.few_spheres import TINY
-from tests.workflow.study_run import inelastic
+from tests.workflow.study_run import inelastic, run_few
 
 EXPORTS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
 # What each of them needs to be small: 30 spheres, and no more than 27,000 voxels.
@@ -31,18 +30,7 @@ MORE = {"tiff": ["--voxel", "0.1"], "raw": ["--voxel", "0.1"]}
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of one case that has been run."""
-    folder = tmp_path_factory.mktemp("done")
-    (folder / "few.toml").write_text(TINY.replace("{seeds}", "1"))
-    result = inelastic("run", folder / "few.toml", "--out", folder / "out")
-    assert result.returncode == 0, result.stderr
-    return folder
-
-
-@pytest.fixture
-def study(done: Path, tmp_path: Path) -> Path:
-    """Return a copy of it."""
-    shutil.copytree(done, tmp_path / "study")
-    return tmp_path / "study"
+    return run_few(tmp_path_factory.mktemp("done"), "1")
 
 
 @contextmanager

@@ -8,6 +8,7 @@ import io
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ from lammps_inelastic.workflow.report.columns import Column, table
 from lammps_inelastic.workflow.report.contents import all_sections
 from lammps_inelastic.workflow.report.data import Data, paper_numbers, read_data
 from lammps_inelastic.workflow.report.figures import Figure, Panel, curve
-from lammps_inelastic.workflow.report.page import summarise
+from lammps_inelastic.workflow.report.page import render, summarise
 from lammps_inelastic.workflow.report.statistics import (
     Sample,
     Stated,
@@ -490,6 +491,19 @@ def test_results_of_an_older_deck_group_with_newer_ones(tmp_path: Path) -> None:
     first, second = (result.variables for result in data.studies["own"].results)
     assert first["solver"] == "apgd"
     assert first | {"seed": 2} == second
+
+
+@pytest.mark.parametrize("value", [None, "word"])
+def test_other_decks_under_the_names_of_the_paper(value: str | None) -> None:
+    """Their parameters are not ours, or words: no number stands for them."""
+    one = measured(deck="own", numbers__particles=1000)
+    (stage,) = one.record["stages"]
+    variables = {name: value for name in stage["variables"] if value is not None}
+    own = replace(one, record={**one.record, "stages": [{**stage, "variables": variables}]})
+    data = Data({name: study(name, [own]) for name in STUDIES}, paper_numbers())
+    page = Page(render(data, all_sections(data, ["own.h5"])))
+    assert ANCHORS - {"summary"} <= set(page.ids)
+    assert not re.search(r"\bnan\b", page.text, re.IGNORECASE)
 
 
 def test_solvers_are_not_mixed() -> None:

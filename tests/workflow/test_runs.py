@@ -51,6 +51,22 @@ def one_case(folder: Path, seed: int = 1) -> Path:
     return path
 
 
+@pytest.mark.parametrize("options", [[], ["--mpi"]])
+def test_what_cannot_be_measured_is_said(options: list[str], tmp_path: Path) -> None:
+    path = one_case(tmp_path)
+    few = TINY.replace("{seeds}", "1").replace("structure = false", "structure = true")
+    path.write_text(few.replace("particles = 30", "particles = 10"))
+    done = inelastic("run", path, "--out", tmp_path / "out", *options, ranks=len(options))
+    assert (done.returncode, done.stderr) == (0, "")
+    said = [line.partition("not measured: ")[2] for line in done.stdout.splitlines()]
+    assert [": ".join(line.split(": ")[:2]) for line in said if line] == [
+        "radial distribution: the box is too near to the outermost particles",
+        "q4, q6, crystalline: more than 12 particles are needed, not 10",
+    ]
+    names = numbers_of(tmp_path / "out" / "few.h5").keys()
+    assert not any("q6" in name or "structure/" in name for name in names)
+
+
 def of_case(numbers: dict[str, Any], case: Case) -> dict[str, Any]:
     """The numbers of one case in a study's file."""
     start = f"few/cases/{case.name}/"

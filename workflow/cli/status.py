@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..folder import Folder, last_lines
-from ..launch import MEASURED
+from ..launch import MEASURED, failure_in
 from ..store import read_result
 from ..study import Case, Study
 from ..wide_table import print_wide
@@ -46,8 +46,8 @@ def _print_status(study: Study, folder: Folder) -> None:
         note = ""
         if state == "failed":
             note = folder.reason(case)
-        elif state == "finished" and (lines := last_lines(folder.case(case) / MEASURED)):
-            note = f"cannot be measured: {lines[-1]}"
+        elif state == "finished" and (said := failure_in(last_lines(folder.case(case) / MEASURED))):
+            note = f"cannot be measured: {said}"
         elif state == "measured":
             note, same = _of_result(study, case, folder)
             other += not same

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..decks import find_deck
-from ..files import whole
+from ..files import write_text
 from ..folder import Folder
 from ..gather import gather_results
 from ..launch import Options, run_study
@@ -94,8 +94,8 @@ def run(options: argparse.Namespace) -> int:
     comparison = compare(results)
     lines = [*left_out, *never_at_rest(comparison), *recommendations(comparison)]
     print_comparison(comparison, lines)
-    _write(options.out / ROWS, as_csv(comparison))
-    _write(options.out / PAGE, as_markdown(plan, comparison, lines))
+    write_text(options.out / ROWS, as_csv(comparison))
+    write_text(options.out / PAGE, as_markdown(plan, comparison, lines))
     names = [STORE, ROWS, PAGE]
     if comparison.rows:
         # Drawing takes a while to import, for which the other subcommands need not wait.
@@ -140,8 +140,3 @@ def _run_all(
     left_out = [f"left out: {name}: {reason}" for name, reason in failed.items()]
     left_out += [f"left out: {name}: somebody else runs it" for name in elsewhere]
     return results, left_out, bool(failed)
-
-
-def _write(path: Path, text: str) -> None:
-    with whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")

@@ -30,6 +30,16 @@ class Data:
     studies: Mapping[str, StoredStudy]
     paper: Mapping[str, Any]
 
+    @property
+    def usual_tolerance(self) -> float:
+        """The overlap, over the radius, that the paper uses wherever it states no other."""
+        return float(self.paper["protocol"]["default_eps_over_r"])
+
+    @property
+    def paper_solver(self) -> str:
+        """The paper's solver, as our decks name it."""
+        return str(self.paper["protocol"]["solver"])
+
     def results(self, *names: str) -> list[Result]:
         """Return the results of the first of these studies that has any."""
         for name in names:
@@ -100,7 +110,7 @@ def profile(result: Result) -> tuple[FloatArray, FloatArray] | None:
     values = result.values.get("profile/packing_fraction", result.values.get("profile/monte_carlo"))
     if distance is None or values is None:
         return None
-    return distance / float(result.variables.get("diameter", 1.0)), values
+    return distance / result.setting("diameter", 1.0), values
 
 
 def profiles(results: Iterable[Result]) -> list[tuple[FloatArray, FloatArray]]:

@@ -7,12 +7,9 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Any
 
 from ..store import Result
+from .data import SPHERES, deck_defaults
 from .text import DASH, as_count, as_runs, as_value
 
-# The values of a deck's variable `solver`: our own solver, and the paper's.
-OUR_SOLVER, PAPER_SOLVER = "apgd", "uzawa"
-# The paper uses this overlap, over the radius, wherever it states no other.
-USUAL_TOLERANCE = 0.0005
 # The packing depends on these parameters by chance alone: cases that differ in nothing else are
 # repeats.
 REPEATS = frozenset({"seed", "dump_every"})
@@ -35,12 +32,7 @@ def by_variables(names: Sequence[str]) -> Callable[[Result], tuple[Any, ...]]:
 
 def by_value(name: str) -> Callable[[Result], float]:
     """Return a key: a result's value of a variable that is a number."""
-    return lambda result: float(result.variables[name])
-
-
-def value_of(result: Result, name: str) -> float:
-    """Return a result's value of a variable that is a number; NaN if the deck has none."""
-    return float(result.variables.get(name, math.nan))
+    return lambda result: result.setting(name)
 
 
 def varying(results: Sequence[Result]) -> list[str]:
@@ -87,7 +79,7 @@ def _equal(value: object, wanted: float | str) -> bool:
 
 def is_agitated(result: Result) -> bool:
     """Say whether a random force acted in a run."""
-    return bool(result.variables.get("random_force", 0) > 0)
+    return result.setting("random_force") > 0
 
 
 def by_size(results: Iterable[Result]) -> dict[tuple[float, float], list[Result]]:
@@ -95,19 +87,19 @@ def by_size(results: Iterable[Result]) -> dict[tuple[float, float], list[Result]
     groups = grouped(
         results,
         lambda result: (
-            float(result.variables.get("particles", result.number("particles"))),
-            float(result.variables.get("diameter", 1.0)),
+            result.setting("particles", result.number("particles")),
+            result.setting("diameter", 1.0),
         ),
     )
     return dict(sorted(groups.items()))
 
 
-def nearest_size(results: Sequence[Result], wanted: int) -> list[Result]:
+def nearest_size(results: Sequence[Result], wanted: int, tolerance: float) -> list[Result]:
     """Return the results of so many particles; of the most if there are none of so many.
 
-    Results of another tolerance than the paper's usual one are left out if there are any of that.
+    Results of another tolerance are left out if there are any of this one.
     """
-    groups = by_size(matching(results, tolerance=USUAL_TOLERANCE) or results)
+    groups = by_size(matching(results, tolerance=tolerance) or results)
     if not groups:
         return []
     for (particles, _), group in groups.items():
@@ -118,12 +110,17 @@ def nearest_size(results: Sequence[Result], wanted: int) -> list[Result]:
 
 def count_of(results: Sequence[Result]) -> int:
     """Return the number of particles that the results were asked to have."""
-    return int(results[0].variables.get("particles", results[0].number("particles")))
+    return int(results[0].setting("particles", results[0].number("particles")))
+
+
+def our_solver() -> str:
+    """Return our own solver: the one that our decks take where nothing else is said."""
+    return str(deck_defaults(SPHERES)["solver"])
 
 
 def solver_of(result: Result) -> str:
     """Return the solver of a run; a deck that does not say it uses our own."""
-    return str(result.variables.get("solver", OUR_SOLVER))
+    return str(result.variables.get("solver", our_solver()))
 
 
 def seed_label(result: Result) -> str:

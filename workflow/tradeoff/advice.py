@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,12 +75,11 @@ def described(one: Configuration, comparison: Comparison) -> str:
         row.configuration for row in comparison.rows if row.configuration.contacts == one.contacts
     ]
     words = [f"{one.tolerance:g} r"]
-    parts: list[tuple[str, Callable[[Configuration], object]]] = [
-        ("solver", lambda each: each.solver),
-        ("dt", lambda each: each.dt),
-        ("ranks", lambda each: each.ranks),
+    words += [
+        f"{name} {value}"
+        for name, value in one.choices.items()
+        if len({other.choices[name] for other in others}) > 1
     ]
-    words += [f"{name} {part(one)}" for name, part in parts if len(set(map(part, others))) > 1]
     return ", ".join(words)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -17,7 +17,6 @@ from lammps_inelastic.analysis.plots import plot_bounds, plot_points, style_of
 from ..files import whole
 from ..report.figures import DPI, RC
 from .comparison import Comparison, Row
-from .plan import Configuration
 
 # The figure is about as wide as a page [inches].
 SIZE = (7.4, 4.3)
@@ -130,19 +129,13 @@ def _curves(rows: Sequence[Row]) -> Mapping[str, list[Row]]:
     for row in rows:
         one = row.configuration
         words = [f"{one.contacts} contacts" if one.contacts == "hard" else "soft spheres"]
-        for name, part in PARTS.items():
-            values = {part(other.configuration) for other in rows} - {None}
-            if len(values) > 1 and part(one) is not None:
-                words.append(f"{name}{part(one)}")
+        for name, value in one.choices.items():
+            values = {other.configuration.choices[name] for other in rows} - {None}
+            if len(values) > 1 and value is not None:
+                # A solver's name says by itself what it is.
+                words.append(f"{value}" if name == "solver" else f"{name} {value}")
         curves.setdefault(", ".join(words), []).append(row)
     return curves
-
-
-PARTS: Mapping[str, Callable[[Configuration], object]] = {
-    "": lambda one: one.solver,
-    "dt ": lambda one: one.dt,
-    "ranks ": lambda one: one.ranks,
-}
 
 
 def _logarithmic(ax: Axes) -> None:

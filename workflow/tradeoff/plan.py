@@ -47,6 +47,11 @@ class Configuration:
     dt: float | None
     ranks: int
 
+    @property
+    def choices(self) -> Mapping[str, object]:
+        """What tells the configuration from others of its contacts and tolerance, by name."""
+        return {"solver": self.solver, "dt": self.dt, "ranks": self.ranks}
+
 
 @dataclass(frozen=True)
 class Plan:

@@ -11,7 +11,7 @@ from ...store import Result
 from ..blocks import Block, Comparison, Content, Text
 from ..columns import RUNS, Column, table
 from ..data import SPHERES, Data, deck_defaults
-from ..groups import OUR_SOLVER, count_of, grouped, is_agitated, solver_of, value_of
+from ..groups import count_of, grouped, is_agitated, our_solver, solver_of
 from ..quantities import AGITATED_COORDINATION_NUMBER, COORDINATION_NUMBER
 from ..statistics import Sample, Stated, sample
 from ..text import as_count, as_sample, as_short
@@ -69,9 +69,10 @@ def agitation(data: Data) -> Content:
             ),
         ),
         Text(
-            "Paper: with the random force the coordination number is too small by about 0.5. "
-            "How much it is depends on how strong the force is, which the paper does not "
-            "state. While the spheres are agitated the count is made with the larger tolerance."
+            "Paper: with the random force the coordination number is too small by about "
+            f"{as_short(STATED_DROP)}. How much it is depends on how strong the force is, which "
+            "the paper does not state. While the spheres are agitated the count is made with the "
+            "larger tolerance."
         ),
     ]
     return Content(blocks, [_compared(row) for row in rows if _is_as_in_the_paper(row.kind, data)])
@@ -95,10 +96,10 @@ def _agitated(data: Data) -> list[Result]:
 def _kind_of(result: Result) -> _Kind:
     return _Kind(
         count_of([result]),
-        value_of(result, "diameter"),
-        value_of(result, "tolerance"),
+        result.setting("diameter"),
+        result.setting("tolerance"),
         solver_of(result),
-        value_of(result, "random_force"),
+        result.setting("random_force"),
     )
 
 
@@ -108,8 +109,8 @@ def _drop(group: Sequence[Result]) -> Sample:
 
 def _is_as_in_the_paper(kind: _Kind, data: Data) -> bool:
     return (
-        kind.solver == OUR_SOLVER
-        and kind.tolerance == data.paper["protocol"]["default_eps_over_r"]
+        kind.solver == our_solver()
+        and kind.tolerance == data.usual_tolerance
         and kind.force == deck_defaults(SPHERES).get("random_force")
     )
 
@@ -121,6 +122,6 @@ def _compared(row: _Row) -> Comparison:
         row.drop,
         2,
         "",
-        "the paper says about 0.5, and not how strong its random force is",
+        f"the paper says about {as_short(STATED_DROP)}, and not how strong its random force is",
         "it depends on that, and on the number of spheres: see the section on it",
     )

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from ...store import Result
 from ..data import SPHERES, Data
 from ..figures import Curve, Kind, points
-from ..groups import grouped, value_of
+from ..groups import grouped
 from ..quantities import Quantity
 from ..statistics import pooled_numbers
 from ..text import as_short
@@ -23,13 +23,12 @@ ByAspect = Mapping[float, Sequence[Result]]
 
 def by_aspect(data: Data) -> ByAspect:
     """Return the results of the study of dimers by aspect ratio; spheres at 1."""
-    groups = grouped(data.results("dimers"), _aspect)
-    groups.pop(math.nan, None)
-    return dict(sorted(groups.items()))
+    known = [result for result in data.results("dimers") if not math.isnan(_aspect(result))]
+    return dict(sorted(grouped(known, _aspect).items()))
 
 
 def _aspect(result: Result) -> float:
-    return 1.0 if result.record["deck"] == SPHERES else value_of(result, "aspect_ratio")
+    return 1.0 if result.record["deck"] == SPHERES else result.setting("aspect_ratio")
 
 
 def listed(data: Data, groups: ByAspect) -> ByAspect:

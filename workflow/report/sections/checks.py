@@ -34,10 +34,8 @@ class _Row:
     def tolerance(self) -> float:
         """The loosest tolerance of a run, radii; NaN if the deck has none."""
         names = ("tolerance", "tolerance_agitated", "tolerance_measuring")
-        variables = self.group[0].variables
-        return max(
-            (float(variables[name]) for name in names if name in variables), default=math.nan
-        )
+        values = [self.group[0].setting(name) for name in names]
+        return max((value for value in values if not math.isnan(value)), default=math.nan)
 
     @property
     def overlap(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -45,7 +46,7 @@ COLUMNS: Sequence[Column[_Run]] = (
 def coming_to_rest(data: Data) -> Content:
     """Show both numbers against the step, and from which step on they stay as they are."""
     with_frames = [r for r in data.results("table-2") if series(r, "evolution/step") is not None]
-    results = nearest_size(with_frames, 10_000)
+    results = nearest_size(with_frames, 10_000, data.usual_tolerance)
     if not results:
         return Content()
     stated = data.paper["protocol"]
@@ -104,13 +105,9 @@ def _moments(result: Result, stated: Mapping[str, Any]) -> list[tuple[str, float
         ("paper: plateau", float(stated["plateau_reached_at_step"])),
         ("paper: constant", float(stated["plateau_step"])),
     ]
-    off = result.variables.get("steps_agitated")
-    if off is not None:
-        moments.append(("random force off", float(off)))
-        if "steps_settling" in result.variables:
-            count = off + result.variables["steps_settling"]
-            moments.append(("smaller ε, count", float(count)))
-    return moments
+    off = result.setting("steps_agitated")
+    ours = [("random force off", off), ("smaller ε, count", off + result.setting("steps_settling"))]
+    return [*moments, *((what, step) for what, step in ours if not math.isnan(step))]
 
 
 def _evolution(result: Result, quantity: Quantity) -> tuple[FloatArray, FloatArray]:

@@ -16,7 +16,7 @@ from ..blocks import Block, Comparison, Content, Text
 from ..columns import RUNS, Column, table
 from ..data import Data
 from ..figures import Curve, Figure, Panel, points
-from ..groups import by_size, by_value, grouped, value_of
+from ..groups import by_size, by_value, grouped
 from ..quantities import COORDINATION_NUMBER, PACKING_FRACTION
 from ..statistics import Sample, Stated, numbers, sample
 from ..text import DASH, as_count, as_mean, as_short, as_text
@@ -208,7 +208,7 @@ def against_force(data: Data) -> Content:
     if not results:
         return Content()
     stated = data.paper["dimers"]["anisotropy"]
-    aspect = value_of(results[0], "aspect_ratio")
+    aspect = results[0].setting("aspect_ratio")
     rows = _agitated_rows(results)
     as_in_the_paper = [
         row

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -65,7 +64,7 @@ def number_of_spheres(data: Data) -> Content:
     of_paper = [_row_of_paper(data, results, stated) for stated in data.paper["table2"]]
     comparisons = [row.phi for row in of_paper if row.group]
     whole = data.paper["spheres"]["phi_percent"]
-    bulk = nearest_size(results, 10_000)
+    bulk = nearest_size(results, 10_000, data.usual_tolerance)
     if bulk:
         comparisons.append(
             Comparison(
@@ -135,11 +134,11 @@ def _other_rows(results: Sequence[Result], of_paper: Sequence[_Row]) -> list[_Ro
         _Row(
             int(particles),
             diameter,
-            float(tolerance or math.nan),
+            tolerance,
             None,
             part,
             Comparison("φ", NOTHING_STATED, PACKING_FRACTION.over(part), PACKING_FRACTION.decimals),
         )
         for (particles, diameter), group in by_size(others).items()
-        for tolerance, part in grouped(group, lambda r: r.variables.get("tolerance")).items()
+        for tolerance, part in grouped(group, lambda r: r.setting("tolerance")).items()
     ]

@@ -11,7 +11,7 @@ from ...store import Result
 from ..blocks import Block, Content, Text
 from ..data import Data
 from ..figures import Figure, Pictures
-from ..groups import count_of, value_of
+from ..groups import count_of
 from ..text import as_count, as_short
 
 # The dimer that is drawn has this aspect ratio.
@@ -74,7 +74,7 @@ def falling_dimers(data: Data) -> Content:
             results,
             "figure-10",
             f"{as_count(count_of(results))} dimers of L/d = "
-            f"{as_short(value_of(results[0], 'aspect_ratio'))} fall; the colour is the number "
+            f"{as_short(results[0].setting('aspect_ratio'))} fall; the colour is the number "
             "of contacts. The paper shows four steps and does not say which.",
         )
     )

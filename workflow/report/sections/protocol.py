@@ -97,19 +97,19 @@ def protocol(data: Data) -> Content:
 
 def _rows(results: Sequence[Result]) -> list[_Row]:
     """Return a row for each protocol; the first rows of the study have the deck's own values."""
-    groups = grouped(results, lambda r: tuple(r.variables.get(name) for name in PROTOCOL))
+    groups = grouped(results, lambda r: tuple(map(r.setting, PROTOCOL)))
     standard, *_ = groups
     usual = groups[standard]
     rows = []
     for values, group in groups.items():
         changed = [
-            f"{word} {as_short(float(value))}"
+            f"{word} {as_short(value)}"
             for word, value, normal in zip(PROTOCOL.values(), values, standard, strict=True)
-            if value != normal
+            if value != normal and not math.isnan(value)
         ]
         rows.append(
             _Row(
-                tuple(map(float, values)),
+                values,
                 ", ".join(changed) or "standard",
                 group,
                 _apart(PACKING_FRACTION.over(group), PACKING_FRACTION.over(usual))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...decks import gravity_of
 from ...shipped import QUICK_FOLDER, STUDIES_FOLDER
 from ...store import Result, StoredStudy
 from ..blocks import Block, Listing, Section, Table, Text, nothing_run
@@ -14,8 +14,6 @@ from ..columns import Column, table
 from ..data import Data
 from ..statistics import computing_seconds
 from ..text import DASH, as_runs, as_short, as_time
-
-_GRAVITY = re.compile(r"^variable\s+gravity\s+equal\s+(\S+)", re.MULTILINE)
 
 # The paper does not state these variables of the decks: name, meaning, unit.
 NOT_STATED = (
@@ -166,15 +164,12 @@ def _not_stated_table(results: Sequence[Result]) -> Table:
 
 
 def _gravity(result: Result) -> float | None:
-    """Return the gravity that a result's decks set; None where it is a formula or not set."""
-    for stage in result.record["stages"]:
-        found = _GRAVITY.search(stage["text"])
-        if found is not None:
-            try:
-                return float(found.group(1))
-            except ValueError:
-                return None
-    return None
+    """Return the gravity that the first of a result's decks sets that sets one; None if none does.
+
+    A formula is not taken for a number.
+    """
+    found = (gravity_of(stage["text"]) for stage in result.record["stages"])
+    return next((gravity for gravity in found if gravity is not None), None)
 
 
 @dataclass(frozen=True)

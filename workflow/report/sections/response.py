@@ -10,7 +10,6 @@ from ..blocks import Block, Content, Text
 from ..columns import Column, table
 from ..data import Data, series
 from ..figures import Curve, Figure, Panel, curve
-from ..groups import value_of
 from ..quantities import COORDINATION_NUMBER, FABRIC, PACKING_FRACTION, RATTLERS, Quantity
 from ..text import as_short, as_text
 from .pictures import step_pictures
@@ -122,5 +121,5 @@ def _evolution(results: Sequence[Result]) -> list[Block]:
 def _change(result: Result) -> str:
     change = result.variables.get("change")
     if change == "tilt":
-        return f"gravity tilted by {as_short(value_of(result, 'angle'))}°"
+        return f"gravity tilted by {as_short(result.setting('angle'))}°"
     return "side walls removed" if change == "walls" else str(change)

@@ -52,7 +52,7 @@ def sphere_contacts(data: Data) -> Content:
     """Show the distribution of contacts beside what the paper says of it."""
     stated = data.paper["spheres"]
     known = [r for r in data.results("table-2") if series(r, "distribution/contacts") is not None]
-    results = nearest_size(known, 10_000)
+    results = nearest_size(known, 10_000, data.usual_tolerance)
     if not results:
         return Content()
     runs = [_Run(r, np.asarray(r.values["distribution/contacts"], dtype=float)) for r in results]

@@ -109,7 +109,7 @@ def _results(data: Data) -> list[Result]:
     results = [r for r in data.results("table-2") if "profile/distance" in r.values]
     if not matching(results, diameter=0.11):
         # The study of Table 1 has the same cases.
-        more = matching(data.results("table-1"), diameter=0.11, tolerance=0.0005)
+        more = matching(data.results("table-1"), diameter=0.11, tolerance=data.usual_tolerance)
         results += [result for result in more if is_agitated(result)]
     return results
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from lammps_inelastic.analysis.structure import Q6_OF_CRYSTALS
@@ -114,9 +115,9 @@ def _cases(data: Data) -> list[Case]:
 def _radial_distributions(group: Sequence[Result]) -> list[tuple[FloatArray, FloatArray]]:
     """Return distances over the diameter and g(r), (b,) each, of those runs that have them."""
     return [
-        (distance / float(result.variables["diameter"]), g)
+        (distance / result.setting("diameter"), g)
         for result in group
-        if "diameter" in result.variables
+        if not math.isnan(result.setting("diameter"))
         for distance, g in curves_of(
             [result], "structure/distance", "structure/radial_distribution"
         )

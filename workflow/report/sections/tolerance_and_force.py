@@ -12,15 +12,13 @@ from ..blocks import Comparison, Content, Table
 from ..columns import RUNS, RUNS_OF_PAPER, Column, table
 from ..data import Data
 from ..groups import (
-    OUR_SOLVER,
-    PAPER_SOLVER,
     count_of,
     grouped,
     is_agitated,
     matching,
+    our_solver,
     solver_of,
     unlike,
-    value_of,
 )
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION, compared
 from ..statistics import Stated
@@ -74,11 +72,12 @@ COLUMNS_OF_MORE_SEEDS: Sequence[Column[_Row]] = (TOLERANCE, FORCE, RUNS, *PHI, *
 def tolerance_and_force(data: Data) -> Content:
     """Compare packing fraction and coordination number with the paper's Table 1."""
     results = data.results("table-1")
-    of_paper = _rows_of_paper(results, data.paper["table1"])
+    of_paper = _rows_of_paper(data, results)
     more = _rows_of_more_seeds(data)
     tables: list[Table] = []
     if results:
-        tables.append(_table(results, [*of_paper, *_other_rows(results, of_paper)]))
+        rows = [*of_paper, *_other_rows(results, of_paper)]
+        tables.append(_table(results, rows, data.paper_solver))
     if more:
         tables.append(
             table(
@@ -92,7 +91,7 @@ def tolerance_and_force(data: Data) -> Content:
     return Content(tables, [one for row in run for one in (row.phi, row.z)])
 
 
-def _table(results: Sequence[Result], rows: Sequence[_Row]) -> Table:
+def _table(results: Sequence[Result], rows: Sequence[_Row], paper_solver: str) -> Table:
     count = count_of(results)
     return table(
         "1,000 spheres, d = 0.11; mean ± standard deviation (standard error of our mean)"
@@ -103,7 +102,7 @@ def _table(results: Sequence[Result], rows: Sequence[_Row]) -> Table:
         (
             "SE: standard errors, sqrt(ours² + the paper's²); the paper's is its standard "
             f"deviation over the root of {RUNS_OF_EACH_ROW} runs. Marked: more than 2.",
-            f"Solver: {PAPER_SOLVER} is the paper's, {OUR_SOLVER} ours. Within a loose ε "
+            f"Solver: {paper_solver} is the paper's, {our_solver()} ours. Within a loose ε "
             "they may leave different contacts.",
             "ε / (g h²), with ε that of the count, says how well a contact is told from a "
             "gap: in a step a free sphere falls g h². It should be at most 0.01; above it, "
@@ -112,15 +111,13 @@ def _table(results: Sequence[Result], rows: Sequence[_Row]) -> Table:
     )
 
 
-def _rows_of_paper(
-    results: Sequence[Result], stated_rows: Sequence[Mapping[str, Any]]
-) -> list[_Row]:
+def _rows_of_paper(data: Data, results: Sequence[Result]) -> list[_Row]:
     """Return a row for each row of the paper and solver; our solver's where nothing was run."""
     return [
-        _row(stated, solver, group)
-        for stated in stated_rows
+        _row(data, stated, solver, group)
+        for stated in data.paper["table1"]
         for solver, group in (
-            grouped(_like(results, stated), solver_of) or {OUR_SOLVER: []}
+            grouped(_like(results, stated), solver_of) or {our_solver(): []}
         ).items()
     ]
 
@@ -130,7 +127,7 @@ def _other_rows(results: Sequence[Result], of_paper: Sequence[_Row]) -> list[_Ro
     seen = {result.case for row in of_paper for result in row.group}
     others = [result for result in results if result.case not in seen]
     groups = grouped(
-        others, lambda r: (value_of(r, "tolerance"), value_of(r, "random_force"), solver_of(r))
+        others, lambda r: (r.setting("tolerance"), r.setting("random_force"), solver_of(r))
     )
     return [
         _Row(
@@ -149,7 +146,7 @@ def _rows_of_more_seeds(data: Data) -> list[_Row]:
     """Compare rows of the paper's Table 1 with more runs of our own than it has."""
     results = data.results("more-seeds")
     return [
-        _row(stated, OUR_SOLVER, group, more_seeds=True)
+        _row(data, stated, our_solver(), group, more_seeds=True)
         for stated in data.paper["table1"]
         if (group := _like(results, stated))
     ]
@@ -165,12 +162,16 @@ def _like(results: Sequence[Result], stated: Mapping[str, Any]) -> list[Result]:
 
 
 def _row(
-    stated: Mapping[str, Any], solver: str, group: Sequence[Result], more_seeds: bool = False
+    data: Data,
+    stated: Mapping[str, Any],
+    solver: str,
+    group: Sequence[Result],
+    more_seeds: bool = False,
 ) -> _Row:
     """Compare packing fraction and coordination number with a row of the paper's Table 1."""
     words = f"ε = {as_short(stated['eps_over_r'])} r, "
     words += f"{'with' if stated['random_force'] else 'no'} random force"
-    if solver != OUR_SOLVER:
+    if solver != our_solver():
         words += f", {solver}"
     if more_seeds:
         words += f", {len(group)} seeds"
@@ -197,8 +198,8 @@ def _row(
             COORDINATION_NUMBER.decimals,
             COORDINATION_NUMBER.unit,
             note,
-            f"at a loose ε the count is the solver's: {PAPER_SOLVER} is the paper's"
-            if solver == OUR_SOLVER
+            f"at a loose ε the count is the solver's: {data.paper_solver} is the paper's"
+            if solver == our_solver()
             else "",
         ),
     )
