@@ -106,6 +106,10 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
   if (step_.settings.tolerance < NEAR_ROUND_OFF * result.round_off)
     cause = fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
                         NEAR_ROUND_OFF * result.round_off);
+  else if (constraints_.solved_relinearised() && !step_.settings.shorten)
+    cause = fmt::format("The gaps at the end of the step, until which {}, may not all be had "
+                        "together: lower the timestep, use shorten yes, or raise maxiter ({})",
+                        bodies_ ? "bodies turn" : "walls curve", step_.settings.max_iterations);
   else if (now < STILL_FALLS * before && std::isfinite(before))
     cause = fmt::format("The residual is still coming down, as it does where there is room "
                         "(from {:.3g} to {:.3g} lately): {}",

@@ -396,6 +396,27 @@ def test_the_cause_is_named(name: str, tmp_path: Path, refused: Refused) -> None
         assert word in error, error
 
 
+def test_gaps_that_follow_a_curved_wall_far(tmp_path: Path, refused: Refused) -> None:
+    """A step so long that gravity takes spheres through their container eight times is too long."""
+    random = np.random.default_rng(5)
+    points = random.normal(size=(60, 3))
+    points *= 0.24 * random.uniform(0.3, 1, (60, 1)) / np.linalg.norm(points, axis=1)[:, None]
+    text = scene(
+        points,
+        0.03,
+        tmp_path,
+        tolerance=1e-6,
+        box=((-0.4, 0.4),) * 3,
+        setup="region ball sphere 0 0 0 0.3",
+        options="region ball maxiter 2000",
+        skin=20,
+        timestep=0.7,
+    )
+    error = refused(text + "run 1\n")
+    assert "gaps at the end of the step, until which walls curve" in error, error
+    assert "use shorten yes" in error, error
+
+
 def column(folder: Path, maxiter: int, lid: float) -> str:
     """Return 50 spheres that stand on one another and just touch floor and lid."""
     x = np.full(50, 0.5)
