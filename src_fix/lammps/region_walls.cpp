@@ -179,6 +179,21 @@ void RegionWalls::view_static(
   }
 }
 
+void RegionWalls::view_moving_now(
+    const std::vector<Viewpoint> &viewpoints,
+    const std::function<void(const Viewpoint &, const WallView &)> &found)
+{
+  std::vector<WallView> views;
+  for (const Obstacle &obstacle : obstacles_) {
+    if (!obstacle.moving) continue;
+    set_clock(obstacle, 0);
+    for (const Viewpoint &from : viewpoints) {
+      see(obstacle, from.where, from.reach, views);
+      for (const WallView &view : views) found(from, view);
+    }
+  }
+}
+
 // Variables that move a region are evaluated for the end of the step by setting LAMMPS's clock
 // ahead.
 void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)

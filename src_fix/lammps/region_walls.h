@@ -59,6 +59,11 @@ class RegionWalls : protected Pointers {
             const std::function<void(const Viewpoint &, const WallView &)> &found,
             const std::function<void(const Viewpoint &, const std::string &region)> &outside);
 
+  // Calls `found` for every wall of a moving region within reach where the wall stands now, whatever
+  // it does in the step. Collective.
+  void view_moving_now(const std::vector<Viewpoint> &viewpoints,
+                       const std::function<void(const Viewpoint &, const WallView &)> &found);
+
  private:
   struct Obstacle {
     Region *region;

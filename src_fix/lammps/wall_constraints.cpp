@@ -96,6 +96,17 @@ void WallConstraints::collect(double margin)
         step_.problem_found = fmt::format("the centre of atom {} is on the wrong side of region {}",
                                           atom->tag[from.atom], region);
       });
+  note_overlaps_with_moving_walls();
+}
+
+// A wall that moves away is out of reach at the end of the step, and may be overlapped now.
+void WallConstraints::note_overlaps_with_moving_walls()
+{
+  for (RegionWalls::Viewpoint &from : viewpoints_) from.reach = atom->radius[from.atom];
+  walls_.view_moving_now(
+      viewpoints_, [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+        rules_.overlaps().note(view.distance - from.reach, from.atom, -view.wall);
+      });
 }
 
 void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &view)

@@ -49,6 +49,7 @@ class WallConstraints : protected Pointers {
   std::uint64_t key(int i, int wall) const
   { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
 
+  void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
   const Viewpoints &viewpoints(const double *velocity, double beyond);
   const Viewpoints &viewpoints_at_end(double margin);

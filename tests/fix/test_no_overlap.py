@@ -443,6 +443,21 @@ def test_a_rising_floor_gives_the_spheres_its_velocity(
     )
 
 
+def test_a_floor_that_leaves_is_seen_where_it_stands(tmp_path: Path, lmp: Runner) -> None:
+    """The overlap that is reported is that of now, however fast the floor falls away."""
+    deck = moving_scene(
+        tmp_path,
+        "variable up equal -500*time\nregion floor plane 0 0 0 0 1 0 move NULL v_up NULL",
+        np.array([[0.5, RADIUS - 0.5 * EPS, 0.5]]),
+        RADIUS,
+        "floor",
+        False,
+    )
+    result = lmp(deck + "run 0\n")
+    # Round-off of positions.
+    assert result.thermo["f_contact[4]"][0] == pytest.approx(0.5 * EPS, abs=1e-12)
+
+
 @pytest.mark.parametrize("shape", ["block", "cylinder"])
 def test_a_rotating_container(shape: str, tmp_path: Path, lmp: Runner) -> None:
     region = {

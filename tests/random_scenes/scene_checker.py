@@ -400,12 +400,30 @@ class _Part:
         deeper = (
             depth[beyond] - np.where(earlier > REGULAR * self.eps, earlier, 0.0) > bound[beyond]
         )
-        if shape is None:
-            for k in np.flatnonzero(deeper):
+        for k in np.flatnonzero(deeper):
+            if shape is None:
                 deeper[k] = not self.are_entangled(last, i[beyond[k]], j[beyond[k]])
+            else:
+                hidden = self.is_hidden(last, i[beyond[k]], shape, -int(j[beyond[k]]))
+                deeper[k] = not (hidden and self.facts["bad_start"])
         if deeper.any():
             worst = int(beyond[deeper][np.argmax(depth[beyond][deeper])])
             self.wrong(kind, self.pair(frame, i, j, worst, depth[worst]))
+
+    def is_hidden(self, frame: _Frame, i: int, shape: Shape, number: int) -> bool:
+        """Whether LAMMPS does not show a sphere this wall, one of several parts of a region.
+
+        It shows of an intersection the points that lie in all parts. Beside its edge a sphere can
+        stick out of a part there alone, which pushing it apart from others may make a little worse.
+        """
+        others = [s for s in self.shapes if s["region"] == shape["region"] and s is not shape]
+        for view in views(shape, frame.x[i], frame.time):
+            point = frame.x[i] - view.distance[0] * view.normal[0]
+            for other in others:
+                seen = views(other, point, frame.time)
+                if view.number == number and min(float(v.distance[0]) for v in seen) < 0:
+                    return True
+        return False
 
     def are_entangled(self, frame: _Frame, i: int, j: int) -> bool:
         """Whether two bodies, or a body and a sphere, are deep in one another somewhere.
