@@ -49,6 +49,9 @@ class RegionWalls : protected Pointers {
     int atom;
     double where[3];
     double reach;
+    // Add this [length] to `where` for the place itself: across a periodic boundary the walls of the
+    // other side are seen, from there.
+    double image[3] = {};
   };
 
   // Calls found(viewpoint, view) for every wall within reach. outside(viewpoint, region) is called

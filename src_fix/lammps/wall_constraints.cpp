@@ -6,6 +6,7 @@
 #include "rigid_motion.h"
 
 #include "atom.h"
+#include "domain.h"
 
 #include "fmt/format.h"
 
@@ -20,6 +21,9 @@ namespace {
 
 // [radians] The end of a body that turns further says little about the wall that it has met.
 constexpr double HALF_A_TURN = 3.14;
+
+bool is_image(const RegionWalls::Viewpoint &from)
+{ return from.image[0] != 0.0 || from.image[1] != 0.0 || from.image[2] != 0.0; }
 
 }    // namespace
 
@@ -46,6 +50,27 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
   return viewpoints_;
 }
 
+bool WallConstraints::is_periodic() const
+{ return !domain->triclinic && (domain->xperiodic || domain->yperiodic || domain->zperiodic); }
+
+// Moves a point beyond a periodic boundary to the other side. Tells whether it was beyond one. (LAMMPS
+// shows the walls of a region only at that side of the boundary where they are.)
+bool WallConstraints::wrap(RegionWalls::Viewpoint &from) const
+{
+  if (!is_periodic()) return false;
+  bool wrapped = false;
+  for (int d = 0; d < 3; ++d) {
+    const double beyond =
+        std::max(domain->boxlo[d] - from.where[d], from.where[d] - domain->boxhi[d]);
+    if (!domain->periodicity[d] || beyond <= 0.0) continue;
+    const double widths = std::floor((from.where[d] - domain->boxlo[d]) / domain->prd[d]);
+    from.image[d] = widths * domain->prd[d];
+    from.where[d] -= from.image[d];
+    wrapped = true;
+  }
+  return wrapped;
+}
+
 // Points where the step takes those atoms for which the constraint of a wall may be inexact. A
 // constraint that was set by an earlier look is set again wherever its wall is now.
 const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double margin)
@@ -61,12 +86,14 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
       followed.insert(i);
   }
   for (int i = 0; i < atom->nlocal; ++i) {
-    if (step_.problem.inverse_mass[i] == 0.0 || (walls_.exact() && !step_.is_member(i))) continue;
+    if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
     const double reach = followed.count(i) ? EXTREME : atom->radius[i] + (bodies_ ? margin : 0.0);
-    if (reach + h * norm(v) < clear_of_walls_[i]) continue;
-    viewpoints_.push_back({i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach});
+    RegionWalls::Viewpoint end = {i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach};
+    const bool may_differ = !walls_.exact() || step_.is_member(i);
+    if (may_differ && reach + h * norm(v) >= clear_of_walls_[i]) viewpoints_.push_back(end);
+    if (wrap(end)) viewpoints_.push_back(end);
   }
   return viewpoints_;
 }
@@ -158,7 +185,8 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   const bool known = existing != constraint_.end();
   const double *const n = view.normal;
   const double *const x = atom->x[i];
-  const double from_here[3] = {from.where[0] - x[0], from.where[1] - x[1], from.where[2] - x[2]};
+  double from_here[3];
+  for (int d = 0; d < 3; ++d) from_here[d] = from.where[d] + from.image[d] - x[d];
   const double gap_there = view.distance - atom->radius[i];
   const double gap_here = gap_there - dot(n, from_here);
   const double wall_motion = view.distance_now - view.distance;
@@ -190,14 +218,17 @@ long WallConstraints::relinearise(double margin)
   Viewpoints beyond;
   std::unordered_set<std::size_t> seen;
   walls_.view(
-      viewpoints_at_end(margin), !bodies_,
+      viewpoints_at_end(margin), only_inexact(),
       [&](const RegionWalls::Viewpoint &from, const WallView &view) {
         const auto existing = constraint_.find(key(from.atom, view.wall));
         const bool known = existing != constraint_.end();
         if (known) seen.insert(existing->second);
         const double gap_now = known ? step_.sides[existing->second].gap_now : 0.0;
         const double gap = view.distance - atom->radius[from.atom];
-        const bool too_deep = rules_.ends_too_deep(gap_now, atom->radius[from.atom], gap);
+        // The walls behind a periodic boundary are as exact as others.
+        const bool exact = is_image(from) && walls_.exact() && !step_.is_member(from.atom);
+        const bool too_deep = rules_.ends_too_deep(gap_now, atom->radius[from.atom], gap) ||
+            (exact && gap < std::min(gap_now, -step_.settings.tolerance));
         if (too_deep || (known && step_.sides[existing->second].followed))
           changed += add_plane(from, view, too_deep);
       },
@@ -242,7 +273,7 @@ long WallConstraints::add_planes_within(const Viewpoints &beyond)
     step_.excess = std::max(step_.excess, atom->radius[from.atom]);
   long changed = 0;
   walls_.view(
-      last_inside(beyond), !bodies_,
+      last_inside(beyond), only_inexact(),
       [&](const RegionWalls::Viewpoint &from, const WallView &view) {
         changed += add_plane(from, view, true);
       },
@@ -261,7 +292,8 @@ WallConstraints::Viewpoints WallConstraints::last_inside(const Viewpoints &beyon
     Viewpoints points = beyond;
     for (std::size_t k = 0; k < beyond.size(); ++k)
       for (int d = 0; d < 3; ++d)
-        points[k].where[d] += (part[k] - 1.0) * (beyond[k].where[d] - atom->x[beyond[k].atom][d]);
+        points[k].where[d] += (part[k] - 1.0) *
+            (beyond[k].where[d] + beyond[k].image[d] - atom->x[beyond[k].atom][d]);
     return points;
   };
   for (int bisection = 0; bisection < BISECTIONS; ++bisection) {
@@ -270,7 +302,7 @@ WallConstraints::Viewpoints WallConstraints::last_inside(const Viewpoints &beyon
     const Viewpoints points = viewpoints_at(middle);
     std::vector<char> out(beyond.size(), 0);
     walls_.view(
-        points, !bodies_,
+        points, only_inexact(),
         [](const RegionWalls::Viewpoint &, const WallView &) {
         },
         [&](const RegionWalls::Viewpoint &from, const std::string &) {

@@ -28,7 +28,8 @@ class WallConstraints : protected Pointers {
                   GhostExchange &ranks, const ContactMemory &memory, const RigidMotion *bodies);
 
   // Tells whether the end of a step must be looked at: bodies turn, or walls curve.
-  bool need_relinearising() const { return !walls_.empty() && (bodies_ || !walls_.exact()); }
+  bool need_relinearising() const
+  { return !walls_.empty() && (bodies_ || !walls_.exact() || is_periodic()); }
 
   // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
   void collect(double margin);
@@ -49,6 +50,10 @@ class WallConstraints : protected Pointers {
   std::uint64_t key(int i, int wall) const
   { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
 
+  bool is_periodic() const;
+  // Tells whether only walls without exact constraints can be met at the end of a step.
+  bool only_inexact() const { return !bodies_ && !is_periodic(); }
+  bool wrap(RegionWalls::Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
   const Viewpoints &viewpoints(const double *velocity, double beyond);

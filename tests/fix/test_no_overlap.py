@@ -443,6 +443,31 @@ def test_a_rising_floor_gives_the_spheres_its_velocity(
     )
 
 
+@pytest.mark.parametrize("speed", [0.3, 30.0])
+def test_an_obstacle_behind_a_periodic_boundary(speed: float, tmp_path: Path, lmp: Runner) -> None:
+    """A sphere that leaves a periodic box meets what stands on the other side."""
+    text = scene(
+        [[0.8, 0.5, 0.5]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        velocities=[[speed, 0, 0]],
+        box=((0, 1),) * 3,
+        boundary="p p p",
+        gravity=False,
+        skin=0.3,
+        setup="region post block 0.1 0.3 -1 2 -1 2 side out units box",
+        options="region post shorten yes",
+        timestep=0.01,
+    )
+    lmp(text + DUMP_PARTICLES + "run 100\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    ends = [(frame["x"][0] + 0.6) % 1 - 0.6 for frame in frames]
+    farthest = max(ends)
+    assert farthest <= 0.1 - RADIUS + EPS * SLACK
+    assert farthest >= 0.1 - RADIUS - 2 * EPS  # it has met the post
+
+
 def test_a_floor_that_leaves_is_seen_where_it_stands(tmp_path: Path, lmp: Runner) -> None:
     """The overlap that is reported is that of now, however fast the floor falls away."""
     deck = moving_scene(

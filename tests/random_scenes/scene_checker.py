@@ -404,7 +404,9 @@ class _Part:
             if shape is None:
                 deeper[k] = not self.are_entangled(last, i[beyond[k]], j[beyond[k]])
             else:
-                hidden = self.is_hidden(last, i[beyond[k]], shape, -int(j[beyond[k]]))
+                hidden = "intersect" in self.facts["words"] and self.is_hidden(
+                    last, i[beyond[k]], shape, -int(j[beyond[k]])
+                )
                 deeper[k] = not (hidden and self.facts["bad_start"])
         if deeper.any():
             worst = int(beyond[deeper][np.argmax(depth[beyond][deeper])])
