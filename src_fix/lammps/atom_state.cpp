@@ -49,14 +49,14 @@ void AtomState::grow(int atoms)
 {
   memory->grow(state_, atoms, STATE_SIZE, "inelastic:state");
   memory_.resize(atoms);
-  if (step_.settings.has_bodies()) momenta_.resize(atoms);
+  if (step_.has_bodies) momenta_.resize(atoms);
 }
 
 void AtomState::copy(int from, int to)
 {
   std::copy_n(state_[from], STATE_SIZE, state_[to]);
   memory_.copy(from, to);
-  if (step_.settings.has_bodies()) momenta_.copy(from, to);
+  if (step_.has_bodies) momenta_.copy(from, to);
 }
 
 // An atom that is created during a run moves on from where it is.
@@ -64,7 +64,7 @@ void AtomState::begin(int i)
 {
   std::fill_n(state_[i], STATE_SIZE, 0.0);
   memory_.forget(i);
-  if (step_.settings.has_bodies()) momenta_.forget(i);
+  if (step_.has_bodies) momenta_.forget(i);
   std::copy_n(atom->x[i], 3, expected_position(i));
   std::copy_n(atom->v[i], 3, expected_velocity(i));
   expected_radius(i) = atom->radius[i];
@@ -73,7 +73,7 @@ void AtomState::begin(int i)
 int AtomState::pack_exchange(int i, double *buffer) const
 {
   double *out = std::copy_n(state_[i], STATE_SIZE, buffer);
-  if (step_.settings.has_bodies()) out += momenta_.pack(i, out);
+  if (step_.has_bodies) out += momenta_.pack(i, out);
   out += memory_.pack(i, out, memory_.number_of_partners(i));
   return static_cast<int>(out - buffer);
 }
@@ -83,7 +83,7 @@ int AtomState::unpack_exchange(int i, const double *buffer)
   std::copy_n(buffer, STATE_SIZE, state_[i]);
   memory_.forget(i);
   const double *in = buffer + STATE_SIZE;
-  if (step_.settings.has_bodies()) in += momenta_.unpack(i, in);
+  if (step_.has_bodies) in += momenta_.unpack(i, in);
   in += memory_.unpack(i, in);
   return static_cast<int>(in - buffer);
 }
@@ -93,12 +93,11 @@ int AtomState::restart_size(int i, bool writes) const
   if (!writes) return 0;
   const double *const held = state_[i] + PUSH_HELD;
   const bool pushed = held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
-  return pushed || (step_.settings.has_bodies() && momenta_.has_held(i)) ? largest_restart_size()
-                                                                         : 1;
+  return pushed || (step_.has_bodies && momenta_.has_held(i)) ? largest_restart_size() : 1;
 }
 
 int AtomState::largest_restart_size() const
-{ return 7 + (step_.settings.has_bodies() ? CarriedMomenta::HELD_SIZE : 0); }
+{ return 7 + (step_.has_bodies ? CarriedMomenta::HELD_SIZE : 0); }
 
 int AtomState::pack_restart(int i, double *buffer, bool writes) const
 {
@@ -109,7 +108,7 @@ int AtomState::pack_restart(int i, double *buffer, bool writes) const
   if (size == 1) return size;
   out = std::copy_n(atom->v[i], 3, out);
   out = std::copy_n(state_[i] + PUSH_HELD, 3, out);
-  if (step_.settings.has_bodies()) momenta_.pack_held(i, out);
+  if (step_.has_bodies) momenta_.pack_held(i, out);
   return size;
 }
 
@@ -122,8 +121,7 @@ void AtomState::unpack_restart(int i, int nth)
   // A velocity that was set since is all momentum.
   if (!std::equal(in, in + 3, atom->v[i])) return;
   for (int d = 0; d < 3; ++d) atom->v[i][d] -= in[3 + d];
-  if (step_.settings.has_bodies() && size == largest_restart_size())
-    momenta_.unpack_held(i, in + 6);
+  if (step_.has_bodies && size == largest_restart_size()) momenta_.unpack_held(i, in + 6);
 }
 
 double AtomState::memory_usage() const

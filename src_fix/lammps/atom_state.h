@@ -71,7 +71,7 @@ class AtomState : protected Pointers {
     STATE_SIZE = 13
   };
   int carried_size() const
-  { return STATE_SIZE + (step_.settings.has_bodies() ? CarriedMomenta::PACKED_SIZE : 0); }
+  { return STATE_SIZE + (step_.has_bodies ? CarriedMomenta::PACKED_SIZE : 0); }
 
   const Step &step_;
   double **state_ = nullptr;

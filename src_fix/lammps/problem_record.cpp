@@ -201,7 +201,7 @@ void ProblemRecord::write(const inelastic::ProjectionResult &result) const
     if (step_.is_member(i) && all.place[i] == all.start[all.body[i]]) first_of_bodies.push_back(i);
   }
   Table of_atoms = atoms();
-  const bool has_bodies = step_.settings.has_bodies();
+  const bool has_bodies = step_.has_bodies;
   if (has_bodies)
     for (const Column &column : members()) of_atoms.push_back(column);
   const std::vector<double> atom_rows = rows(of_atoms, owned);

@@ -43,9 +43,10 @@ struct Side {
 };
 
 struct Step {
-  explicit Step(const Settings &of_fix) : settings(of_fix) {}
+  explicit Step(const Settings &of_fix) : settings(of_fix), has_bodies(of_fix.has_bodies()) {}
 
   const Settings &settings;
+  const bool has_bodies;    // of the settings: asked for every particle
 
   // A step of this run came before, so that momenta are carried along and its prediction can be
   // compared with what moved.
@@ -76,10 +77,9 @@ struct Step {
   { return in_group(atom, i) && !(atom->mask[i] & settings.frozen_bit); }
 
   // Tells whether a particle belongs to a body.
-  bool is_member(int i) const { return settings.has_bodies() && problem.bodies.body[i] >= 0; }
+  bool is_member(int i) const { return has_bodies && problem.bodies.body[i] >= 0; }
 
-  const std::vector<double> &motion() const
-  { return settings.has_bodies() ? motion_of_bodies : velocity; }
+  const std::vector<double> &motion() const { return has_bodies ? motion_of_bodies : velocity; }
 
   // The vector from the centre of mass of its body to a particle; zero for a free one.
   const double *arm(int i) const

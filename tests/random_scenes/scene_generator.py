@@ -939,8 +939,8 @@ class _Draw:
     def head(self) -> str:
         lines = [f"units {self.units}", self.style(), f"atom_modify map {self.map}"]
         flags = self.flags
-        if self.ranks == 2 and len(self.spheres.r) == 1:
-            # Two ranks of LAMMPS fail in a box that shrinks to a point (also without our fix).
+        if len(self.spheres.r) == 1:
+            # LAMMPS itself can end in a box that shrinks to a point, with and without our fix.
             flags = ["m" if flag == "s" else flag for flag in flags]
         lines += [f"boundary {' '.join(flags)}", *self.setup]
         return "\n".join(lines)
