@@ -30,6 +30,11 @@ Cut = tuple[str, str, str]
 
 BODIES: list[Cut] = [
     (f"{LAMMPS}/fix_settings.h", "return !rigid_fix.empty();", "return false;"),
+    (
+        f"{LAMMPS}/step.h",
+        "return has_bodies && problem.bodies.body[i] >= 0;",
+        "return false;",
+    ),
     ("src_fix/core/rigid_bodies.h", "return inverse_mass.empty();", "return true;"),
     (PACKED, "if (!rods_.empty() || !bodies_.empty())", "if (false)"),
 ]
