@@ -62,8 +62,7 @@ void RunSummary::log_overlaps(long unexpected_steps) const
         lmp,
         "  {} left overlaps of up to {:.6g} beyond 2 tolerances: a shorter timestep, or shorten "
         "yes, avoids them\n",
-        step_.has_bodies ? "turning bodies, or the curvature of walls,"
-                                    : "the curvature of walls",
+        step_.has_bodies ? "turning bodies, or the curvature of walls," : "the curvature of walls",
         largest_excess_);
   if (pushed_ > 0)
     utils::logmesg(
