@@ -13,11 +13,11 @@ namespace {
   constexpr double UNIT_ROUND_OFF = 0.5 * std::numeric_limits<double>::epsilon();
 
   // Returns whether round-off, a few 1e-7 of the largest length in single precision, is far below
-  // the tolerance. Double precision is the best there is.
-  template <typename Real> bool suffices(double largest_length, double tolerance)
+  // the target. Double precision is the best there is.
+  template <typename Real> bool suffices(double largest_length, double target)
   {
-    constexpr double MOST_TOLERANCES = 3.0e5;
-    return sizeof(Real) == sizeof(double) || largest_length < MOST_TOLERANCES * tolerance;
+    constexpr double MOST_TARGETS = 3.0e5;
+    return sizeof(Real) == sizeof(double) || largest_length < MOST_TARGETS * target;
   }
 
   // Nesterov's momentum is beta_k = (t_k - 1) / t_(k+1) with t_1 = 1 and
@@ -59,70 +59,29 @@ namespace {
     return all;
   }
 
-}    // namespace
-
-// The first guess lambda is judged and scaled by these numbers, which are over all ranks.
-struct AcceleratedProjectedGradient::FirstGuess {
-  Residual residual;
-  double along;               // lambda . w(lambda)
-  double along_free;          // lambda . w(0)
-  double largest_length;      // largest |w_c(0)| or D_c lambda_c
-  double largest_diagonal;    // largest D_c
-
-  // The guess is first made as large as the dual function likes it along its own direction. This
-  // costs no product with A, since w is affine: the minimum over s of the dual function at s lambda
-  // is at s = -lambda . w(0) / lambda . (w(lambda) - w(0)). It saves a tenth of the iterations
-  // (measured), within these bounds.
-  double scale() const
+  // The first guess is first made as large as the dual function likes it along its own direction.
+  // This costs no product with A, since w is affine: the minimum over s of the dual function at s
+  // lambda is at s = -lambda . w(0) / lambda . (w(lambda) - w(0)). It saves a tenth of the
+  // iterations (measured), within these bounds.
+  double scale(const Guess &guess)
   {
     constexpr double LEAST_SCALE = 0.9, MOST_SCALE = 1.1;
-    const double curved_along = along - along_free;
-    return curved_along > 0.0 ? std::clamp(-along_free / curved_along, LEAST_SCALE, MOST_SCALE)
-                              : 1.0;
+    const double curved_along = guess.along - guess.along_free;
+    return curved_along > 0.0
+        ? std::clamp(-guess.along_free / curved_along, LEAST_SCALE, MOST_SCALE)
+        : 1.0;
   }
-};
 
-void AcceleratedProjectedGradient::set_diagonal(const ContactProblem &problem)
-{
-  const ContactSet &contacts = problem.contacts;
-  diagonal_.resize(contacts.size());
-  for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const double *const n = &contacts.normal[3 * c];
-    diagonal_[c] = problem.timestep *
-        (problem.mobility(contacts.first[c], n) + problem.mobility(contacts.second[c], n));
-  }
-}
+}    // namespace
 
-AcceleratedProjectedGradient::FirstGuess
-AcceleratedProjectedGradient::judge_first_guess(const ContactProblem &problem, Host &host)
-{
-  const std::vector<double> &impulse = problem.contacts.impulse;
-  const std::vector<double> &free_gap = gap_operator_.free_gap();
-  const std::size_t count = impulse.size();
-  gap_.resize(count);
-  gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
-  const Residual mine = residual(gap_.data(), impulse.data(), count);
-  double along = 0.0, along_free = 0.0, largest = 0.0, largest_diagonal = 0.0;
-  for (std::size_t c = 0; c < count; ++c) {
-    along += impulse[c] * gap_[c];
-    along_free += impulse[c] * free_gap[c];
-    largest = std::max({largest, std::abs(free_gap[c]), impulse[c] * diagonal_[c]});
-    largest_diagonal = std::max(largest_diagonal, diagonal_[c]);
-  }
-  double sums[2] = {along, along_free};
-  double maxima[4] = {mine.feasibility, mine.complementarity, largest, largest_diagonal};
-  host.reduce(sums, 2, maxima, 4);
-  return {{maxima[0], maxima[1]}, sums[0], sums[1], maxima[2], maxima[3]};
-}
-
-bool AcceleratedProjectedGradient::judge(const ContactProblem &problem, const SolverLimits &limits,
-                                         Host &host, SolverResult &result)
+bool AcceleratedProjectedGradient::judge(const ContactProblem &problem, Host &host,
+                                         SolverResult &result)
 {
   const std::vector<double> &impulse = problem.contacts.impulse;
   gap_.resize(impulse.size());
   gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
   result.residual = residual_over_ranks(gap_.data(), impulse.data(), impulse.size(), host);
-  return result.residual.largest() <= limits.tolerance;
+  return result.residual.largest() <= result.target;
 }
 
 std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const ContactProblem &problem,
@@ -134,8 +93,8 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   // length (measured in columns, heaps and crystals of 2 to 600 particles).
   constexpr double BELOW_ROUND_OFF = 0.5;
   const bool infeasible = is_infeasible(problem, gap_operator_, limits, host);
-  if (!infeasible && !(limits.tolerance < BELOW_ROUND_OFF * result.round_off)) return std::nullopt;
-  if (judge(problem, limits, host, result)) return Status::CONVERGED;
+  if (!infeasible && !(result.target < BELOW_ROUND_OFF * result.round_off)) return std::nullopt;
+  if (judge(problem, host, result)) return Status::CONVERGED;
   return infeasible ? Status::INFEASIBLE : Status::ROUND_OFF;
 }
 
@@ -157,7 +116,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
 
   iterations.prepare(problem, gap_operator_.free_gap(), diagonal_, scales, host);
   std::vector<double> &impulse = problem.contacts.impulse;
-  const double tolerance = limits.tolerance / scales.length;
+  const double target = result.target / scales.length;
   Momentum momentum;
   double last_change_squared = 0.0;
   long next_check = 0;
@@ -175,14 +134,14 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     const double packed_residual = std::max(-passed.least_gap, passed.most_under_force);
     result.trend.see(result.iterations, scales.length * packed_residual);
 
-    if (packed_residual <= tolerance && result.iterations >= next_check) {
+    if (packed_residual <= target && result.iterations >= next_check) {
       iterations.impulses_before(scales, impulse);
-      if (judge(problem, limits, host, result)) return Status::CONVERGED;
+      if (judge(problem, host, result)) return Status::CONVERGED;
       if (++failures == MOST_FAILURES && sizeof(Real) < sizeof(double))
         return Status::OUT_OF_ITERATIONS;
       next_check = result.iterations + failures;
     }
-    if (!suffices<Real>(passed.heaviest, tolerance)) {
+    if (!suffices<Real>(passed.heaviest, target)) {
       iterations.impulses(scales, impulse);
       return Status::OUT_OF_ITERATIONS;
     }
@@ -200,7 +159,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     iterations.finish(host, momentum.value());
   }
   iterations.impulses(scales, impulse);
-  if (judge(problem, limits, host, result)) return Status::CONVERGED;
+  if (judge(problem, host, result)) return Status::CONVERGED;
   return std::isfinite(result.residual.feasibility) ? Status::OUT_OF_ITERATIONS
                                                     : Status::NOT_FINITE;
 }
@@ -217,30 +176,30 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
 
   std::vector<double> &impulse = problem.contacts.impulse;
   gap_operator_.prepare(problem);
-  set_diagonal(problem);
-  for (double &value : impulse) value = std::max(0.0, value);
 
   SolverResult result;
-  const FirstGuess guess = judge_first_guess(problem, host);
+  const Guess guess = judge_first_guess(problem, host);
   result.residual = guess.residual;
-  if (result.residual.largest() <= limits.tolerance)
+  result.target = target_residual(limits, guess);
+  if (result.residual.largest() <= result.target)
     result.status = Status::CONVERGED;
   else if (!std::isfinite(result.residual.feasibility))
     result.status = Status::NOT_FINITE;
   if (result.status != Status::OUT_OF_ITERATIONS) return result;
 
-  const double scale = guess.scale();
-  for (double &value : impulse) value *= scale;
+  const double factor = scale(guess);
+  for (double &value : impulse) value *= factor;
   curvature_ = curvature_ == 0.0 ? FIRST_CURVATURE : std::max(1.0, RELAXATION * curvature_);
 
   Scales scales;
   scales.length = std::exp2(std::ilogb(guess.largest_length));
   scales.impulse = scales.length / std::exp2(std::ilogb(guess.largest_diagonal));
-  if (suffices<float>(guess.largest_length, limits.tolerance))
+  if (suffices<float>(guess.largest_length, result.target))
     result.status = iterate(single_, problem, limits, scales, host, result);
   const bool settled = result.status == Status::CONVERGED || result.status == Status::INFEASIBLE;
   if (!settled && result.iterations < limits.max_iterations)
     result.status = iterate(double_, problem, limits, scales, host, result);
+  settle_for_tolerance(limits, result.residual.largest(), result);
   return result;
 }
 

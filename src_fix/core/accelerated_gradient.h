@@ -12,7 +12,7 @@
 // product with A, and is remembered from one call to the next.
 //
 // An iteration reads every constraint once, in single precision if its round-off is far below the
-// tolerance, and otherwise in double precision (packed_iterations.h). The verdict whether impulses
+// target, and otherwise in double precision (packed_iterations.h). The verdict whether impulses
 // are a solution is always in double precision, by gap_operator.h.
 
 #pragma once
@@ -30,12 +30,7 @@ class AcceleratedProjectedGradient final : public Solver {
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
 
  private:
-  struct FirstGuess;
-
-  void set_diagonal(const ContactProblem &problem);
-  FirstGuess judge_first_guess(const ContactProblem &problem, Host &host);
-
-  // Iterates until the residual, judged in double precision, is within the limits, or more
+  // Iterates until the residual, judged in double precision, is at most the target, or more
   // iterations in this precision are of no use. Returns OUT_OF_ITERATIONS also if iterations are
   // left and single precision does not suffice.
   template <typename Real>
@@ -43,9 +38,8 @@ class AcceleratedProjectedGradient final : public Solver {
                  const SolverLimits &limits, const Scales &scales, Host &host,
                  SolverResult &result);
 
-  // Sets the residual of the impulses in `problem`. Returns whether it is within the limits.
-  bool judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
-             SolverResult &result);
+  // Sets the residual of the impulses in `problem`. Returns whether it is at most the target.
+  bool judge(const ContactProblem &problem, Host &host, SolverResult &result);
 
   // Returns how the search ends if more iterations from the impulses in `problem` are of no use.
   std::optional<Status> judge_prospects(const ContactProblem &problem, const SolverLimits &limits,
@@ -55,9 +49,7 @@ class AcceleratedProjectedGradient final : public Solver {
   // change^T D change is `change_squared`.
   void raise_curvature(double curved, double change_squared);
 
-  double curvature_ = 0.0;          // L; 0 = not yet known
-  std::vector<double> diagonal_;    // D [time / mass]
-  std::vector<double> gap_;         // [length] at the end of the step, one per constraint
+  double curvature_ = 0.0;    // L; 0 = not yet known
   PackedIterations<float> single_;
   PackedIterations<double> double_;
 };

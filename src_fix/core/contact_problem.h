@@ -50,6 +50,14 @@ struct ContactProblem {
         ? inverse_mass[particle]
         : bodies.mobility(particle, direction);
   }
+
+  // Returns the diagonal entry of A for constraint c [time / mass]: the length by which a unit
+  // impulse of the constraint opens its own gap.
+  double diagonal(std::size_t c) const
+  {
+    const double *const n = &contacts.normal[3 * c];
+    return timestep * (mobility(contacts.first[c], n) + mobility(contacts.second[c], n));
+  }
 };
 
 }    // namespace inelastic

@@ -1,5 +1,6 @@
 #include "projection.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -7,14 +8,16 @@ namespace inelastic {
 
 namespace {
 
-  // Without admissible velocities the gaps under forces tell nothing: only overlaps count then.
+  // Gaps under forces are looked at only where no overlap, on any rank, is beyond the tolerance.
+  // (Without admissible velocities they tell nothing.)
   void find_worst(const std::vector<double> &gap_at_end, const std::vector<double> &impulse,
-                  std::size_t count, ProjectionResult &result)
+                  std::size_t count, double tolerance, ProjectionResult &result)
   {
+    const bool overlaps_only = result.status == Status::INFEASIBLE ||
+        result.residual.feasibility > tolerance;
     double most = 0.0;
     for (std::size_t c = 0; c < count; ++c) {
-      const bool matters = gap_at_end[c] < 0.0 ||
-          (impulse[c] > 0.0 && result.status != Status::INFEASIBLE);
+      const bool matters = gap_at_end[c] < 0.0 || (impulse[c] > 0.0 && !overlaps_only);
       if (!matters || !(std::abs(gap_at_end[c]) > most)) continue;
       most = std::abs(gap_at_end[c]);
       result.worst = c;
@@ -26,7 +29,7 @@ namespace {
   // added after the last solve and will not be solved for. Those that were added with a first guess
   // have pushed no particle: their impulses become 0.
   void judge_failure(ContactProblem &problem, GapOperator &gap_operator, std::size_t solved_for,
-                     Host &host, ProjectionResult &result)
+                     double tolerance, Host &host, ProjectionResult &result)
   {
     std::vector<double> &impulse = problem.contacts.impulse;
     std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(solved_for), impulse.end(), 0.0);
@@ -36,7 +39,7 @@ namespace {
     result.residual =
         residual_over_ranks(gap_at_end.data(), impulse.data(), gap_at_end.size(), host);
     const bool solved = result.status == Status::OUT_OF_ROUNDS;
-    find_worst(gap_at_end, impulse, solved ? gap_at_end.size() : solved_for, result);
+    find_worst(gap_at_end, impulse, solved ? gap_at_end.size() : solved_for, tolerance, result);
   }
 
 }    // namespace
@@ -49,13 +52,15 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
   GapOperator &gap_operator = solver.gap_operator();
   velocity.resize(3 * static_cast<std::size_t>(problem.particles));
   while (true) {
-    const SolverLimits remaining = {limits.tolerance, limits.max_iterations - result.iterations,
-                                    limits.reach};
+    SolverLimits remaining = limits;
+    remaining.max_iterations -= result.iterations;
+    remaining.enough = std::max(limits.enough, result.target);
     const SolverResult solved = solver.solve(problem, remaining, host);
     ++result.rounds;
     result.status = solved.status;
     result.iterations += solved.iterations;
     result.residual = solved.residual;
+    result.target = std::max(result.target, solved.target);
     result.round_off = solved.round_off;
     result.trend = solved.trend;
 
@@ -70,7 +75,7 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
     if (converged && changed == 0.0) return result;
     if (converged && result.rounds < max_rounds) continue;
     if (converged) result.status = Status::OUT_OF_ROUNDS;
-    judge_failure(problem, gap_operator, solved_for, host, result);
+    judge_failure(problem, gap_operator, solved_for, limits.tolerance, host, result);
     return result;
   }
 }

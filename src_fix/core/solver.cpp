@@ -25,4 +25,59 @@ Residual residual_over_ranks(const double *gap_at_end, const double *impulse, st
   return {maxima[0], maxima[1]};
 }
 
+double target_residual(const SolverLimits &limits, const Guess &guess)
+{
+  if (limits.accuracy == 0.0) return limits.tolerance;
+  // Lengths are known to a few units of round-off.
+  constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();
+  const double changed = std::max(guess.mean_change, guess.residual.largest());
+  return std::min(
+      limits.tolerance,
+      std::max({limits.accuracy * changed, ROUND_OFF * guess.largest_length, limits.enough}));
+}
+
+Guess Solver::judge_first_guess(ContactProblem &problem, Host &host)
+{
+  std::vector<double> &impulse = problem.contacts.impulse;
+  const std::vector<double> &free_gap = gap_operator_.free_gap();
+  const std::size_t count = impulse.size();
+  gap_.resize(count);
+  diagonal_.resize(count);
+  for (double &value : impulse) value = std::max(0.0, value);
+  gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
+  const Residual mine = residual(gap_.data(), impulse.data(), count);
+  Guess guess;
+  double changes = 0.0, changing = 0.0;
+  for (std::size_t c = 0; c < count; ++c) {
+    diagonal_[c] = problem.diagonal(c);
+    const double change = impulse[c] * diagonal_[c];
+    guess.along += impulse[c] * gap_[c];
+    guess.along_free += impulse[c] * free_gap[c];
+    guess.largest_length = std::max({guess.largest_length, std::abs(free_gap[c]), change});
+    guess.largest_diagonal = std::max(guess.largest_diagonal, diagonal_[c]);
+    changes += change;
+    if (impulse[c] > 0.0) changing += 1.0;
+  }
+  double sums[4] = {guess.along, guess.along_free, changes, changing};
+  double maxima[4] = {mine.feasibility, mine.complementarity, guess.largest_length,
+                      guess.largest_diagonal};
+  host.reduce(sums, 4, maxima, 4);
+  guess.along = sums[0];
+  guess.along_free = sums[1];
+  if (sums[3] > 0.0) guess.mean_change = sums[2] / sums[3];
+  guess.residual = {maxima[0], maxima[1]};
+  guess.largest_length = maxima[2];
+  guess.largest_diagonal = maxima[3];
+  return guess;
+}
+
+void settle_for_tolerance(const SolverLimits &limits, double reached, SolverResult &result)
+{
+  const bool stopped_short = result.status == Status::OUT_OF_ITERATIONS ||
+      result.status == Status::ROUND_OFF;
+  if (!stopped_short || !(reached <= limits.tolerance)) return;
+  result.status = Status::CONVERGED;
+  result.target = reached;
+}
+
 }    // namespace inelastic

@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <vector>
 
 namespace inelastic {
 
@@ -41,14 +42,14 @@ Residual residual_over_ranks(const double *gap_at_end, const double *impulse, st
 
 // How the search for the impulses of a step has ended.
 enum class Status {
-  // The residual is within the tolerance.
+  // The residual is within the target, or within the tolerance where no smaller one was to be had.
   CONVERGED,
   // Each solve converged, but the last one allowed left constraints to add or change
   // (projection.h).
   OUT_OF_ROUNDS,
   // The largest number of iterations was made, and the residual is above the tolerance.
   OUT_OF_ITERATIONS,
-  // The tolerance is below the round-off of the gaps where impulses act.
+  // The tolerance, too, is below the round-off of the gaps where impulses act.
   ROUND_OFF,
   // A number in the problem or in the iterations is infinite or no number.
   NOT_FINITE,
@@ -87,15 +88,41 @@ struct SolverLimits {
   long max_iterations = 0;
   // [length] Steps that move particles further than this are not sensible (infeasibility.h).
   double reach = std::numeric_limits<double>::infinity();
+  // The largest residual of a solution as a part of what contacts change in the step
+  // (target_residual); 0 = only the tolerance counts.
+  double accuracy = 0.0;
+  double enough = 0.0;    // [length] the target of an earlier round of the same step
 };
+
+// What is known before the iterations, from the first guess of the impulses; over all ranks.
+struct Guess {
+  Residual residual;
+  // [length] The mean, over the constraints with impulse, of the length by which the impulse opens
+  // its own gap.
+  double mean_change = 0.0;
+  // [length] The largest gap without impulses, or change by an impulse.
+  double largest_length = 0.0;
+  double largest_diagonal = 0.0;    // [time / mass] of A
+  // lambda . w(lambda) and lambda . w(0) [mass length^2 / time]
+  double along = 0.0, along_free = 0.0;
+};
+
+// Returns the residual [length] at which the iterations end: the accuracy times what contacts change,
+// or times what the first guess lacks, whichever is more; at most the tolerance.
+double target_residual(const SolverLimits &limits, const Guess &guess);
 
 struct SolverResult {
   Status status = Status::OUT_OF_ITERATIONS;
   long iterations = 0;
   Residual residual;         // over all ranks
+  double target = 0.0;       // [length] the residual that was asked for; reached if CONVERGED
   double round_off = 0.0;    // [length] of the gaps where impulses act; no residual gets below it
   ResidualTrend trend;
 };
+
+// Makes a search that has ended above its target, but within the tolerance, a solution: the target
+// becomes what was reached.
+void settle_for_tolerance(const SolverLimits &limits, double reached, SolverResult &result);
 
 class Solver {
  public:
@@ -109,7 +136,13 @@ class Solver {
   GapOperator &gap_operator() { return gap_operator_; }
 
  protected:
+  // Judges the impulses of the problem, of which negative ones become 0, and sets the diagonal. The
+  // operator must be prepared for the problem. Collective.
+  Guess judge_first_guess(ContactProblem &problem, Host &host);
+
   GapOperator gap_operator_;
+  std::vector<double> gap_;         // [length] at the end of the step, one per constraint
+  std::vector<double> diagonal_;    // of A [time / mass]
 };
 
 }    // namespace inelastic

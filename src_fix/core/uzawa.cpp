@@ -11,20 +11,21 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
 {
   ContactSet &contacts = problem.contacts;
   const std::size_t count = contacts.size();
-  std::fill(contacts.impulse.begin(), contacts.impulse.end(), 0.0);
   gap_operator_.prepare(problem);
-  gap_.resize(count);
 
   SolverResult result;
-  const auto ended = [&result](Status status) {
+  result.target = target_residual(limits, judge_first_guess(problem, host));
+  std::fill(contacts.impulse.begin(), contacts.impulse.end(), 0.0);
+  const auto ended = [&](Status status) {
     result.status = status;
+    settle_for_tolerance(limits, result.residual.feasibility, result);
     return result;
   };
   double step = 0.0;    // 1 / L; 0 = not yet known
   while (true) {
     gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
     result.residual = residual_over_ranks(gap_.data(), contacts.impulse.data(), count, host);
-    if (result.residual.feasibility <= limits.tolerance) return ended(Status::CONVERGED);
+    if (result.residual.feasibility <= result.target) return ended(Status::CONVERGED);
     if (!std::isfinite(result.residual.feasibility)) return ended(Status::NOT_FINITE);
     if (result.iterations >= limits.max_iterations) return ended(Status::OUT_OF_ITERATIONS);
     if (result.iterations > 0) result.trend.see(result.iterations, result.residual.feasibility);

@@ -17,9 +17,6 @@ namespace inelastic {
 class Uzawa final : public Solver {
  public:
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
-
- private:
-  std::vector<double> gap_;    // [length] at the end of the step, one per constraint
 };
 
 }    // namespace inelastic

@@ -52,6 +52,7 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   solved_relinearised_ = relinearised_;
   if (bodies_) bodies_->turn(problem, velocity, step_.motion_of_bodies);
   const long added = pairs_.add_violated() + wall_constraints_.add_violated();
+  const long changed = step_.phase == Phase::CONTACT ? rules_.keep_within_tolerance(velocity) : 0;
   long relinearised = 0;
   step_.excess = 0.0;
   if (bodies_ || wall_constraints_.need_relinearising()) {
@@ -65,7 +66,7 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   came_back_ = came_back_ || sums[0] > 0.0;
   relinearised_ = relinearised_ || sums[1] > 0.0;
   ranks_.fail_together(step_.problem_found);
-  return added + relinearised;
+  return added + changed + relinearised;
 }
 
 void Constraints::adapt_margin(double reach)

@@ -59,6 +59,7 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   vector_[TOTAL_ITERATIONS] += static_cast<double>(result.iterations);
   vector_[SHORTENED_STEPS] = static_cast<double>(shortened_steps);
   vector_[EXCESS] = step_.excess;
+  vector_[PUSHED_STEPS] += step_.bad_start ? 1.0 : 0.0;
 }
 
 void ContactOutput::clear_sums(bool virial_per_atom)

@@ -38,6 +38,7 @@ class ContactOutput : protected Pointers {
     TOTAL_ITERATIONS,
     SHORTENED_STEPS,
     EXCESS,
+    PUSHED_STEPS,
     VECTOR_SIZE
   };
 

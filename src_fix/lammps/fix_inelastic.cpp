@@ -102,9 +102,13 @@ int FixInelastic::setmask()
 
 int FixInelastic::modify_param(int narg, char **arg)
 {
-  if (strcmp(arg[0], "tolerance") != 0) return 0;
-  if (narg < 2) utils::missing_cmd_args(FLERR, "fix_modify tolerance", error);
-  settings_.tolerance = read_tolerance(lmp, arg[1]);
+  const std::string keyword = arg[0];
+  if (keyword != "tolerance" && keyword != "accuracy") return 0;
+  if (narg < 2) utils::missing_cmd_args(FLERR, "fix_modify " + keyword, error);
+  if (keyword == "tolerance")
+    settings_.tolerance = read_tolerance(lmp, arg[1]);
+  else
+    settings_.accuracy = read_accuracy(lmp, arg[1]);
   return 2;
 }
 
@@ -289,6 +293,7 @@ inelastic::ProjectionResult FixInelastic::solve(Kick kick)
     predict(kick);
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
+    const double target = result.target;
     constraints_.overlaps().share();
     if (settings_.record_every > 0 && kick == Kick::WHOLE &&
         update->ntimestep % settings_.record_every == 0)
@@ -308,7 +313,10 @@ inelastic::ProjectionResult FixInelastic::solve(Kick kick)
       summary_.add_unconverged();
       unsolved_.report(result);
     }
-    if (length_.accepts(unsolved_.named())) return result;
+    if (length_.accepts(unsolved_.named())) {
+      step_.target = target;
+      return result;
+    }
   }
 }
 
@@ -333,7 +341,9 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   // Further than the list reaches no step goes: such a one is shortened, or it is an error.
   constexpr double BEYOND_REACH = 10.0;
   const double reach = (settings_.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
-  const inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
+  inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
+  // A push is no momentum.
+  if (step_.phase == Phase::CONTACT) limits.accuracy = settings_.accuracy;
   const inelastic::ProjectionResult result = inelastic::project(
       step_.problem, constraints_, *solver_, limits, MAX_ROUNDS, ranks_, step_.velocity);
   if (result.status != inelastic::Status::CONVERGED) unsolved_.note_worst(result);

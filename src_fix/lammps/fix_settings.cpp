@@ -12,8 +12,8 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-constexpr const char *KEYWORDS[] = {"region", "rigid",  "solver", "maxiter",
-                                    "frozen", "record", "shorten"};
+constexpr const char *KEYWORDS[] = {"region",  "rigid",  "accuracy", "solver",
+                                    "maxiter", "frozen", "record",   "shorten"};
 
 bool is_keyword(const char *word)
 {
@@ -53,8 +53,8 @@ void Reader::read_keywords()
     const std::string keyword = arg_[at_];
     if (!is_keyword(arg_[at_]))
       error_->all(FLERR, at_,
-                  "Unknown fix inelastic keyword {}: use region, rigid, solver, maxiter, frozen, "
-                  "record or shorten",
+                  "Unknown fix inelastic keyword {}: use region, rigid, accuracy, solver, maxiter, "
+                  "frozen, record or shorten",
                   keyword);
     if (at_ + 2 > narg_) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error_);
     const char *const value = arg_[at_ + 1];
@@ -63,6 +63,8 @@ void Reader::read_keywords()
       read_regions(value);
     else if (keyword == "rigid")
       read_rigid(value);
+    else if (keyword == "accuracy")
+      settings_.accuracy = read_accuracy(lmp_, value, at_ - 1);
     else if (keyword == "solver")
       settings_.solver = value;
     else if (keyword == "maxiter")
@@ -139,6 +141,15 @@ double LAMMPS_NS::read_tolerance(LAMMPS *lmp, const char *text, int argument)
     lmp->error->all(FLERR, argument,
                     "Fix inelastic tolerance must be a length greater than 0, not {}", text);
   return tolerance;
+}
+
+double LAMMPS_NS::read_accuracy(LAMMPS *lmp, const char *text, int argument)
+{
+  const double accuracy = utils::numeric(FLERR, text, false, lmp);
+  if (!(accuracy > 0.0 && accuracy <= 1.0))
+    lmp->error->all(FLERR, argument,
+                    "Fix inelastic accuracy must be greater than 0 and at most 1, not {}", text);
+  return accuracy;
 }
 
 Settings LAMMPS_NS::read_settings(LAMMPS *lmp, int narg, char **arg, int group_bit)

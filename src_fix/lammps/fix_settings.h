@@ -19,6 +19,8 @@ struct Settings {
   // EPS, the largest overlap allowed [length]. Too small, it is below the round-off of positions; too
   // large, slow contacts are not resolved.
   double tolerance = 0.0;
+  // A, the part of what contacts change in a step to which the step is solved, where that is below EPS.
+  double accuracy = 1.0e-3;
   // The name that make_solver() of the core knows.
   std::string solver = "apgd";
   // Iterations in one time step. Beyond, the run stops, or goes on with a warning.
@@ -48,6 +50,9 @@ Settings read_settings(LAMMPS *lmp, int narg, char **arg, int group_bit);
 // Reads EPS [length]. Errors: anything but a finite number greater than 0, which the error points to if
 // it knows the argument's index.
 double read_tolerance(LAMMPS *lmp, const char *text, int argument = Error::NOPOINTER);
+
+// Reads the accuracy in the same way. Errors: anything but a number greater than 0 and at most 1.
+double read_accuracy(LAMMPS *lmp, const char *text, int argument = Error::NOPOINTER);
 
 }    // namespace LAMMPS_NS
 

@@ -11,30 +11,74 @@ constexpr double RELINEARISE_BEYOND = 1.1;
 
 }    // namespace
 
-double GapRules::effective_gap(double gap_now, double size) const
-{
-  if (!overlaps_.is_bad(gap_now)) return gap_now;
-  if (step_.phase == Phase::CONTACT) return 0.0;
-  const double limit = PUSH_LIMIT * size * step_.problem.timestep / step_.regular_timestep;
-  return std::max(gap_now, -std::max(limit, REGULAR_OVERLAP * step_.settings.tolerance));
-}
-
-double GapRules::wanted_gap(double gap_now, double size) const
-{ return overlaps_.is_bad(gap_now) ? gap_now - effective_gap(gap_now, size) : 0.0; }
-
-bool GapRules::ends_too_deep(double gap_now, double size, double gap_at_end)
+// What an overlap gives back in a step stays in the velocities: it is no more than what velocities are
+// resolved to. So small a gap under a force is closed already; the solver ends within one target more.
+double GapRules::contact_gap(const Side &side) const
 {
   const double tolerance = step_.settings.tolerance;
-  const double allowed = overlaps_.is_bad(gap_now) ? gap_now : 0.0;
+  const double target = std::min(step_.target, tolerance);
+  const double gap = side.gap_now;
+  if (gap < 0.0) return std::max(gap, -target);
+  return side.pressed ? std::max(0.0, gap - std::min(target, tolerance - target)) : gap;
+}
+
+double GapRules::effective_gap(const Side &side) const
+{
+  const double gap = side.gap_now;
+  if (step_.phase == Phase::CONTACT) return overlaps_.is_bad(gap) ? 0.0 : contact_gap(side);
+  const double limit = PUSH_LIMIT * side.size * step_.problem.timestep / step_.regular_timestep;
+  return std::max(gap, -std::max(limit, REGULAR_OVERLAP * step_.settings.tolerance));
+}
+
+double GapRules::wanted_gap(const Side &side) const
+{
+  const double wanted = side.gap_now - effective_gap(side);
+  return overlaps_.is_bad(side.gap_now) ? wanted
+                                        : std::max(wanted, -0.5 * step_.settings.tolerance);
+}
+
+bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
+{
+  const double tolerance = step_.settings.tolerance;
+  const bool bad = overlaps_.is_bad(side.gap_now);
+  const double allowed = bad ? side.gap_now : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
-  return wanted_gap(gap_now, size) - gap_at_end > RELINEARISE_BEYOND * tolerance;
+  const double wanted = bad ? wanted_gap(side) : 0.0;
+  return wanted - gap_at_end > RELINEARISE_BEYOND * tolerance;
+}
+
+long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
+{
+  inelastic::ContactSet &contacts = step_.problem.contacts;
+  const double h = step_.problem.timestep;
+  const double tolerance = step_.settings.tolerance;
+  long changed = 0;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const Side &side = step_.sides[c];
+    // Gaps that were set by the end of the step are kept there by follow().
+    const double linear_gap = side.gap_now - side.wall_motion;
+    const bool as_at_start = contacts.gap[c] == effective_gap(side) - side.wall_motion;
+    if (!as_at_start || overlaps_.is_bad(side.gap_now) || contacts.gap[c] == linear_gap) continue;
+    const int i = contacts.first[c], j = contacts.second[c];
+    const bool is_wall = side.wall != 0;
+    if (step_.is_member(i) || (!is_wall && step_.is_member(j))) continue;
+    double opening = 0.0;
+    for (int d = 0; d < 3; ++d)
+      opening += contacts.normal[3 * c + d] *
+          (velocity[3 * i + d] - (is_wall ? 0.0 : velocity[3 * j + d]));
+    const double at_end = linear_gap + h * opening;
+    if (at_end >= -tolerance && (at_end <= tolerance || contacts.impulse[c] == 0.0)) continue;
+    contacts.gap[c] = linear_gap;
+    ++changed;
+  }
+  return changed;
 }
 
 long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
   Side &side = step_.sides[c];
-  const double linear_gap = effective_gap(side.gap_now, side.size) - side.wall_motion;
+  const double linear_gap = effective_gap(side) - side.wall_motion;
   const double gap = std::min(exact_gap, linear_gap);
   if (!too_deep) {
     const bool worth_it = contacts.impulse[c] > 0.0 &&

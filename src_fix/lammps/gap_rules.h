@@ -17,17 +17,16 @@ class GapRules {
   // turns little; one that turns by a radian takes up to twenty.
   static constexpr int MAX_RELINEARISATIONS = 40;
 
-  // The gap [length] that the constraint asks to be kept, the wall's motion left out. `size` is the sum
-  // of radii (the radius at a wall).
-  double effective_gap(double gap_now, double size) const;
+  // The gap [length] that the constraint takes for the present one, the wall's motion left out.
+  double effective_gap(const Side &side) const;
 
   // The gap [length] at the end of the step for which the constraint is just met.
-  double wanted_gap(double gap_now, double size) const;
+  double wanted_gap(const Side &side) const;
 
   // Tells whether the end of the step is so deep that the constraint must change. The excess is noted as well:
   // what starts with a bad overlap may keep it, but not get deeper. It is asked for more, which costs no
   // shorter step where it is not to be had.
-  bool ends_too_deep(double gap_now, double size, double gap_at_end);
+  bool ends_too_deep(const Side &side, double gap_at_end);
 
   // Sets the gap of constraint c to one that is exact for the present velocity, or to the linearised one
   // if that is smaller. One that was set for an earlier velocity is set again, so that no force keeps
@@ -35,9 +34,15 @@ class GapRules {
   // constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
+  // Lets constraints of free spheres that these velocities leave beyond the tolerance ask for their
+  // present gap. (The step's target is known only now.) Returns how many.
+  long keep_within_tolerance(const std::vector<double> &velocity);
+
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
+  double contact_gap(const Side &side) const;
+
   Step &step_;
   OverlapWatch &overlaps_;
 };

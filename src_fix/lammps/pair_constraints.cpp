@@ -123,9 +123,10 @@ void PairConstraints::take(std::size_t slot, int i, int j)
           "atom {} overlaps its own periodic image: the box is too small", atom->tag[i]);
     return;
   }
-  problem.contacts.add(i, j, normal, rules_.effective_gap(gap, size),
-                       step_.impulse_per_force * memory_.force(i, atom->tag[j]));
-  step_.sides.push_back({0, gap, size, 0.0});
+  const double force = memory_.force(i, atom->tag[j]);
+  const Side side = {0, gap, size, 0.0, force > 0.0};
+  problem.contacts.add(i, j, normal, rules_.effective_gap(side), step_.impulse_per_force * force);
+  step_.sides.push_back(side);
 }
 
 double PairConstraints::gap_at_end(int i, int j, double *away) const
@@ -210,7 +211,7 @@ long PairConstraints::relinearise()
           n[d] * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
     const double along = std::max(LEAST_ALONG, dot(n, away) / norm(away));
     const Side &side = step_.sides[c];
-    const double lacking = gap - rules_.wanted_gap(side.gap_now, side.size);
+    const double lacking = gap - rules_.wanted_gap(side);
     return (lacking < 0.0 ? lacking / along : lacking) - step_.problem.timestep * opening;
   };
 
@@ -222,7 +223,7 @@ long PairConstraints::relinearise()
     if (side.wall != 0 || !(step_.is_member(i) || step_.is_member(j))) continue;
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
-    const bool too_deep = rules_.ends_too_deep(side.gap_now, side.size, gap);
+    const bool too_deep = rules_.ends_too_deep(side, gap);
     if ((too_deep || side.followed) && may_change)
       changed += rules_.follow(c, relinearised_gap(c, gap), too_deep);
   }

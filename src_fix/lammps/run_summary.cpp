@@ -17,10 +17,10 @@ RunSummary::RunSummary(LAMMPS *lmp, const Step &step, PhaseClock &clock) :
 
 void RunSummary::begin(long shortened_steps)
 {
-  steps_ = pushed_ = unconverged_ = 0;
+  steps_ = unconverged_ = pushed_at_start_ = pushed_later_ = 0;
   shortened_before_ = shortened_steps;
   iterations_ = constraint_iterations_ = 0.0;
-  largest_overlap_ = largest_excess_ = deepest_start_ = 0.0;
+  overlap_of_start_ = largest_overlap_ = largest_excess_ = 0.0;
   clock_.reset();
 }
 
@@ -34,11 +34,11 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
 {
   ++steps_;
   iterations_ += static_cast<double>(result.iterations);
-  largest_overlap_ = std::max(largest_overlap_, step_.largest_overlap);
   largest_excess_ = std::max(largest_excess_, step_.excess);
-  if (!step_.bad_start) return;
-  ++pushed_;
-  deepest_start_ = std::max(deepest_start_, step_.largest_overlap);
+  const bool of_start = step_.bad_start && pushed_at_start_ == steps_ - 1;
+  if (step_.bad_start) ++(of_start ? pushed_at_start_ : pushed_later_);
+  double &overlap = of_start ? overlap_of_start_ : largest_overlap_;
+  overlap = std::max(overlap, step_.largest_overlap);
 }
 
 void RunSummary::log(long shortened_steps, long unexpected_steps) const
@@ -64,12 +64,18 @@ void RunSummary::log_overlaps(long unexpected_steps) const
         "yes, avoids them\n",
         step_.has_bodies ? "turning bodies, or the curvature of walls," : "the curvature of walls",
         largest_excess_);
-  if (pushed_ > 0)
+  if (pushed_at_start_ > 0)
+    utils::logmesg(
+        lmp, "  before that, {} steps pushed the overlaps of the start, up to {:.6g}, apart\n",
+        pushed_at_start_, overlap_of_start_);
+  if (pushed_later_ > 0)
     utils::logmesg(
         lmp,
-        "  {} steps began with overlaps of more than 2 tolerances, up to {:.6g}, and pushed "
-        "them apart; in {} of them such an overlap had appeared that no step had left\n",
-        pushed_, deepest_start_, unexpected_steps);
+        "  {} later steps began with overlaps of more than 2 tolerances, and pushed them apart\n",
+        pushed_later_);
+  if (unexpected_steps > 0)
+    utils::logmesg(lmp, "  in {} steps such an overlap had appeared that no step had left\n",
+                   unexpected_steps);
   if (unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
                    unconverged_);

@@ -32,12 +32,14 @@ class RunSummary : protected Pointers {
 
   const Step &step_;
   PhaseClock &clock_;
-  long steps_ = 0, pushed_ = 0, unconverged_ = 0, shortened_before_ = 0;
+  long steps_ = 0, unconverged_ = 0, shortened_before_ = 0;
+  // Bad starts were pushed apart in so many steps: in those with which the run began, and in later ones.
+  long pushed_at_start_ = 0, pushed_later_ = 0;
   double iterations_ = 0.0;
   double constraint_iterations_ = 0.0;    // constraints of this rank, once for each iteration
-  double largest_overlap_ = 0.0;          // [length]
+  double overlap_of_start_ = 0.0;         // [length] the largest of those steps
+  double largest_overlap_ = 0.0;          // [length] of the other steps
   double largest_excess_ = 0.0;           // [length]
-  double deepest_start_ = 0.0;            // [length] of the overlaps that were pushed apart
 };
 
 }    // namespace LAMMPS_NS

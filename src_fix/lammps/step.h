@@ -39,6 +39,7 @@ struct Side {
   double gap_now;           // [length] at the present positions
   double size;              // [length] the sum of the two radii; the radius at a wall
   double wall_motion;       // [length] by how much the wall closes the gap during the step
+  bool pressed = false;     // the last step left a force
   bool followed = false;    // the gap was set by where an earlier solution of the step ends
 };
 
@@ -63,6 +64,9 @@ struct Step {
   std::vector<double> velocity;    // 3 per particle, the projection
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
+
+  // [length] The residual to which the last step was solved (core/solver.h).
+  double target = EXTREME;
 
   // This is known after constraints were collected.
   Phase phase = Phase::CONTACT;

@@ -144,10 +144,11 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
   const double gap_now = view.distance_now - size;
   const double motion = view.distance_now - view.distance;
   constraint_[key(i, view.wall)] = problem.contacts.size();
-  problem.contacts.add(i, problem.particles, view.normal,
-                       rules_.effective_gap(gap_now, size) - motion,
-                       step_.impulse_per_force * memory_.force(i, -view.wall));
-  step_.sides.push_back({view.wall, gap_now, size, motion});
+  const double force = memory_.force(i, -view.wall);
+  const Side side = {view.wall, gap_now, size, motion, force > 0.0};
+  problem.contacts.add(i, problem.particles, view.normal, rules_.effective_gap(side) - motion,
+                       step_.impulse_per_force * force);
+  step_.sides.push_back(side);
 }
 
 long WallConstraints::add_violated()
@@ -193,22 +194,24 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   // A region can show a wall late: from inside one part of a union the others are not seen. An obstacle
   // that is overlapped is seen; its plane at the end of the step may lie beyond where the sphere is now.
   const double to_plane = gap_here + wall_motion;
-  const double gap_now = known ? step_.sides[existing->second].gap_now
-      : view.convex            ? std::max(0.0, to_plane)
-                               : to_plane;
-  rules_.overlaps().note(gap_now, i, -view.wall);
+  Side side = {view.wall, view.convex ? std::max(0.0, to_plane) : to_plane, atom->radius[i],
+               wall_motion};
+  side.followed = step_.is_member(i);
+  if (known) side.gap_now = step_.sides[existing->second].gap_now;
+  if (known) side.pressed = step_.sides[existing->second].pressed;
+  rules_.overlaps().note(side.gap_now, i, -view.wall);
   // This makes it exact for this motion, also where a body turns.
   const double turning = step_.is_member(i)
       ? h * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]))
       : 0.0;
-  const double gap = gap_here + turning - rules_.wanted_gap(gap_now, atom->radius[i]);
+  const double gap = gap_here + turning - rules_.wanted_gap(side);
   if (known && is_same_plane(existing->second, n))
     return rules_.follow(existing->second, gap, too_deep);
   if (!too_deep) return 0;
   inelastic::ContactProblem &problem = step_.problem;
   constraint_[key(i, view.wall)] = problem.contacts.size();
   problem.contacts.add(i, problem.particles, view.normal, gap, 0.0);
-  step_.sides.push_back({view.wall, gap_now, atom->radius[i], wall_motion, step_.is_member(i)});
+  step_.sides.push_back(side);
   return 1;
 }
 
@@ -223,14 +226,14 @@ long WallConstraints::relinearise(double margin)
         const auto existing = constraint_.find(key(from.atom, view.wall));
         const bool known = existing != constraint_.end();
         if (known) seen.insert(existing->second);
-        const double gap_now = known ? step_.sides[existing->second].gap_now : 0.0;
+        const Side side = known ? step_.sides[existing->second]
+                                : Side{view.wall, 0.0, atom->radius[from.atom], 0.0};
         const double gap = view.distance - atom->radius[from.atom];
         // The walls behind a periodic boundary are as exact as others.
         const bool exact = is_image(from) && walls_.exact() && !step_.is_member(from.atom);
-        const bool too_deep = rules_.ends_too_deep(gap_now, atom->radius[from.atom], gap) ||
-            (exact && gap < std::min(gap_now, -step_.settings.tolerance));
-        if (too_deep || (known && step_.sides[existing->second].followed))
-          changed += add_plane(from, view, too_deep);
+        const bool too_deep = rules_.ends_too_deep(side, gap) ||
+            (exact && gap < std::min(side.gap_now, -step_.settings.tolerance));
+        if (too_deep || (known && side.followed)) changed += add_plane(from, view, too_deep);
       },
       [&](const RegionWalls::Viewpoint &from, const std::string &) {
         beyond.push_back(from);
@@ -256,7 +259,7 @@ long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
     const double *const n = &step_.problem.contacts.normal[3 * c];
     const double turning =
         step_.problem.timestep * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]));
-    const double linear_gap = rules_.effective_gap(side.gap_now, side.size) - side.wall_motion;
+    const double linear_gap = rules_.effective_gap(side) - side.wall_motion;
     changed += rules_.follow(c, linear_gap + turning, false);
   }
   return changed;

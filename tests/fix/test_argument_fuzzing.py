@@ -118,6 +118,7 @@ NO_COUNT = ["0", "-5", "1.5", "1e5", "x", "nan", "99999999999999999999", "v_x", 
 RIGHT = {
     "region": ["container", "container lid", "lid container"],
     "solver": ["apgd", "uzawa"],
+    "accuracy": ["1e-3", "1", "1e-9"],
     "maxiter": ["1000", "100000", "1000 warn", "2147483648"],
     "frozen": ["still"],
     "record": ["step*.npz every 1", "*.npz every 1000", "a.*.b every 2147483647"],
@@ -127,6 +128,7 @@ WRONG = {
     "region": ["", "nowhere", "container nowhere", "box2", "1", "*"],
     "rigid": ["", "motion", "motion point", "nofix solid", "motion cube", "gravity point"],
     "solver": ["", "newton", "APGD", "apgd2", "0"],
+    "accuracy": ["", "0", "-1", "1.0001", "nan", "inf", "loose"],
     "maxiter": ["", "warn", "10 warning", "10 10", *NO_COUNT],
     "frozen": ["", "nobody", "1", "still still"],
     "record": [

@@ -275,7 +275,8 @@ def test_followed_gaps_are_those_of_the_end(name: str, tmp_path: Path, lmp: Runn
         for first, second, gap, now, impulse in zip(
             *(record[key] for key in ("id1", "id2", "gap", "gap_now", "impulse")), strict=True
         ):
-            if gap == now or impulse == 0:
+            # Without a turn to follow the two differ by at most a regular overlap.
+            if abs(gap - now) <= 2 * tolerance or impulse == 0:
                 continue
             x = end[index[int(first)]]
             if second > 0:

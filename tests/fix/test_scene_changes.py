@@ -238,11 +238,20 @@ def warned(result: Run) -> list[str]:
     return [line for line in result.warnings if "which no earlier step has left" in line]
 
 
-def pushed(result: Run) -> list[tuple[int, int]]:
-    """Return of each run's summary in how many steps something was pushed, and had appeared."""
-    line = r"^  (\d+) steps began with overlaps .* in (\d+) of them such an overlap had appeared"
-    found = re.findall(line, result.screen, re.MULTILINE)
-    return [(int(steps), int(appeared)) for steps, appeared in found]
+def pushed(result: Run) -> list[tuple[int, int, int]]:
+    """Return of each run that pushed: steps of its start, later ones, those where it appeared."""
+    lines = (
+        r"before that, (\d+) steps pushed the overlaps of the start",
+        r"(\d+) later steps began with overlaps",
+        r"in (\d+) steps such an overlap had appeared",
+    )
+    found = []
+    for summary in result.screen.split("Fix inelastic: ")[1:]:
+        counts = [re.search(rf"^  {line}", summary, re.MULTILINE) for line in lines]
+        start, later, appeared = (int(count[1]) if count else 0 for count in counts)
+        if start or later:
+            found.append((start, later, appeared))
+    return found
 
 
 def overlapping(folder: Path, **options: object) -> str:
@@ -262,11 +271,19 @@ def overlapping(folder: Path, **options: object) -> str:
 
 
 def test_a_bad_start_is_counted_and_no_surprise(tmp_path: Path, lmp: Runner) -> None:
-    result = lmp(overlapping(tmp_path) + "run 20\nrun 20\n")
+    text = overlapping(tmp_path) + "thermo_style custom step f_contact[12]\nrun 20\nrun 20\n"
+    result = lmp(text)
     assert not warned(result)
-    ((steps, appeared),) = pushed(result)
-    assert steps >= 2
-    assert appeared == 0
+    ((start, later, appeared),) = pushed(result)
+    assert start >= 2
+    assert (later, appeared) == (0, 0)
+    assert result.runs[0]["f_contact[12]"][0] == 1
+    assert result.runs[1]["f_contact[12]"][-1] == start
+    # The overlap of the start is said apart from that of the rest.
+    said = re.findall(r"largest overlap (\S+) =", result.screen)
+    assert all(float(overlap) <= 2 * EPS * SLACK for overlap in said)
+    (depth,) = re.findall(r"overlaps of the start, up to (\S+), apart", result.screen)
+    assert float(depth) == pytest.approx(0.5 * RADIUS, rel=1e-6)  # printed with six digits
 
 
 def test_a_bad_start_that_goes_on_in_the_next_run(tmp_path: Path, lmp: Runner) -> None:
@@ -298,7 +315,7 @@ def test_an_overlap_that_appears_between_runs(
     result = lmp(text + f"run 5\n{change}\nrun 20\n", ranks=ranks)
     (warning,) = warned(result)
     assert re.search(f"step 5: {who}", warning), warning
-    assert [appeared for _, appeared in pushed(result)] == [1]
+    assert [appeared for *_, appeared in pushed(result)] == [1]
 
 
 def test_an_overlap_that_appears_during_a_run(tmp_path: Path, lmp: Runner) -> None:
@@ -317,8 +334,9 @@ def test_an_overlap_that_appears_during_a_run(tmp_path: Path, lmp: Runner) -> No
     result = lmp(text + drop + "run 30\n")
     (warning,) = warned(result)
     assert re.search(r"step 1: atoms [12] and [12] overlap by 0.2 \(2e\+03 toler", warning), warning
-    ((steps, appeared),) = pushed(result)
-    assert steps >= 2
+    ((start, later, appeared),) = pushed(result)
+    assert start == 0
+    assert later >= 2
     assert appeared == 1
     assert result.thermo["f_contact[4]"][-1] <= 1e-4 * SLACK
 
@@ -337,7 +355,8 @@ def test_a_lower_tolerance_is_no_surprise(tmp_path: Path, lmp: Runner) -> None:
         tmp_path,
         tolerance=0.01 * RADIUS,
         box=((0.0, 0.57), (0.0, 2.0), (0.0, 0.57)),
-        options="region container shorten yes",
+        # So loose a solver leaves overlaps near the tolerance.
+        options="region container shorten yes accuracy 1",
     )
     result = lmp(text + f"run 150\nfix_modify contact tolerance {EPS}\nrun 20\n")
     assert not warned(result)
