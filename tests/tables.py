@@ -4,8 +4,9 @@
 spheres against time step, tolerance and solver, `near` that of dimers that are almost spheres
 against the tolerance, `start` a regular start of dimers beside a random one, `inertia` point masses
 beside solid spheres, `turning` the look at the end of the step beside a program without it, which
-is built for this. Every row is nine seeds unless --seeds says otherwise. The paper's numbers are
-studies.
+is built for this, `convergence` the error of exactly known motions against time step and
+tolerance, `rest` what motion is left in a bed. Every row is nine seeds unless --seeds says
+otherwise; the last two need none. The paper's numbers are studies.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from tests.benchmark.scenes_without import TURNING, build
+from tests.convergence import ACCURACIES, STEPS, TOLERANCES
+from tests.convergence import SCENES as EXACT
 from tests.pouring import (
     Packing,
     Projections,
@@ -185,6 +188,69 @@ def turning(seeds: int) -> Iterator[str]:
             yield f"| {ratio} | {' | '.join([*iterations, *overlaps])} |"
 
 
+def convergence(_: int) -> Iterator[str]:
+    yield f"| scene | accuracy | `EPS` / d | {' | '.join(f'{n} steps' for n in STEPS)} |"
+    yield "|---|---|---|" + "---|" * len(STEPS)
+    for name, make in EXACT.items():
+        exact = make()
+        for accuracy in ACCURACIES:
+            for tolerance in TOLERANCES:
+                with tempfile.TemporaryDirectory() as folder:
+                    errors = [exact.error(Path(folder), tolerance, n, accuracy) for n in STEPS]
+                cells = " | ".join(f"{error:.1e}" for error in errors)
+                yield f"| {name} | {accuracy:g} | {tolerance:g} | {cells} |"
+
+
+# A bed between periodic side walls; the means are over the last eighth of 20 time units.
+BED = f"""
+units lj
+atom_style sphere
+boundary p p f
+region box block 0 1 0 1 0 4
+create_box 1 box
+region floor plane 0 0 0 0 0 1
+region start block 0 1 0 1 0.06 2.5
+create_atoms 1 random 1000 4711 start overlap 0.08 maxtry 5000
+set group all diameter 0.1 density 1
+variable damping equal PI*0.001/6
+pair_style zero 0.1
+pair_coeff * *
+neighbor 0.1 bin
+timestep ${{h}}
+fix gravity all gravity {GRAVITY} vector 0 0 -1
+fix drag all viscous ${{damping}}
+fix contact all inelastic ${{eps}} region floor shorten yes accuracy ${{accuracy}}
+fix motion all nve
+variable speed equal sqrt(2*ke/mass(all))/({GRAVITY}*v_h)
+variable iterations equal f_contact[1]
+variable n equal round(2.5/v_h)
+thermo $n
+fix means all ave/time 1 $n $n v_speed v_iterations
+thermo_style custom step ke f_means[1] f_means[2]
+thermo_modify norm no
+log log.lammps
+run $(8*v_n)
+print "means $(f_means[1]) $(f_means[2])"
+"""
+
+
+def rest(_: int) -> Iterator[str]:
+    yield "| accuracy | h | `EPS` / d | v_rms / (g h) | iterations a step |"
+    yield "|---|---|---|---|---|"
+    for accuracy in (1e-3, 1e-4):
+        for timestep in (0.01, 0.0025):
+            for tolerance in (1e-3, 1e-5):
+                variables = {"h": timestep, "eps": 0.1 * tolerance, "accuracy": accuracy}
+                with tempfile.TemporaryDirectory() as folder:
+                    log = run_deck(Path(folder), BED, variables)
+                (means,) = (line for line in log.splitlines() if line.startswith("means "))
+                speed, iterations = means.split()[1:]
+                yield (
+                    f"| {accuracy:g} | {timestep:g} | {tolerance:g} | {float(speed):.3f} "
+                    f"| {float(iterations):.0f} |"
+                )
+
+
 def summed(runs: Sequence[Projections]) -> Projections:
     """Return several runs of a log as one."""
     return Projections(
@@ -201,6 +267,8 @@ TABLES = {
     "start": start,
     "inertia": inertia,
     "turning": turning,
+    "convergence": convergence,
+    "rest": rest,
 }
 
 
