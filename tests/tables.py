@@ -86,6 +86,11 @@ def contacts(seeds: int) -> Iterator[str]:
                     # The same times for every time step
                     "steps_agitated": round(4 / timestep),
                     "steps_settling": round(8 / timestep),
+                    # One time step from start to end
+                    "steps_resting": 0,
+                    "dt_resting": timestep,
+                    "steps_tightening": 50,
+                    "steps_measuring": 20,
                     "tolerance_measuring": tolerance,
                 }
                 resolution = tolerance * RADIUS / (GRAVITY * timestep**2)
@@ -170,7 +175,7 @@ def turning(seeds: int) -> Iterator[str]:
     yield "|---|---|---|---|---|"
     # The dimers are shaken and slowed, at one tolerance.
     phases = {"steps_agitated": 400, "steps_settling": 200}
-    phases |= {"steps_tightening": 0, "steps_measuring": 0}
+    phases |= {"steps_resting": 0, "steps_tightening": 0, "steps_measuring": 0}
     with tempfile.TemporaryDirectory() as name:
         plugins = [build(Path(name) / f"{len(cuts)}", cuts) for cuts in (TURNING, [])]
         for ratio in (1.05, 1.5, 2.0):

@@ -350,7 +350,10 @@ def _effort(log: RunLog, smallest_radius: float) -> dict[str, float]:
 def _resolution(stage: Mapping[str, Any], radius: float) -> float | None:
     """Return eps / (g h^2) of the measuring phase, where the deck has these as numbers."""
     gravity = gravity_of(stage["text"])
-    tolerance, step = (stage["variables"].get(name) for name in ("tolerance_measuring", "dt"))
+    variables = stage["variables"]
+    tolerance, step = variables.get("tolerance_measuring"), variables.get("dt")
+    # The decks measure with the time step of a bed at rest, those of version 0.1 had one step.
+    step = variables.get("dt_resting", step)
     if gravity is None or not isinstance(tolerance, int | float):
         return None
     if not isinstance(step, int | float):

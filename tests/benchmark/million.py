@@ -78,7 +78,9 @@ def settle(folder: Path, particles: int, steps: int | None) -> Effort:
     if steps is not None:
         assert END in text
         text = text.replace(END, f"run {steps}\n")
-    nothing = {f"steps_{p}": 0 for p in ("agitated", "settling", "tightening", "measuring")}
+    nothing = {
+        f"steps_{p}": 0 for p in ("agitated", "settling", "resting", "tightening", "measuring")
+    }
     start = {"particles": particles, "start": "lattice.data", "out": "start", **nothing, **common}
     _lmp(folder, "spheres", shipped_deck("spheres"), start)
     memory = _lmp(folder, "settling", text, {"packing": "start/packing.restart", **common})

@@ -18,7 +18,8 @@ from tests.fix.lammps_run import Runner
 
 STEPS = {
     "steps_agitated": 100,
-    "steps_settling": 100,
+    "steps_settling": 50,
+    "steps_resting": 50,
     "steps_tightening": 5,
     "steps_measuring": 3,
     "dump_every": 40,
@@ -39,7 +40,7 @@ CASES = {
             "shape": "trimer.txt",
             "extent": 1.2,
             "inertia": "point",
-            "steps_settling": 300,  # they are thrown higher
+            "steps_settling": 250,  # they are thrown higher
         },
         200,
         3,
@@ -81,7 +82,7 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
     (tmp_path / "trimer.txt").write_text(TRIMER)
     steps = STEPS | variables
     result = lmp(deck(name), ranks=ranks, variables=steps)
-    last = steps["steps_agitated"] + steps["steps_settling"] + 8
+    last = steps["steps_agitated"] + steps["steps_settling"] + 50 + 8
     frame = read_particle_frame(result.folder / "out" / "particles.lammpsdump")
     assert frame.step == last
     assert frame.bodies is not None

@@ -23,6 +23,7 @@ PACKING = {
     "particles": PARTICLES,
     "steps_agitated": 200,
     "steps_settling": 200,
+    "steps_resting": 0,
     "steps_tightening": 1,
     "steps_measuring": 1,
 }

@@ -172,16 +172,18 @@ def test_a_wedge(case: tuple[float, float, float], tmp_path: Path, lmp: Runner) 
         assert depth <= case[1] * SLACK + 4e-16
 
 
+# In longer steps the whole dimer would pass the floor: shorten yes is for that.
+SHORT = [case for case in GRID if case[0] * case[1] <= 0.3]
+
+
 @pytest.mark.parametrize("inertia", ["point", "solid"])
-@pytest.mark.parametrize("case", GRID, ids=str)
+@pytest.mark.parametrize("case", SHORT, ids=str)
 def test_a_dimer_on_one_end(
     case: tuple[float, float, float], inertia: str, tmp_path: Path, lmp: Runner
 ) -> None:
     """Its lower sphere meets the floor, and stays there while the dimer turns."""
     speed, tolerance, timestep = case
     step = speed * tolerance
-    if step > 0.3:
-        pytest.skip("in a step the whole dimer would pass the floor: shorten yes is for that")
     turn = 0.6
     start = placed(dimer(1.5), [0, 0, 0], [0, 0, turn])
     lower = int(start.positions[:, 1].argmin())

@@ -17,7 +17,8 @@ from tests.fix.lammps_run import LAUNCHER, Runner
 
 VARIABLES = {
     "steps_agitated": 300,
-    "steps_settling": 40,
+    "steps_settling": 10,
+    "steps_resting": 30,
     "steps_tightening": 5,
     "steps_measuring": 3,
     "dump_every": 40,
@@ -39,7 +40,7 @@ def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
     assert np.array_equal(frame.ids, np.arange(1, 1001))
     # The tighter tolerance of the last phase; 1e-6 for round-off.
     overlap = largest_pair_overlap(frame.positions, frame.radii).depth
-    assert overlap <= 0.0001 * 0.055 * (1 + 1e-6)
+    assert overlap <= 0.00001 * 0.055 * (1 + 1e-6)
     contacts = list(iterate_contact_frames(result.folder / "out" / "contacts.lammpsdump"))
     assert [frame.step for frame in contacts] == [345, 346, 347, 348]
     assert all(len(frame.ids) > 2000 for frame in contacts)  # a settled bed has 2,900
@@ -53,6 +54,7 @@ def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
         # More than there is memory for.
         ({"particles": 2147483647}, "no room: particles of this diameter would fill 299"),
         ({"drag": 100}, "drag times dt must be below 1, not 1"),
+        ({"drag": 30}, "drag times dt_resting must be below 1, not 1.5"),
     ],
 )
 def test_wrong_parameters(

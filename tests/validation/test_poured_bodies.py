@@ -113,6 +113,7 @@ def test_overlap_of_every_step(name: str, tmp_path: Path) -> None:
     steps = {
         "steps_agitated": 150,
         "steps_settling": 100,
+        "steps_resting": 0,
         "steps_tightening": 0,
         "steps_measuring": 0,
     }

@@ -143,6 +143,7 @@ def test_overlap_of_every_step(name: str, tmp_path: Path) -> None:
     steps = {
         "steps_agitated": 250,
         "steps_settling": 100,
+        "steps_resting": 0,
         "steps_tightening": 0,
         "steps_measuring": 0,
     }
@@ -184,6 +185,8 @@ def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
                 "dump_every": 1000,
                 "steps_agitated": steps,
                 "steps_settling": 0,
+                "steps_resting": 0,
+                "dt_resting": 0.01,
                 "steps_tightening": 3,
                 "steps_measuring": 0,
             },
@@ -281,6 +284,7 @@ def test_kinetic_energy_and_momentum(tmp_path: Path) -> None:
             "dump_every": 1000,
             "steps_agitated": 300,
             "steps_settling": 100,
+            "steps_resting": 0,
             "steps_tightening": 0,
             "steps_measuring": 0,
         },

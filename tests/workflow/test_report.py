@@ -486,7 +486,7 @@ def test_overlap_is_compared_with_the_loosest_tolerance() -> None:
 
 def test_results_of_an_older_deck_group_with_newer_ones(tmp_path: Path) -> None:
     old = measured(seed=1)
-    new = measured(seed=2, solver="apgd", tolerance_measuring=0.0001)
+    new = measured(seed=2, solver="apgd", tolerance_measuring=0.00001)
     data = read_data([write(tmp_path / "a.h5", study("own", [old, new]))])
     first, second = (result.variables for result in data.studies["own"].results)
     assert first["solver"] == "apgd"

@@ -35,7 +35,7 @@ Damage = Callable[[Path], None]
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of two cases: 30 spheres in contact, of two seeds."""
     folder = tmp_path_factory.mktemp("story")
-    text = TINY.replace("{seeds}", "[1, 2]").replace("settling = 60", "settling = 100")
+    text = TINY.replace("{seeds}", "[1, 2]").replace("settling = 40", "settling = 80")
     (folder / "few.toml").write_text(text)
     done = inelastic("run", folder / "few.toml", "--out", folder / "out")
     assert (done.returncode, done.stderr) == (0, "")
@@ -176,12 +176,12 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "a contact less": (without_contact, f"{CONTACTS}: .* contacts at step 135, but"),
     "half a log": (
-        lines(lambda log: log[: len(log) // 2]),
+        lines(lambda log: log[: place(log, "Loop", 0) + 1]),
         f"{LOG}: its end is missing, and what is there does not tell of {PARTICLES} and",
     ),
     "a log cut in a run": (
         lines(lambda log: log[: place(log, "Loop", 2)]),
-        f"{LOG}: nothing after step 120 of the run that begins at step 20: it is still under way",
+        f"{LOG}: nothing after step 100 of the run that begins at step 20: it is still under way",
     ),
     "a log cut between runs": (
         lines(lambda log: log[: place(log, "Loop", 2) + 1]),
@@ -189,7 +189,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "a log without a run": (
         without_run(2),
-        f"{LOG}, line .*: a run begins at step 120, but the one before it ended at step 20",
+        f"{LOG}, line .*: a run begins at step 100, but the one before it ended at step 20",
     ),
     "a log without a line": (
         lines(lambda log: [line for line in log if not re.match(r"\s+60 ", line)]),
@@ -445,12 +445,20 @@ def lmp(folder: Path, deck: str, **variables: object) -> Path:
 def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the start of a packing, `start`, which took no steps."""
     folder = tmp_path_factory.mktemp("start")
-    none = dict.fromkeys([f"steps_{n}" for n in ("agitated", "settling", "tightening")], 0)
+    none = dict.fromkeys(
+        [f"steps_{n}" for n in ("agitated", "settling", "resting", "tightening")], 0
+    )
     lmp(folder, "spheres", particles=30, diameter=0.2, steps_measuring=0, out="start", **none)
     return folder
 
 
-SHORT = {"steps_agitated": 30, "steps_settling": 70, "steps_tightening": 7, "steps_measuring": 4}
+SHORT = {
+    "steps_agitated": 30,
+    "steps_settling": 40,
+    "steps_resting": 30,
+    "steps_tightening": 7,
+    "steps_measuring": 4,
+}
 FEW = {"particles": 30, "diameter": 0.2}
 SETTLING = {"packing": "start/packing.restart", "diameter": 0.2, "time_settling": 0.7}
 

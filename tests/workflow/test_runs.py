@@ -104,7 +104,7 @@ def test_every_dataset_is_in_the_schema(undisturbed: Path) -> None:
 def test_what_is_measured_of_dimers(tmp_path: Path, write_study: Callable[..., Path]) -> None:
     dimers = TINY.replace('deck = "spheres"', 'deck = "dimers"').replace("{seeds}", "1")
     # Long enough to land on one another
-    dimers = dimers.replace("settling = 60", "settling = 250").replace(
+    dimers = dimers.replace("settling = 40", "settling = 230").replace(
         "points = 1000", "points = 20000"
     )
     study = write_study(dimers)
@@ -380,7 +380,7 @@ def test_an_error_on_one_rank_ends_the_job(tmp_path: Path) -> None:
 @pytest.mark.parametrize("timeout", ["0.3", "1.4"])
 def test_in_a_job_a_run_that_is_cut_short_is_late(tmp_path: Path, timeout: float) -> None:
     path = one_case(tmp_path)
-    path.write_text(path.read_text().replace("steps_settling = 60", "steps_settling = 1000000"))
+    path.write_text(path.read_text().replace("steps_settling = 40", "steps_settling = 1000000"))
     done = inelastic("run", path, "--out", tmp_path / "out", "--mpi", "--timeout", timeout, ranks=1)
     assert done.returncode == 1
     assert f"timed out after {timeout} s" in done.stdout

@@ -104,7 +104,7 @@ def mistakes_of(path: Path) -> list[str]:
             HEAD + "[outputs]\npictures = ['0']",
             "must be a whole number from 0 to 92233720368547758",
         ),
-        (HEAD + "[outputs]\npictures = [1271]", "it must be a step from 0 to 1270, where the long"),
+        (HEAD + "[outputs]\npictures = [736]", "it must be a step from 0 to 735, where the long"),
         (
             HEAD + "[outputs]\npictures = [0, 0]",
             "they must be at most 100 steps, each of them once",
@@ -217,7 +217,7 @@ def test_a_row_whose_deck_does_not_fit(write_study: Callable[..., Path]) -> None
 
 def test_pictures_of_the_longest_case(write_study: Callable[..., Path]) -> None:
     """Of a shorter one the last frame is drawn, so that a study may mix them."""
-    text = HEAD + "[parameters]\nsteps_settling = [100, 2000]\n[outputs]\npictures = [0, 2470]"
+    text = HEAD + "[parameters]\nsteps_settling = [100, 2000]\n[outputs]\npictures = [0, 2535]"
     assert len(read_study(write_study(text)).cases) == 2
 
 

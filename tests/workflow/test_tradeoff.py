@@ -503,7 +503,8 @@ def test_two_ranks_are_kept_apart(tmp_path: Path) -> None:
 def test_settling_in_a_study(write_study: Callable[..., Path], tmp_path: Path) -> None:
     study = write_study(
         'title = "t"\ndeck = ["spheres", "settling"]\n[parameters]\nparticles = 60\n'
-        "diameter = 0.3\nsteps_agitated = 0\nsteps_settling = 0\nsteps_tightening = 0\n"
+        "diameter = 0.3\nsteps_agitated = 0\nsteps_settling = 0\nsteps_resting = 0\n"
+        "steps_tightening = 0\n"
         'steps_measuring = 0\ncontacts = ["hard", "soft"]\n[outputs]\nnetwork = true\n'
     )
     assert main(["run", str(study), "--out", str(tmp_path / "out")]) == 0

@@ -85,12 +85,16 @@ def read_data(paths: Iterable[Path]) -> Data:
 def _completed(result: Result) -> Result:
     """Return a result that has all variables of today's decks, so that it groups with newer ones.
 
-    A deck had no such choice before it had the variable: it did what the default does.
+    A deck had no such choice before it had the variable: it did what the default does, but for the
+    phase of rest, which version 0.1 had not.
     """
-    stages = [
-        {**stage, "variables": {**deck_defaults(stage["deck"]), **stage["variables"]}}
-        for stage in result.record["stages"]
-    ]
+    stages = []
+    for stage in result.record["stages"]:
+        known = stage["variables"]
+        defaults = dict(deck_defaults(stage["deck"]))
+        if "steps_resting" in defaults:
+            defaults |= {"steps_resting": 0, "dt_resting": known.get("dt", defaults["dt"])}
+        stages.append({**stage, "variables": {**defaults, **known}})
     return replace(result, record={**result.record, "stages": stages})
 
 

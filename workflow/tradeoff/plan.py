@@ -21,6 +21,7 @@ from ..study import INPUTS, Case, Input, stage_of
 NO_STEPS: Mapping[str, Value] = {
     "steps_agitated": 0,
     "steps_settling": 0,
+    "steps_resting": 0,
     "steps_tightening": 0,
     "steps_measuring": 0,
 }
