@@ -65,8 +65,9 @@ struct Step {
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
 
-  // [length] The residual to which the last step was solved (core/solver.h).
-  double target = EXTREME;
+  // [length] The residual to which the last step was solved (core/solver.h). Before the first one, at
+  // which nothing is known, overlaps give nothing back.
+  double target = 0.0;
 
   // This is known after constraints were collected.
   Phase phase = Phase::CONTACT;

@@ -71,7 +71,7 @@ def record(scene: Scene, folder: Path) -> dict[str, Recorded]:
     values: dict[str, object] = {"particles": scene.particles, "diameter": scene.diameter}
     if scene.aspect_ratio is not None:
         values["aspect_ratio"] = scene.aspect_ratio
-    phases = ("agitated", "settling", "tightening", "measuring")
+    phases = ("agitated", "settling", "resting", "tightening", "measuring")
     run_deck(
         folder / "start", shipped_deck(scene.particle), values | {f"steps_{p}": 0 for p in phases}
     )

@@ -329,3 +329,36 @@ def test_accuracy(accuracy: float, tmp_path: Path, lmp: Runner) -> None:
     opening = [(v[k] - v[0]) @ points[k] for k in range(1, 6)]
     # It is a part of the largest approach, 1.3, and what an overlap gives back is as much again.
     assert max(map(abs, opening)) <= 2.6 * accuracy
+
+
+def test_overlaps_of_the_start_are_no_velocity(tmp_path: Path, lmp: Runner) -> None:
+    """A restart file, or a data file, may hold overlaps that were allowed."""
+    case = (0.1, 1e-3, 0.01)
+    points = np.array([[-0.5 + 4e-4, 0, 0], [0.5 - 4e-4, 0, 0]])
+    frames = moved(lmp, free_scene(points, np.zeros((2, 3)), case, tmp_path), 30)
+    # What an overlap gives back is what velocities are resolved to, and here nothing moves.
+    assert np.abs(relative_to_approach(frames[-1], case)).max() <= LEFT
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_gas_in_parts(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    """Divided runs, and one that goes on from a restart file: no energy comes in between."""
+    points = random_points(85, ((0.0, 5.0),) * 3, 2 * RADIUS * 1.001, seed=4)
+    velocities = np.random.default_rng(4).normal(size=points.shape)
+    deck = scene(
+        points,
+        RADIUS,
+        tmp_path,
+        tolerance=1e-2,
+        velocities=(velocities - velocities.mean(axis=0)) * 1e-2 / 0.01,
+        box=PERIODIC,
+        boundary="p p p",
+        timestep=0.01,
+        gravity=False,
+        options="shorten yes",
+    )
+    first = lmp(deck + 4 * "run 15\n" + "write_restart half.restart\n", ranks=ranks)
+    again = deck.replace("read_data spheres.data", "read_restart half.restart")
+    second = lmp(again + 4 * "run 15\n", ranks=ranks)
+    energy = np.concatenate([part["KinEng"] for run in (first, second) for part in run.runs])
+    assert_cools(energy)

@@ -60,7 +60,7 @@ class Measured:
     overlap: float  # largest of all steps
     feasibility: float
     complementarity: float
-    # Kinetic energy of a step's projection beyond what overlaps and residuals account for, relative
+    # Kinetic energy of a step's projection beyond what its constraints account for, relative
     energy: float
 
     def __str__(self) -> str:
@@ -97,9 +97,11 @@ def residuals(path: Path, box: object) -> tuple[float, float, float]:
     under_force = p["impulse"] > 0
     w = (p["gap"] + h * np.sum(p["normal"] * relative, axis=1))[under_force]
     energy = [0.5 * float(p["mass"] @ (u**2).sum(axis=1)) for u in (p["predicted_velocity"], v)]
-    explained = float(p["impulse"] @ (np.maximum(0.0, -p["gap"]) + eps)) / h
+    # What constraints give back of overlaps, and what gap is left where a force acts.
+    left = max([0.0, *w])
+    explained = float(p["impulse"] @ (np.maximum(0.0, -p["gap"]) + left)) / h
     gained = (energy[1] - energy[0] - explained) / max(energy[0], 1e-300)
-    return max(lacking) / eps, max([0.0, *w]) / eps, max(0.0, gained)
+    return max(lacking) / eps, left / eps, max(0.0, gained)
 
 
 def measured(folder: Path, eps: float, box: Any = DEFAULT_BOX) -> Measured:
@@ -790,9 +792,8 @@ def test_other_units(length: float, gravity: float, tmp_path: Path) -> None:
 def test_long_rest(tmp_path: Path) -> None:
     """100,000 steps of 300 settled spheres, in a bed of about ten layers.
 
-    Every contact may be anywhere between a gap of 0 and an overlap of eps, and in a step every
-    layer may move by eps against the one below: ten layers bound what the centre of mass may do,
-    and ten eps a step the velocities.
+    Every contact may be anywhere between a gap of 0 and an overlap of eps, and rattlers move: ten
+    layers bound what the centre of mass may do. The velocities are what the solver leaves over.
     """
     box = ((0, 0.6), (0, 5), (0, 0.6))
     deck = scene(
@@ -826,7 +827,8 @@ def test_long_rest(tmp_path: Path) -> None:
         f"{said:g} (of all steps)"
     )
     assert max(drift) <= layers
-    assert speed <= layers * EPS / STEP
+    # 1.1 was measured.
+    assert speed <= 2 * EPS / STEP
     assert max(depth / EPS, said) <= SLACK
 
 
