@@ -208,6 +208,12 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   if (known && is_same_plane(existing->second, n))
     return rules_.follow(existing->second, gap, too_deep);
   if (!too_deep) return 0;
+  // Behind a periodic boundary a sphere that passes an obstacle in one step sees its far side: a plane
+  // there would throw it on. The step is too long.
+  if (is_image(from) && view.convex && to_plane < -step_.settings.tolerance) {
+    step_.excess = std::max(step_.excess, -gap_there);
+    return 0;
+  }
   inelastic::ContactProblem &problem = step_.problem;
   constraint_[key(i, view.wall)] = problem.contacts.size();
   problem.contacts.add(i, problem.particles, view.normal, gap, 0.0);
