@@ -41,8 +41,6 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     summary_(lmp, step_, clock_), record_(lmp, step_, ranks_, state_.contact_memory())
 {
   if (bodies_) movers_.push_back(bodies_.get());
-  if (!solver_)
-    error->all(FLERR, "Fix inelastic solver must be apgd or uzawa, not {}", settings_.solver);
   constraints_.walls().init();
   if (!atom->radius_flag)
     error->all(FLERR, "Fix inelastic needs spheres with a radius: use atom_style sphere");
@@ -343,7 +341,11 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   const double reach = (settings_.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
   inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
   // A push is no momentum.
-  if (step_.phase == Phase::CONTACT) limits.accuracy = settings_.accuracy;
+  if (step_.phase == Phase::CONTACT) {
+    constexpr double LEAST = 0.5;    // of the last target: GapRules::contact_gap
+    limits.accuracy = settings_.accuracy;
+    limits.enough = LEAST * step_.target;
+  }
   const inelastic::ProjectionResult result = inelastic::project(
       step_.problem, constraints_, *solver_, limits, MAX_ROUNDS, ranks_, step_.velocity);
   if (result.status != inelastic::Status::CONVERGED) unsolved_.note_worst(result);

@@ -1,5 +1,7 @@
 #include "fix_settings.h"
 
+#include "make_solver.h"
+
 #include "group.h"
 #include "lammps.h"
 #include "utils.h"
@@ -35,6 +37,7 @@ class Reader {
  private:
   void read_regions(const char *first);
   void read_rigid(const char *fix_id);
+  void read_solver(const char *name);
   void read_max_iterations(const char *value);
   void read_frozen(const char *group_id);
   void read_record(const char *file);
@@ -66,7 +69,7 @@ void Reader::read_keywords()
     else if (keyword == "accuracy")
       settings_.accuracy = read_accuracy(lmp_, value, at_ - 1);
     else if (keyword == "solver")
-      settings_.solver = value;
+      read_solver(value);
     else if (keyword == "maxiter")
       read_max_iterations(value);
     else if (keyword == "frozen")
@@ -95,6 +98,13 @@ void Reader::read_rigid(const char *fix_id)
   ++at_;
   settings_.rigid_fix = fix_id;
   settings_.inertia = inertia == "point" ? Inertia::POINT : Inertia::SOLID;
+}
+
+void Reader::read_solver(const char *name)
+{
+  if (!inelastic::make_solver(name))
+    error_->all(FLERR, at_ - 1, "Fix inelastic solver must be apgd or uzawa, not {}", name);
+  settings_.solver = name;
 }
 
 void Reader::read_max_iterations(const char *value)

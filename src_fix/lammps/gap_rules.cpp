@@ -12,14 +12,17 @@ constexpr double RELINEARISE_BEYOND = 1.1;
 }    // namespace
 
 // What an overlap gives back in a step stays in the velocities: it is no more than what velocities are
-// resolved to. So small a gap under a force is closed already; the solver ends within one target more.
+// resolved to. A gap under a force that is so small is closed already. This asks for more than the
+// geometry does, which may have no room for it, but for less than the residual that is allowed: the
+// target of this step is at least half of the last one (FixInelastic::project).
 double GapRules::contact_gap(const Side &side) const
 {
   const double tolerance = step_.settings.tolerance;
   const double target = std::min(step_.target, tolerance);
   const double gap = side.gap_now;
   if (gap < 0.0) return std::max(gap, -target);
-  return side.pressed ? std::max(0.0, gap - std::min(target, tolerance - target)) : gap;
+  constexpr double CLOSED = 0.25;    // of a target
+  return side.pressed ? std::max(0.0, gap - std::min(CLOSED * target, tolerance - target)) : gap;
 }
 
 double GapRules::effective_gap(const Side &side) const

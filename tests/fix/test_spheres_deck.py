@@ -63,3 +63,12 @@ def test_wrong_parameters(
     """One line says what is wrong."""
     deck = (files("lammps_inelastic.inputs") / "spheres.in").read_text()
     assert named in refused(deck, variables=variables)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_spheres_that_fit_exactly(seed: int, lmp: Runner) -> None:
+    """Five fill the width: no gap in their row may be taken for closed without room for it."""
+    deck = (files("lammps_inelastic.inputs") / "spheres.in").read_text()
+    steps = {"steps_agitated": 20, "steps_settling": 1500, "dump_every": 500}
+    result = lmp(deck, variables={"particles": 30, "diameter": 0.2, "seed": seed, **steps})
+    assert result.runs[-1]["overlap"].max() <= 0.00001 * 0.1 * (1 + 1e-6)  # round-off
