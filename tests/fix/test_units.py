@@ -67,7 +67,8 @@ def test_units(units: str, inertia: str, tmp_path: Path, lmp: Runner) -> None:
     positions, forces = run("lj", deck, tmp_path, lmp)
     assert np.abs(forces).max() > 1
     same_positions, same_forces = run(units, deck, tmp_path, lmp)
-    # Round-off of the conversion, which collisions amplify.
-    assert np.abs(same_positions - positions).max() <= 1e-8 * RADIUS
-    # What the tolerance leaves undecided of forces is larger, but the iterations are the same.
-    assert np.abs(same_forces - forces).max() <= 1e-5
+    # Where round-off of the conversion takes an iteration more or less, a residual of the accuracy
+    # makes the difference, which collisions amplify.
+    assert np.abs(same_positions - positions).max() <= 1e-6 * RADIUS
+    # In weights; the accuracy leaves forces undecided by some 1e-3 of their mean.
+    assert np.abs(same_forces - forces).max() <= 1e-4
