@@ -233,26 +233,33 @@ PERIODIC = ((0.0, 6.001),) * 3
 GASES = ((0.3, 1e-2, 300), (3.0, 1e-3, 300), (100.0, 1e-3, 30), (1e3, 1e-4, 30), (1.0, 1e-2, 100))
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("gas", GASES, ids=str)
-def test_a_gas_of_spheres(
-    gas: tuple[float, float, int], solver: str, tmp_path: Path, lmp: Runner
-) -> None:
-    speed, tolerance, steps = gas
-    points = random_points(85, ((0.0, 5.0),) * 3, 2 * RADIUS * 1.001, seed=3)
-    velocities = np.random.default_rng(3).normal(size=points.shape)
-    deck = scene(
+def gas_of_spheres(
+    folder: Path, seed: int, speed: float, tolerance: float, options: str = ""
+) -> str:
+    """Return a deck of 85 spheres; the mean square of each component is `speed` squared."""
+    points = random_points(85, ((0.0, 5.0),) * 3, 2 * RADIUS * 1.001, seed=seed)
+    velocities = np.random.default_rng(seed).normal(size=points.shape)
+    return scene(
         points,
         RADIUS,
-        tmp_path,
+        folder,
         tolerance=tolerance,
         velocities=(velocities - velocities.mean(axis=0)) * speed * tolerance / 0.01,
         box=PERIODIC,
         boundary="p p p",
         timestep=0.01,
         gravity=False,
-        options=f"solver {solver} shorten yes",
+        options=f"{options} shorten yes",
     )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("gas", GASES, ids=str)
+def test_a_gas_of_spheres(
+    gas: tuple[float, float, int], solver: str, tmp_path: Path, lmp: Runner
+) -> None:
+    speed, tolerance, steps = gas
+    deck = gas_of_spheres(tmp_path, 3, speed, tolerance, f"solver {solver}")
     frames = moved(lmp, deck, steps)
     assert_cools(kinetic_energy(frames))
     assert_momentum_kept(frames)
@@ -343,20 +350,7 @@ def test_overlaps_of_the_start_are_no_velocity(tmp_path: Path, lmp: Runner) -> N
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_gas_in_parts(ranks: int, tmp_path: Path, lmp: Runner) -> None:
     """Divided runs, and one that goes on from a restart file: no energy comes in between."""
-    points = random_points(85, ((0.0, 5.0),) * 3, 2 * RADIUS * 1.001, seed=4)
-    velocities = np.random.default_rng(4).normal(size=points.shape)
-    deck = scene(
-        points,
-        RADIUS,
-        tmp_path,
-        tolerance=1e-2,
-        velocities=(velocities - velocities.mean(axis=0)) * 1e-2 / 0.01,
-        box=PERIODIC,
-        boundary="p p p",
-        timestep=0.01,
-        gravity=False,
-        options="shorten yes",
-    )
+    deck = gas_of_spheres(tmp_path, 4, 1.0, 1e-2)
     first = lmp(deck + 4 * "run 15\n" + "write_restart half.restart\n", ranks=ranks)
     again = deck.replace("read_data spheres.data", "read_restart half.restart")
     second = lmp(again + 4 * "run 15\n", ranks=ranks)
