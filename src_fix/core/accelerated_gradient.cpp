@@ -181,6 +181,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   const Guess guess = judge_first_guess(problem, host);
   result.residual = guess.residual;
   result.target = target_residual(limits, guess);
+  result.change = guess.change();
   if (result.residual.largest() <= result.target)
     result.status = Status::CONVERGED;
   else if (!std::isfinite(result.residual.feasibility))

@@ -4,16 +4,19 @@
 // of the kinetic energy and keep every constraint of contact_set.h:
 //
 //   minimise over V:   1/2 (V - V*)^T M (V - V*)
-//   subject to         gap_c + h G_c . V >= 0      for every constraint c
+//   subject to         gap_c + h G_c . V >= 0      for every rigid constraint c
 //
 // M is the mass matrix, h the time step, and G_c . V = n_c . (v_first - v_second). The dual problem
 // has one impulse lambda_c per constraint; the optimality conditions are
 //
-//   V = V* + M^-1 G^T lambda,   w(lambda) = gap + h G V,   lambda >= 0,  w >= 0,  lambda . w = 0
+//   V = V* + M^-1 G^T lambda,   lambda >= 0,  w >= 0,  lambda . w = 0,
+//   w(lambda) = gap + h G V + C lambda
 //
-// w_c is a length: the gap at the end of the step as the linearised constraint sees it. The vector
-// w is the gradient of the dual function 1/2 lambda^T A lambda + (gap + h G V*)^T lambda, where A =
-// h G M^-1 G^T [time / mass].
+// C is diagonal and has the compliances. A rigid constraint has none; one with a compliance is a
+// spring, which costs 1 / (2 h) C_c lambda_c^2 beside the energy that is minimised. w_c is a length:
+// for a rigid constraint the gap at the end of the step as the linearised constraint sees it. The
+// vector w is the gradient of the dual function 1/2 lambda^T A lambda + (gap + h G V*)^T lambda,
+// where A = h G M^-1 G^T + C [time / mass].
 //
 // Every array per particle has one more entry than there are particles: a dummy particle that never
 // moves stands for all walls.
@@ -51,13 +54,18 @@ struct ContactProblem {
         : bodies.mobility(particle, direction);
   }
 
-  // Returns the diagonal entry of A for constraint c [time / mass]: the length by which a unit
-  // impulse of the constraint opens its own gap.
+  // Returns the diagonal entry of A for constraint c [time / mass]: what a unit impulse of the
+  // constraint adds to its own w.
   double diagonal(std::size_t c) const
   {
-    const double *const n = &contacts.normal[3 * c];
-    return timestep * (mobility(contacts.first[c], n) + mobility(contacts.second[c], n));
+    return mobility_of_pair(contacts.first[c], contacts.second[c], &contacts.normal[3 * c]) +
+        contacts.compliance[c];
   }
+
+  // Returns the length by which a unit impulse along n between two particles moves them apart in
+  // the step [time / mass].
+  double mobility_of_pair(int one, int other, const double *n) const
+  { return timestep * (mobility(one, n) + mobility(other, n)); }
 };
 
 }    // namespace inelastic

@@ -9,16 +9,18 @@ void ContactSet::clear()
   normal.clear();
   gap.clear();
   impulse.clear();
+  compliance.clear();
 }
 
 void ContactSet::add(int first_particle, int second_particle, const double *unit_normal,
-                     double gap_value, double impulse_guess)
+                     double gap_value, double impulse_guess, double compliance_value)
 {
   first.push_back(first_particle);
   second.push_back(second_particle);
   for (int d = 0; d < 3; ++d) normal.push_back(unit_normal[d]);
   gap.push_back(gap_value);
   impulse.push_back(impulse_guess);
+  compliance.push_back(compliance_value);
 }
 
 }    // namespace inelastic

@@ -2,7 +2,7 @@
 //
 // Constraint c keeps two particles, or a particle and a wall, apart during one time step:
 //
-//   gap_c + h n_c . (v_first - v_second) >= 0                                            [length]
+//   gap_c + h n_c . (v_first - v_second) + C_c lambda_c >= 0                             [length]
 //
 //   n_c    is a unit normal. It points from the second side to the first (from the wall to the
 //          particle).
@@ -10,6 +10,8 @@
 //          moves, its motion during the step is already in the gap, so that a wall has no velocity
 //          here.
 //   h      is the time step.
+//   C_c    is the compliance of the contact, 0 for a rigid one: under its impulse the gap may be
+//          smaller by C_c lambda_c.
 //
 // Each constraint carries one impulse lambda_c >= 0 [mass length / time]: +lambda_c n_c acts on the
 // first particle and -lambda_c n_c on the second.
@@ -27,11 +29,12 @@ struct ContactSet {
   std::vector<double> normal;     // 3 per constraint
   std::vector<double> gap;        // [length]
   std::vector<double> impulse;    // [mass length / time]
+  std::vector<double> compliance;    // [time / mass]
 
   std::size_t size() const { return gap.size(); }
   void clear();
   void add(int first_particle, int second_particle, const double *unit_normal, double gap_value,
-           double impulse_guess);
+           double impulse_guess, double compliance_value = 0.0);
 };
 
 }    // namespace inelastic

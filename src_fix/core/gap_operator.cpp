@@ -70,16 +70,18 @@ INELASTIC_CLONES void scatter_impulses(const ContactSet &contacts, const double 
   }
 }
 
-// Writes free_gap + h G change, one per constraint.
+// Writes free_gap + h G change + C impulse, one per constraint.
 INELASTIC_CLONES void gather_gaps(const ContactSet &contacts, const double *free_gap,
-                                  double timestep, const double *change, double *gap_at_end)
+                                  double timestep, const double *change, const double *impulse,
+                                  double *gap_at_end)
 {
   const std::size_t count = contacts.size();
   const int *const first = contacts.first.data();
   const int *const second = contacts.second.data();
+  const double *const compliance = contacts.compliance.data();
   const double *n = contacts.normal.data();
   for (std::size_t c = 0; c < count; ++c, n += 3)
-    gap_at_end[c] = free_gap[c] +
+    gap_at_end[c] = free_gap[c] + compliance[c] * impulse[c] +
         timestep *
             opening_speed(n, change + 3 * static_cast<std::size_t>(first[c]),
                           change + 3 * static_cast<std::size_t>(second[c]));
@@ -148,7 +150,8 @@ void GapOperator::apply(const ContactProblem &problem, const double *impulse, do
                         Host &host)
 {
   velocity_change(problem, impulse, host);
-  gather_gaps(problem.contacts, free_gap_.data(), problem.timestep, change_.data(), gap_at_end);
+  gather_gaps(problem.contacts, free_gap_.data(), problem.timestep, change_.data(), impulse,
+              gap_at_end);
 }
 
 void GapOperator::velocity(const ContactProblem &problem, const double *impulse, double *velocity,

@@ -1,6 +1,6 @@
 // The operator that gives the gaps at the end of the step for given impulses:
 //
-//   w(lambda) = gap + h G V* + A lambda,   A = h G M^-1 G^T
+//   w(lambda) = gap + h G V* + A lambda,   A = h G M^-1 G^T + C
 //
 // in the notation of contact_problem.h. Every verdict on impulses applies A through this class, in
 // double precision. (The iterations of accelerated_gradient.h have a fast form of their own.)

@@ -14,7 +14,8 @@ bool is_infeasible(const ContactProblem &problem, GapOperator &gap_operator,
   const std::vector<double> &free_gap = gap_operator.free_gap();
   double lacking = 0.0, farthest = 0.0;
   for (std::size_t c = 0; c < impulse.size(); ++c) {
-    lacking -= impulse[c] * (free_gap[c] + limits.tolerance);
+    const double give = problem.contacts.compliance[c] * impulse[c];
+    lacking -= impulse[c] * (free_gap[c] + give + limits.tolerance);
     farthest = std::max(farthest, -free_gap[c]);
   }
   for (int i = 0; i < problem.particles; ++i) {

@@ -147,6 +147,7 @@ void PackedIterations<Real>::pack_constraints(const ContactSet &contacts,
   ends_.resize(count);
   normal_.resize(count);
   diagonal_.resize(count);
+  compliance_.resize(count);
   impulse_.resize(count);
   const double per_length = 1.0 / scales.length;
   const double per_impulse = 1.0 / scales.impulse;
@@ -157,6 +158,7 @@ void PackedIterations<Real>::pack_constraints(const ContactSet &contacts,
     ends_[k] = {place<Real>(contacts.first[c]), place<Real>(contacts.second[c])};
     set_lanes(normal_[k], n[0], n[1], n[2], free_gap[c] * per_length);
     diagonal_[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
+    compliance_[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
     impulse_[k] = static_cast<Real>(contacts.impulse[c] * per_impulse);
   }
   impulse_before_ = impulse_;
@@ -229,6 +231,7 @@ packed::Pass<Real> PackedIterations<Real>::pass(double momentum, double step)
           ends_.data(),
           normal_.data(),
           diagonal_.data(),
+          compliance_.data(),
           impulse_.data(),
           impulse_before_.data(),
           gap_before_.data(),

@@ -63,7 +63,7 @@ template <typename Real> class PackedIterations {
   std::vector<std::size_t> source_;    // per packed constraint: its place in the problem
   std::vector<packed::Ends> ends_;
   std::vector<Vector> normal_;    // the fourth number is w(0)
-  std::vector<Real> diagonal_, impulse_, impulse_before_, gap_before_;
+  std::vector<Real> diagonal_, compliance_, impulse_, impulse_before_, gap_before_;
   std::vector<Real> inverse_mass_;    // per particle; 1 for particles in bodies
   std::vector<Vector> sum_, velocity_, ahead_;
   std::vector<packed::Rod<Real>> rods_;

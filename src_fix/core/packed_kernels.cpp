@@ -86,6 +86,7 @@ namespace {
       const Real *const impulse = pass.impulse + begin;
       Real *const next = pass.impulse_before + begin;
       const Real *const diagonal = pass.diagonal + begin;
+      const Real *const compliance = pass.compliance + begin;
       Real *const gap_before = pass.gap_before + begin;
       const Real momentum = pass.momentum, step = pass.step;
       const Real share = 1 / (1 + momentum);
@@ -95,14 +96,15 @@ namespace {
       for (std::size_t k = 0; k < size; ++k) {
         const Real last_change = impulse[k] - next[k];
         const Real ahead = impulse[k] + momentum * last_change;
-        const Real free = ahead - step * gap[k] / diagonal[k];
+        const Real there = gap[k] + compliance[k] * ahead;
+        const Real free = ahead - step * there / diagonal[k];
         const Real value = free > 0 ? free : 0;
         const Real change = value - impulse[k];
         uphill += (ahead - value) * change * diagonal[k];
         change_squared += change * change * diagonal[k];
-        // gap[k] is the gap of the impulses ahead. Gaps are affine in the impulses, so that
-        // gap = here + momentum * (here - gap_before), solved for the gap of the present impulses:
-        const Real here = (gap[k] + momentum * gap_before[k]) * share;
+        // This is w of the impulses ahead. It is affine in the impulses, so that
+        // there = here + momentum * (here - gap_before), solved for w of the present impulses:
+        const Real here = (there + momentum * gap_before[k]) * share;
         const Real under_force = impulse[k] > 0 ? here : 0;
         least = here < least ? here : least;
         most = under_force > most ? under_force : most;

@@ -61,6 +61,7 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
     result.iterations += solved.iterations;
     result.residual = solved.residual;
     result.target = std::max(result.target, solved.target);
+    result.change = std::max(result.change, solved.change);
     result.round_off = solved.round_off;
     result.trend = solved.trend;
 

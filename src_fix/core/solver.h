@@ -103,12 +103,15 @@ struct Guess {
   // [length] The largest gap without impulses, or change by an impulse.
   double largest_length = 0.0;
   double largest_diagonal = 0.0;    // [time / mass] of A
+  // [length] What contacts change in the step: what the guess does, or what it lacks.
+  double change() const { return std::max(mean_change, residual.largest()); }
+
   // lambda . w(lambda) and lambda . w(0) [mass length^2 / time]
   double along = 0.0, along_free = 0.0;
 };
 
-// Returns the residual [length] at which the iterations end: the accuracy times what contacts change,
-// or times what the first guess lacks, whichever is more; at most the tolerance.
+// Returns the residual [length] at which the iterations end: the accuracy times what the first guess
+// lacks, or times a tenth of what it does, whichever is more; at most the tolerance.
 double target_residual(const SolverLimits &limits, const Guess &guess);
 
 struct SolverResult {
@@ -116,6 +119,7 @@ struct SolverResult {
   long iterations = 0;
   Residual residual;         // over all ranks
   double target = 0.0;       // [length] the residual that was asked for; reached if CONVERGED
+  double change = 0.0;       // [length] what contacts change in the step (Guess::change)
   double round_off = 0.0;    // [length] of the gaps where impulses act; no residual gets below it
   ResidualTrend trend;
 };

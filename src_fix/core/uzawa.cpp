@@ -14,7 +14,9 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
   gap_operator_.prepare(problem);
 
   SolverResult result;
-  result.target = target_residual(limits, judge_first_guess(problem, host));
+  const Guess guess = judge_first_guess(problem, host);
+  result.target = target_residual(limits, guess);
+  result.change = guess.change();
   std::fill(contacts.impulse.begin(), contacts.impulse.end(), 0.0);
   const auto ended = [&](Status status) {
     result.status = status;

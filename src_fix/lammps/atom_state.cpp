@@ -32,10 +32,13 @@ void AtomState::remember_contacts(GhostExchange &ranks)
     if (!(problem.contacts.impulse[c] > 0.0)) continue;
     const int i = problem.contacts.first[c];
     const int j = problem.contacts.second[c];
-    const int wall = step_.sides[c].wall;
-    const double strength = problem.contacts.impulse[c] * force_per_impulse;
-    memory_.remember(i, wall ? -wall : atom->tag[j], strength);
-    if (!wall) memory_.remember(j, atom->tag[i], strength);
+    const Side &side = step_.sides[c];
+    const int wall = side.wall;
+    const double force = problem.contacts.impulse[c] * force_per_impulse;
+    const ContactMemory::Contact contact = {
+        force, ContactMemory::next_sustained(side.sustained, force), side.preload};
+    memory_.remember(i, wall ? -wall : atom->tag[j], contact);
+    if (!wall) memory_.remember(j, atom->tag[i], contact);
   }
   ranks.gather_memory(memory_);
   double most = 0.0;

@@ -1,5 +1,6 @@
-// The contact forces of the last step, kept per atom so that they follow the atoms through
-// neighbour list rebuilds and from rank to rank: the first guess of the next step.
+// The contacts of the last step, kept per atom so that they follow the atoms through neighbour list
+// rebuilds and from rank to rank: the first guess of the next step, and what makes a contact at rest a
+// spring (gap_rules.h).
 
 #ifndef INELASTIC_CONTACT_MEMORY_H
 #define INELASTIC_CONTACT_MEMORY_H
@@ -13,7 +14,23 @@ namespace LAMMPS_NS {
 
 class ContactMemory {
  public:
-  // The most contacts that a ghost tells its owned atom; what is beyond loses only a first guess.
+  struct Contact {
+    double force = 0.0;        // [force] of the last step
+    double sustained = 0.0;    // [force] what it has carried for long (next_sustained)
+    double preload = NONE;     // [force] at which the spring's gap is zero; NONE = no spring
+  };
+  static constexpr double NONE = -1.0;
+
+  // A contact's sustained force grows by a factor a step from a small part of its first force, so that no
+  // impact, which takes a few steps, is among it.
+  static double next_sustained(double last, double force)
+  {
+    constexpr double FIRST_PART = 1.0e-4, GROWTH = 2.0;
+    return last > 0.0 ? std::min(force, GROWTH * last) : FIRST_PART * force;
+  }
+
+  // The most contacts that a ghost tells its owned atom; what is beyond loses only a first guess, and
+  // is rigid for two steps.
   static constexpr int SHARED_PARTNERS = 16;
 
   void resize(int atoms) { remembered_.resize(atoms); }
@@ -21,23 +38,23 @@ class ContactMemory {
   void forget(int atom) { remembered_[atom].clear(); }
 
   // partner: the other atom's ID, or minus the wall's number.
-  void remember(int atom, tagint partner, double force)
-  { remembered_[atom].push_back({partner, force}); }
+  void remember(int atom, tagint partner, const Contact &contact)
+  { remembered_[atom].push_back({partner, contact}); }
 
-  // Zero when nothing is remembered.
-  double force(int atom, tagint partner) const
+  // Without a force when nothing is remembered.
+  Contact find(int atom, tagint partner) const
   {
     for (const Entry &entry : remembered_[atom])
-      if (entry.partner == partner) return entry.force;
-    return 0.0;
+      if (entry.partner == partner) return entry.contact;
+    return {};
   }
 
   int number_of_partners(int atom) const { return static_cast<int>(remembered_[atom].size()); }
 
   void copy(int from, int to) { remembered_[to] = remembered_[from]; }
 
-  // Buffer layout: number of partners, then partner and force of each.
-  static constexpr int packed_size(int partners) { return 1 + 2 * partners; }
+  // Buffer layout: number of partners, then partner, force, sustained force and preload of each.
+  static constexpr int packed_size(int partners) { return 1 + 4 * partners; }
 
   // At most `partners` of them.
   int pack(int atom, double *buffer, int partners) const
@@ -46,8 +63,11 @@ class ContactMemory {
     int m = 0;
     buffer[m++] = packed;
     for (int k = 0; k < packed; ++k) {
-      buffer[m++] = static_cast<double>(remembered_[atom][k].partner);
-      buffer[m++] = remembered_[atom][k].force;
+      const Entry &entry = remembered_[atom][k];
+      buffer[m++] = static_cast<double>(entry.partner);
+      buffer[m++] = entry.contact.force;
+      buffer[m++] = entry.contact.sustained;
+      buffer[m++] = entry.contact.preload;
     }
     return m;
   }
@@ -57,15 +77,15 @@ class ContactMemory {
   {
     int m = 0;
     const int partners = static_cast<int>(buffer[m++]);
-    for (int k = 0; k < partners; ++k, m += 2)
-      remember(atom, static_cast<tagint>(buffer[m]), buffer[m + 1]);
+    for (int k = 0; k < partners; ++k, m += 4)
+      remember(atom, static_cast<tagint>(buffer[m]), {buffer[m + 1], buffer[m + 2], buffer[m + 3]});
     return m;
   }
 
  private:
   struct Entry {
     tagint partner;
-    double force;
+    Contact contact;
   };
   std::vector<std::vector<Entry>> remembered_;
 };

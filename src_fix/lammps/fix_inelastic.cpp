@@ -291,7 +291,7 @@ inelastic::ProjectionResult FixInelastic::solve(Kick kick)
     predict(kick);
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
-    const double target = result.target;
+    const double target = result.target, change = result.change;
     constraints_.overlaps().share();
     if (settings_.record_every > 0 && kick == Kick::WHOLE &&
         update->ntimestep % settings_.record_every == 0)
@@ -313,6 +313,7 @@ inelastic::ProjectionResult FixInelastic::solve(Kick kick)
     }
     if (length_.accepts(unsolved_.named())) {
       step_.target = target;
+      step_.change = change;
       return result;
     }
   }

@@ -8,6 +8,8 @@ namespace {
 
 // In tolerances: a smaller overlap at the end of the step changes no constraint.
 constexpr double RELINEARISE_BEYOND = 1.1;
+// The gap of a contact at rest differs from zero by at most this part of the tolerance.
+constexpr double ELASTIC_RANGE = 0.25;
 
 }    // namespace
 
@@ -20,9 +22,40 @@ double GapRules::contact_gap(const Side &side) const
   const double tolerance = step_.settings.tolerance;
   const double target = std::min(step_.target, tolerance);
   const double gap = side.gap_now;
+  if (side.compliance > 0.0) return std::max(gap, -ELASTIC_RANGE * tolerance - target);
   if (gap < 0.0) return std::max(gap, -target);
   constexpr double CLOSED = 0.25;    // of a target
-  return side.pressed ? std::max(0.0, gap - std::min(CLOSED * target, tolerance - target)) : gap;
+  return side.force > 0.0 ? std::max(0.0, gap - std::min(CLOSED * target, tolerance - target))
+                          : gap;
+}
+
+void GapRules::rest(Side &side, const ContactMemory::Contact &known, double diagonal) const
+{
+  // A softer contact costs fewer iterations, but gives way to a larger change of its force. (Beyond
+  // three times as much the spring slides all the time, and the bed does not come to rest.)
+  constexpr double MOST_COMPLIANCE = 0.03, PER_ACCURACY = 30.0, PER_TOLERANCE = 0.3;
+  const double tolerance = step_.settings.tolerance;
+  constexpr double AT_REST = 0.5;    // of the force is sustained
+  side.force = known.force;
+  side.sustained = known.sustained;
+  const bool at_rest = known.force > 0.0 && known.sustained >= AT_REST * known.force;
+  if (!at_rest || !(step_.change > 0.0) || overlaps_.is_bad(side.gap_now)) return;
+  side.compliance = diagonal *
+      std::min({MOST_COMPLIANCE, PER_ACCURACY * step_.settings.accuracy,
+                PER_TOLERANCE * tolerance / step_.change});
+  const double length_per_force = side.compliance * step_.impulse_per_force;
+  const double range = ELASTIC_RANGE * tolerance / length_per_force;
+  const double preload = known.preload == ContactMemory::NONE
+      ? known.sustained + side.gap_now / length_per_force
+      : known.preload;
+  side.preload =
+      std::max(0.0, std::clamp(preload, known.sustained - range, known.sustained + range));
+}
+
+double GapRules::asked_gap(const Side &side) const
+{
+  return effective_gap(side) - side.wall_motion -
+      side.compliance * step_.impulse_per_force * std::max(0.0, side.preload);
 }
 
 double GapRules::effective_gap(const Side &side) const
@@ -60,8 +93,9 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     const Side &side = step_.sides[c];
     // Gaps that were set by the end of the step are kept there by follow().
     const double linear_gap = side.gap_now - side.wall_motion;
-    const bool as_at_start = contacts.gap[c] == effective_gap(side) - side.wall_motion;
-    if (!as_at_start || overlaps_.is_bad(side.gap_now) || contacts.gap[c] == linear_gap) continue;
+    const bool as_at_start = contacts.gap[c] == asked_gap(side);
+    const bool asks_for_all = contacts.gap[c] == linear_gap && contacts.compliance[c] == 0.0;
+    if (!as_at_start || asks_for_all || overlaps_.is_bad(side.gap_now)) continue;
     const int i = contacts.first[c], j = contacts.second[c];
     const bool is_wall = side.wall != 0;
     if (step_.is_member(i) || (!is_wall && step_.is_member(j))) continue;
@@ -72,6 +106,7 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     const double at_end = linear_gap + h * opening;
     if (at_end >= -tolerance && (at_end <= tolerance || contacts.impulse[c] == 0.0)) continue;
     contacts.gap[c] = linear_gap;
+    contacts.compliance[c] = 0.0;
     ++changed;
   }
   return changed;
@@ -84,12 +119,14 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
   const double linear_gap = effective_gap(side) - side.wall_motion;
   const double gap = std::min(exact_gap, linear_gap);
   if (!too_deep) {
+    const double asked = contacts.gap[c] + contacts.compliance[c] * contacts.impulse[c];
     const bool worth_it = contacts.impulse[c] > 0.0 &&
-        gap - contacts.gap[c] > RELINEARISE_BEYOND * step_.settings.tolerance &&
+        gap - asked > RELINEARISE_BEYOND * step_.settings.tolerance &&
         step_.relinearisations <= MAX_RELINEARISATIONS / 2;
     if (!worth_it) return 0;
   }
   contacts.gap[c] = gap;
+  contacts.compliance[c] = 0.0;
   side.followed = step_.is_member(contacts.first[c]) ||
       (side.wall == 0 && step_.is_member(contacts.second[c]));
   return 1;

@@ -123,9 +123,10 @@ void PairConstraints::take(std::size_t slot, int i, int j)
           "atom {} overlaps its own periodic image: the box is too small", atom->tag[i]);
     return;
   }
-  const double force = memory_.force(i, atom->tag[j]);
-  const Side side = {0, gap, size, 0.0, force > 0.0};
-  problem.contacts.add(i, j, normal, rules_.effective_gap(side), step_.impulse_per_force * force);
+  Side side = {0, gap, size, 0.0};
+  rules_.rest(side, memory_.find(i, atom->tag[j]), problem.mobility_of_pair(i, j, normal));
+  problem.contacts.add(i, j, normal, rules_.asked_gap(side), step_.impulse_per_force * side.force,
+                       side.compliance);
   step_.sides.push_back(side);
 }
 

@@ -4,6 +4,7 @@
 #ifndef INELASTIC_STEP_H
 #define INELASTIC_STEP_H
 
+#include "contact_memory.h"
 #include "contact_problem.h"
 #include "fix_settings.h"
 #include "vector3.h"
@@ -35,11 +36,15 @@ constexpr double EXTREME = 1.0e300;
 
 // The row beside each constraint of the problem.
 struct Side {
-  int wall;                 // the wall's number; 0 = the second side is a particle
-  double gap_now;           // [length] at the present positions
-  double size;              // [length] the sum of the two radii; the radius at a wall
-  double wall_motion;       // [length] by how much the wall closes the gap during the step
-  bool pressed = false;     // the last step left a force
+  int wall;                  // the wall's number; 0 = the second side is a particle
+  double gap_now;            // [length] at the present positions
+  double size;               // [length] the sum of the two radii; the radius at a wall
+  double wall_motion;        // [length] by how much the wall closes the gap during the step
+  double force = 0.0;        // [force] that the last step left
+  double sustained = 0.0;    // [force] see contact_memory.h
+  // Of a contact at rest, which is a spring (gap_rules.h):
+  double compliance = 0.0;                 // [time / mass] 0 = rigid
+  double preload = ContactMemory::NONE;    // [force] at which its gap is zero
   bool followed = false;    // the gap was set by where an earlier solution of the step ends
 };
 
@@ -68,6 +73,9 @@ struct Step {
   // [length] The residual to which the last step was solved (core/solver.h). Before the first one, at
   // which nothing is known, overlaps give nothing back.
   double target = 0.0;
+
+  // [length] What contacts changed in the last step (core/solver.h).
+  double change = 0.0;
 
   // This is known after constraints were collected.
   Phase phase = Phase::CONTACT;

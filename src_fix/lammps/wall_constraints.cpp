@@ -144,10 +144,11 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
   const double gap_now = view.distance_now - size;
   const double motion = view.distance_now - view.distance;
   constraint_[key(i, view.wall)] = problem.contacts.size();
-  const double force = memory_.force(i, -view.wall);
-  const Side side = {view.wall, gap_now, size, motion, force > 0.0};
-  problem.contacts.add(i, problem.particles, view.normal, rules_.effective_gap(side) - motion,
-                       step_.impulse_per_force * force);
+  Side side = {view.wall, gap_now, size, motion};
+  rules_.rest(side, memory_.find(i, -view.wall),
+              problem.mobility_of_pair(i, problem.particles, view.normal));
+  problem.contacts.add(i, problem.particles, view.normal, rules_.asked_gap(side),
+                       step_.impulse_per_force * side.force, side.compliance);
   step_.sides.push_back(side);
 }
 
@@ -198,7 +199,7 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
                wall_motion};
   side.followed = step_.is_member(i);
   if (known) side.gap_now = step_.sides[existing->second].gap_now;
-  if (known) side.pressed = step_.sides[existing->second].pressed;
+  if (known) side.force = step_.sides[existing->second].force;
   rules_.overlaps().note(side.gap_now, i, -view.wall);
   // This makes it exact for this motion, also where a body turns.
   const double turning = step_.is_member(i)
