@@ -136,6 +136,11 @@ class Recorded:
         ]
 
     @property
+    def springs(self) -> dict[str, Any]:
+        """The argument of `core.project` for contacts at rest."""
+        return {"compliance": self.arrays["compliance"]}
+
+    @property
     def bodies(self) -> dict[str, Any]:
         """The arguments of `core.project` for the bodies; none in a scene of free spheres."""
         a = self.arrays

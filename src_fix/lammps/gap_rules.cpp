@@ -80,7 +80,9 @@ bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
   const double allowed = bad ? side.gap_now : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
   const double wanted = bad ? wanted_gap(side) : 0.0;
-  return wanted - gap_at_end > RELINEARISE_BEYOND * tolerance;
+  // A spring can give way by more than the residual.
+  const double beyond = side.compliance > 0.0 ? 1.0 : RELINEARISE_BEYOND;
+  return wanted - gap_at_end > beyond * tolerance;
 }
 
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
@@ -126,7 +128,7 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
     if (!worth_it) return 0;
   }
   contacts.gap[c] = gap;
-  contacts.compliance[c] = 0.0;
+  contacts.compliance[c] = side.compliance = 0.0;
   side.followed = step_.is_member(contacts.first[c]) ||
       (side.wall == 0 && step_.is_member(contacts.second[c]));
   return 1;

@@ -59,6 +59,7 @@ def project(
     solver: str = "apgd",
     max_iterations: int = 100000,
     impulse: NDArray[np.float64] | None = None,
+    compliance: NDArray[np.float64] | None = None,
     body: NDArray[np.int64] | None = None,
     arm: NDArray[np.float64] | None = None,
     body_inverse_mass: NDArray[np.float64] | None = None,
@@ -69,6 +70,8 @@ def project(
     The solver stops when both residuals, or with "uzawa" the feasibility alone, are within
     ``tolerance`` [length]. It gives up after ``max_iterations``, or earlier if the tolerance is out
     of reach; ``converged`` is then False. ``impulse`` (m,) is a first guess for "apgd".
+    ``compliance`` (m,) [time / mass], not negative, makes contacts springs; without it all are
+    rigid.
     """
 
 def residual(
@@ -81,12 +84,16 @@ def residual(
     impulse: NDArray[np.float64],
     *,
     timestep: float,
+    compliance: NDArray[np.float64] | None = None,
     body: NDArray[np.int64] | None = None,
     arm: NDArray[np.float64] | None = None,
     body_inverse_mass: NDArray[np.float64] | None = None,
     body_inverse_inertia: NDArray[np.float64] | None = None,
 ) -> tuple[float, float]:
-    """Return the feasibility and the complementarity [length] of given impulses."""
+    """Return the feasibility and the complementarity [length] of given impulses.
+
+    Of a contact with a compliance the impulse times the compliance is added to the gap.
+    """
 
 def largest_eigenvalue(
     inverse_mass: NDArray[np.float64],

@@ -146,7 +146,8 @@ struct Contacts {
   Indices second;
   Vectors normal;
   Scalars gap;
-  std::optional<Scalars> impulse;    // the first guess, or none
+  std::optional<Scalars> impulse;       // the first guess, or none
+  std::optional<Scalars> compliance;    // or all are rigid
 };
 
 void require_contacts(const Contacts &given)
@@ -156,6 +157,7 @@ void require_contacts(const Contacts &given)
   require_length(given.second, count, "second");
   require_length(given.normal, count, "normal");
   if (given.impulse) require_length(*given.impulse, count, "impulse");
+  if (given.compliance) require_length(*given.compliance, count, "compliance");
 }
 
 // Refuses constraint c between particles i and j (-1 = a wall) if it makes no sense for the
@@ -190,7 +192,8 @@ void add_contacts(inelastic::ContactProblem &problem, const Contacts &given)
     const double *const n = given.normal.data() + 3 * c;
     require_contact(problem, c, i, j, n);
     problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j), n,
-                         given.gap.data()[c], given.impulse ? given.impulse->data()[c] : 0.0);
+                         given.gap.data()[c], given.impulse ? given.impulse->data()[c] : 0.0,
+                         given.compliance ? given.compliance->data()[c] : 0.0);
   }
 }
 
@@ -207,6 +210,12 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
   require_finite(contacts.normal, "normal");
   require_finite(contacts.gap, "gap");
   if (contacts.impulse) require_finite(*contacts.impulse, "impulse");
+  if (contacts.compliance) {
+    require_finite(*contacts.compliance, "compliance");
+    for (std::size_t c = 0; c < contacts.compliance->size(); ++c)
+      if (contacts.compliance->data()[c] < 0.0)
+        throw nb::value_error("compliance must not be negative");
+  }
 
   inelastic::ContactProblem problem;
   problem.timestep = timestep;
@@ -243,7 +252,8 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
                    const Indices &first, const Indices &second, const Vectors &normal,
                    const Scalars &gap, double timestep, double tolerance,
                    const std::string &solver_name, long max_iterations,
-                   const std::optional<Scalars> &impulse, const std::optional<Indices> &body,
+                   const std::optional<Scalars> &impulse, const std::optional<Scalars> &compliance,
+                   const std::optional<Indices> &body,
                    const std::optional<Vectors> &arm,
                    const std::optional<Scalars> &body_inverse_mass,
                    const std::optional<Matrices> &body_inverse_inertia)
@@ -254,7 +264,7 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
   inelastic::ContactProblem problem =
-      make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse},
+      make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance},
                    timestep, {body, arm, body_inverse_mass, body_inverse_inertia});
   inelastic::SerialHost host;
   Projection projection;
@@ -299,7 +309,7 @@ NB_MODULE(_core, module)
 
   module.def("project", &project, "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a,
              "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "solver"_a = "apgd",
-             "max_iterations"_a = 100000, "impulse"_a = nb::none(), "body"_a = nb::none(),
+             "max_iterations"_a = 100000, "impulse"_a = nb::none(), "compliance"_a = nb::none(), "body"_a = nb::none(),
              "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
              "body_inverse_inertia"_a = nb::none());
 
@@ -307,16 +317,17 @@ NB_MODULE(_core, module)
       "residual",
       [](const Vectors &predicted_velocity, const Scalars &inverse_mass, const Indices &first,
          const Indices &second, const Vectors &normal, const Scalars &gap, const Scalars &impulse,
-         double timestep, const std::optional<Indices> &body, const std::optional<Vectors> &arm,
+         double timestep, const std::optional<Scalars> &compliance,
+         const std::optional<Indices> &body, const std::optional<Vectors> &arm,
          const std::optional<Scalars> &body_inverse_mass,
          const std::optional<Matrices> &body_inverse_inertia) {
         const inelastic::Residual worst = residual_of(
-            make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse},
+            make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance},
                          timestep, {body, arm, body_inverse_mass, body_inverse_inertia}));
         return nb::make_tuple(worst.feasibility, worst.complementarity);
       },
       "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, "gap"_a,
-      "impulse"_a, nb::kw_only(), "timestep"_a, "body"_a = nb::none(), "arm"_a = nb::none(),
+      "impulse"_a, nb::kw_only(), "timestep"_a, "compliance"_a = nb::none(), "body"_a = nb::none(), "arm"_a = nb::none(),
       "body_inverse_mass"_a = nb::none(), "body_inverse_inertia"_a = nb::none());
 
   module.def(
@@ -332,7 +343,7 @@ NB_MODULE(_core, module)
         const Scalars gap(zeros.data(), 1, gap_shape);
         inelastic::SerialHost host;
         return inelastic::largest_eigenvalue(
-            make_problem(velocity, inverse_mass, {first, second, normal, gap, std::nullopt},
+            make_problem(velocity, inverse_mass, {first, second, normal, gap, std::nullopt, std::nullopt},
                          timestep, {body, arm, body_inverse_mass, body_inverse_inertia}),
             host);
       },

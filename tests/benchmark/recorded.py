@@ -112,7 +112,7 @@ def _solve(problem: Recorded, tolerance: float, **options: Any) -> Solved | None
             timestep=problem.timestep,
             tolerance=tolerance,
             max_iterations=MOST_ITERATIONS,
-            **(problem.bodies | options),
+            **(problem.springs | problem.bodies | options),
         )
 
     result, seconds = _timed(once, 1 if options.get("solver") == "uzawa" else REPEATS)

@@ -51,6 +51,18 @@ def solve(request: pytest.FixtureRequest) -> Solve:
     return solved
 
 
+@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+def test_sphere_on_a_spring(solver: str) -> None:
+    # gap + h V + C lambda = 0 and V = -3 + lambda / m: lambda = 0.02 / (h / m + C).
+    given = problem([(0, 0, -3)], [2], [(0, WALL, UP, 0.01)], timestep=0.01)
+    projection = given.project(TOLERANCE, solver=solver, compliance=np.array([0.005]))
+    assert projection.converged
+    assert_within(projection.impulse, [2], 2 * TOLERANCE / 0.01)
+    assert_within(projection.velocity, [[0, 0, -2]], 2 * TOLERANCE / 0.01)
+    # The compliance times the impulse is part of what is judged.
+    assert projection.feasibility <= TOLERANCE
+
+
 def test_sphere_falling_on_the_floor(solve: Solve) -> None:
     # It may use up the gap: V = -gap / h = -1, and m (-1 - (-3)) stops the rest.
     projection, accuracy = solve(problem([(0.5, 0, -3)], [2], [(0, WALL, UP, 0.01)]))

@@ -64,6 +64,8 @@ def test_these_arguments_are_fine() -> None:
         (project, "second"),
         (project, "normal"),
         (project, "impulse"),
+        (project, "compliance"),
+        (residual, "compliance"),
         (residual, "inverse_mass"),
         (residual, "impulse"),
         (largest_eigenvalue, "second"),
@@ -189,6 +191,12 @@ def test_negative_mass(function: Callable[..., object]) -> None:
     # Particle 0 makes the sum over contact 0 positive.
     with pytest.raises(ValueError, match="inverse_mass"):
         function(inverse_mass=np.array([2.0, -1.0]), second=np.array([1, 0]))
+
+
+@pytest.mark.parametrize("function", [project, residual])
+def test_negative_compliance(function: Callable[..., object]) -> None:
+    with pytest.raises(ValueError, match="compliance must not be negative"):
+        function(compliance=np.array([0.0, -1e-9]))
 
 
 @ALL

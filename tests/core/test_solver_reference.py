@@ -90,6 +90,27 @@ def test_impulses_of_an_interior_point_method(name: str) -> None:
     assert_within(projection.impulse, impulse, 10 * TOLERANCE * pressed.sum() / softest)
 
 
+@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+@pytest.mark.parametrize("name", ["overlapping 0", "dense crystal", "mixed, frozen 0"])
+def test_springs(name: str, solver: str) -> None:
+    """Every other contact is a spring, soft or stiff; their impulses are unique."""
+    given = PROBLEMS[name]
+    diagonal = np.diag(given.delassus())
+    softness = np.random.default_rng(5).choice([0.0, 1e-3, 0.03, 1.0], given.gap.size)
+    compliance = softness * diagonal
+    velocity, impulse = reference(given, compliance)
+    projection = given.project(TOLERANCE, solver=solver, compliance=compliance)
+    assert projection.converged
+    assert_within(projection.velocity, velocity, 1e-6 * given.fastest)
+    springs = compliance > 0
+    # The opening of a spring is known to 1e-6 of the fastest in a step, and its gap to TOLERANCE.
+    accuracy = (2e-6 * given.fastest * given.timestep + TOLERANCE) / compliance[springs].min()
+    assert_within(projection.impulse[springs], impulse[springs], accuracy)
+    # With impulses that are right its end differs from that of a rigid contact.
+    rigid, _ = reference(given)
+    assert np.abs(velocity - rigid).max() > 1e-4 * given.fastest
+
+
 @pytest.mark.parametrize("name", ["overlapping 0", "mixed, frozen 0"])
 def test_uzawa_gives_the_same_velocities(name: str) -> None:
     given = PROBLEMS[name]

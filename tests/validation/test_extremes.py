@@ -95,11 +95,13 @@ def residuals(path: Path, box: object) -> tuple[float, float, float]:
     two = np.searchsorted(p["id"], p["id2"]).clip(max=len(x) - 1)
     relative = v[one] - np.where(p["id2"][:, None] > 0, v[two], 0.0)
     under_force = p["impulse"] > 0
-    w = (p["gap"] + h * np.sum(p["normal"] * relative, axis=1))[under_force]
+    # A contact at rest is a spring: its gap without impulses and what its impulse leaves of it.
+    gap = p["gap"] + p["compliance"] * p["impulse"]
+    w = (gap + h * np.sum(p["normal"] * relative, axis=1))[under_force]
     energy = [0.5 * float(p["mass"] @ (u**2).sum(axis=1)) for u in (p["predicted_velocity"], v)]
     # What constraints give back of overlaps, and what gap is left where a force acts.
     left = max([0.0, *w])
-    explained = float(p["impulse"] @ (np.maximum(0.0, -p["gap"]) + left)) / h
+    explained = float(p["impulse"] @ (np.maximum(0.0, -gap) + left)) / h
     gained = (energy[1] - energy[0] - explained) / max(energy[0], 1e-300)
     return max(lacking) / eps, left / eps, max(0.0, gained)
 
