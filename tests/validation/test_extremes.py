@@ -792,11 +792,7 @@ def test_other_units(length: float, gravity: float, tmp_path: Path) -> None:
 
 
 def test_long_rest(tmp_path: Path) -> None:
-    """100,000 steps of 300 settled spheres, in a bed of about ten layers.
-
-    Every contact may be anywhere between a gap of 0 and an overlap of eps, and rattlers move: ten
-    layers bound what the centre of mass may do. The velocities are what the solver leaves over.
-    """
+    """100,000 steps of 300 settled spheres, in a bed of about ten layers."""
     box = ((0, 0.6), (0, 5), (0, 0.6))
     deck = scene(
         random_points(300, ((0.06, 0.54), (0.06, 4.9), (0.06, 0.54)), 2 * RADIUS, seed=1),
@@ -807,7 +803,7 @@ def test_long_rest(tmp_path: Path) -> None:
         box=box,
         options="region container shorten yes",
     )
-    rest, every, layers = 100_000, 1000, 10
+    rest, every = 100_000, 1000
     deck = deck.replace("thermo 1\n", f"thermo {every}\n") + "run 3000\nreset_timestep 0\n"
     dump = DUMP_PARTICLES.replace("custom 1 ", f"custom {every} ")
     result = run(tmp_path, deck + dump + f"run {rest}\n", timeout=500)
@@ -824,13 +820,17 @@ def test_long_rest(tmp_path: Path) -> None:
     said = float(re.findall(r"largest overlap \S+ = (\S+) tolerances", result.screen)[-1])
     print(
         f"100,000 steps of rest: centre of mass moves by {drift[0]:.1f}, {drift[1]:.1f}, "
-        f"{drift[2]:.1f} eps (half of the spheres less than {np.median(moved):.1e} r), mean speed "
-        f"up to {speed * STEP / EPS:.1f} eps a step, overlap {depth / EPS:.6f} eps (in the dump), "
+        f"{drift[2]:.1f} eps (half of the spheres less than {np.median(moved):.1e} r, "
+        f"{np.sum(moved > 0.01)} more than 0.01 r, one {moved.max():.1e} r), mean speed up to "
+        f"{speed * STEP / EPS:.1f} eps a step, overlap {depth / EPS:.6f} eps (in the dump), "
         f"{said:g} (of all steps)"
     )
-    assert max(drift) <= layers
-    # 1.1 was measured.
-    assert speed <= 2 * EPS / STEP
+    assert max(drift) <= 1
+    # Without friction or drag a loose sphere can creep: 3 did, by 0.03 r at most.
+    assert np.sum(moved > 0.01) <= 9
+    assert moved.max() <= 0.1
+    # 0.2 was measured.
+    assert speed <= 0.4 * EPS / STEP
     assert max(depth / EPS, said) <= SLACK
 
 
