@@ -17,15 +17,17 @@ class ContactMemory {
   struct Contact {
     double force = 0.0;        // [force] of the last step
     double sustained = 0.0;    // [force] what it has carried for long (next_sustained)
-    double preload = NONE;     // [force] at which the spring's gap is zero; NONE = no spring
+    // [force] at which the spring's gap is zero; negative where it overlaps without a force
+    double preload = NONE;    // no spring
   };
-  static constexpr double NONE = -1.0;
+  static constexpr double NONE = -1.0e300;
 
   // A contact's sustained force grows by a factor a step from a small part of its first force, so that no
-  // impact, which takes a few steps, is among it.
+  // impact, which takes a few steps, is among it. (With a factor of 2 a column of springs gives back a
+  // tenth of an impact, for it takes some steps itself to stop it.)
   static double next_sustained(double last, double force)
   {
-    constexpr double FIRST_PART = 1.0e-4, GROWTH = 2.0;
+    constexpr double FIRST_PART = 1.0e-4, GROWTH = 1.25;
     return last > 0.0 ? std::min(force, GROWTH * last) : FIRST_PART * force;
   }
 

@@ -49,14 +49,15 @@ void GapRules::rest(Side &side, const ContactMemory::Contact &known, double diag
   const double preload = known.preload == ContactMemory::NONE
       ? known.sustained + side.gap_now / length_per_force
       : known.preload;
-  side.preload =
-      std::max(0.0, std::clamp(preload, known.sustained - range, known.sustained + range));
+  side.preload = std::clamp(preload, known.sustained - range, known.sustained + range);
 }
 
 double GapRules::asked_gap(const Side &side) const
 {
-  return effective_gap(side) - side.wall_motion -
-      side.compliance * step_.impulse_per_force * std::max(0.0, side.preload);
+  const double rigid = effective_gap(side) - side.wall_motion;
+  return side.compliance > 0.0
+      ? rigid - side.compliance * step_.impulse_per_force * side.preload
+      : rigid;
 }
 
 double GapRules::effective_gap(const Side &side) const

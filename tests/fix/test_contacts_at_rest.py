@@ -1,0 +1,134 @@
+"""Contacts at rest are springs: how far they give way, what they give back, and that beds are quiet.
+
+See "Contacts at rest" in src_fix/doc/fix_inelastic.md.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.fix.lammps_run import Runner
+from tests.fix.scenes import (
+    DUMP_PARTICLES,
+    GRAVITY,
+    deepest_in_box,
+    deepest_pair,
+    mass,
+    random_points,
+    read_dump,
+    scene,
+)
+
+RADIUS = 0.05
+STEP = 0.0025
+EPS = 1e-3 * 2 * RADIUS
+WEIGHT = float(mass(RADIUS)) * GRAVITY
+COLUMN = [[0.5, RADIUS * (1 + 2 * k), 0.5] for k in range(8)]
+# Steps after which every contact of a column is a spring.
+RESTED = 60
+# In g h: C / A_cc of the page times the sum of lambda_c A_cc / h over the springs of the column. Each
+# spring opens its own gap by no more than C lambda.
+GIVEN_BACK = 0.03 * (len(COLUMN) + 2 * sum(range(1, len(COLUMN))))
+
+
+def column(folder: Path, **settings: object) -> str:
+    defaults: dict[str, object] = {"tolerance": EPS, "timestep": STEP, "skin": 0.1}
+    return scene(COLUMN, RADIUS, folder, **(defaults | settings))  # type: ignore[arg-type]
+
+
+def test_a_column_stays_where_it_is(tmp_path: Path, lmp: Runner) -> None:
+    deck = column(tmp_path, options="region container record step*.npz every 100")
+    lmp(deck + DUMP_PARTICLES + "run 400\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    start, end = frames[RESTED].positions, frames[-1].positions
+    with np.load(tmp_path / "step400.npz") as file:
+        record = dict(file)
+    # Nine contacts in a row, each of which may give way by half of a tolerance.
+    assert np.abs(end - start).max() <= 0.5 * EPS * len(COLUMN)
+    # The accuracy of the mean contact is 0.5e-3 g h; springs let it add up a few times.
+    assert np.abs(frames[-1].velocities).max() <= 5e-3 * GRAVITY * STEP
+    assert (record["compliance"] > 0).all()
+    assert np.abs(record["gap_now"]).max() <= 0.5 * EPS
+    # Each contact carries what is above it, to the accuracy of the mean contact.
+    above = np.sort(record["impulse"])[::-1] / (WEIGHT * STEP)
+    assert above == pytest.approx(np.arange(len(COLUMN), 0, -1), abs=1e-3 * len(COLUMN))
+
+
+def test_what_a_column_gives_back(tmp_path: Path, lmp: Runner) -> None:
+    """Its weight goes from one step to the next."""
+    lmp(column(tmp_path) + DUMP_PARTICLES + "run 200\nunfix gravity\nrun 200\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    fastest = max(np.abs(frame.velocities).max() for frame in frames[201:])
+    assert fastest <= GIVEN_BACK * GRAVITY * STEP
+
+
+@pytest.mark.parametrize(("above", "velocity"), [(0.02, 1.0), (0.05, 1.0), (0.8, -2.5)])
+def test_what_a_column_gives_back_of_an_impact(
+    above: float, velocity: float, tmp_path: Path, lmp: Runner
+) -> None:
+    """A sphere falls on it after it has rested, with a long step and with a short one."""
+    points = [*COLUMN, [0.5, COLUMN[-1][1] + 2 * RADIUS + above, 0.5]]
+    velocities = np.zeros((len(points), 3))
+    velocities[-1, 1] = velocity
+    rebounds = []
+    for shorter in (1, 4):
+        deck = scene(
+            points,
+            RADIUS,
+            tmp_path / str(shorter),
+            tolerance=EPS,
+            velocities=velocities,
+            timestep=STEP / shorter,
+            skin=0.1,
+        )
+        lmp(deck + DUMP_PARTICLES + f"run {3 * RESTED * shorter}\n", into=str(shorter))
+        frames = read_dump(tmp_path / str(shorter) / "particles.dump")
+        falling = [float(-frame.velocities[-1, 1]) for frame in frames]
+        fastest = max(falling)
+        assert fastest > 1.0
+        hit = falling.index(fastest)
+        rebounds.append(max(float(frame.velocities[:, 1].max()) for frame in frames[hit:]))
+        # Two contacts, the sphere's and its neighbour's, leave 1e-3 of an approach each.
+        load = GIVEN_BACK * GRAVITY * STEP / shorter
+        assert rebounds[-1] <= 2e-3 * fastest + load
+        for frame in frames:
+            depth = deepest_pair(frame.positions, frame["radius"])
+            assert depth <= EPS * (1 + 1e-9)  # round-off
+    print(f"falling at {fastest:.2f}, comes back at {rebounds[0]:.4f} and {rebounds[1]:.4f}")
+
+
+BED_BOX = ((0, 0.7), (0, 2), (0, 0.7))
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_bed_is_quiet_and_cheap(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    inside = tuple((low + RADIUS, high - RADIUS) for low, high in BED_BOX)
+    deck = scene(
+        random_points(300, inside, 2 * RADIUS, seed=2),
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        timestep=STEP,
+        skin=0.1,
+        box=BED_BOX,
+        fixes=f"fix drag all viscous {4 * float(mass(RADIUS))}",
+        options="region container shorten yes",
+    )
+    deck = deck.replace("thermo 1\n", "thermo 50\n")
+    result = lmp(deck + "run 5000\n" + DUMP_PARTICLES + "run 200\n", ranks=ranks)
+    mean = np.sqrt(2 * result.runs[-1]["KinEng"].mean() / (300 * float(mass(RADIUS))))
+    assert mean <= 0.02 * GRAVITY * STEP
+    log = (tmp_path / "log.lammps").read_text() if (tmp_path / "log.lammps").exists() else ""
+    counts = re.findall(r"Fix inelastic: (\d+) projections, (\d+) iterations", result.screen + log)
+    projections, iterations = map(int, counts[-1])
+    # 18 were measured with 1,000 spheres; a bed of rigid contacts takes 60 and more.
+    assert iterations <= 30 * projections
+    frames = read_dump(tmp_path / "particles.dump")
+    for frame in frames:
+        depth = deepest_pair(frame.positions, frame["radius"])
+        depth = max(depth, deepest_in_box(frame.positions, frame["radius"], BED_BOX))
+        assert depth <= EPS * (1 + 1e-9)  # round-off
