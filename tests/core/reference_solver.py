@@ -20,8 +20,8 @@ def reference(
 
     minimise 1/2 (y . y + s . s)  subject to  (gap / h + G V*) + G R y + (C / h)^1/2 s >= 0
 
-    with s only where contacts have a compliance. Clarabel's dual variables are the impulses: y - R^T
-    G^T z = 0, and s = (C / h)^1/2 z, which adds C z to the gap.
+    with s only where contacts have a compliance. Clarabel's dual variables are the impulses:
+    y - R^T G^T z = 0, and s = (C / h)^1/2 z, which adds C z to the gap.
     """
     if given.gap.size == 0:
         return given.predicted_velocity, np.zeros(0)

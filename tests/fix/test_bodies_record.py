@@ -82,12 +82,14 @@ def followed_gaps(record: Record) -> dict[tuple[int, int], float]:
     """Return the constraints that have another gap than the positions, by the spheres' ids.
 
     The gap of two spheres of turning bodies is not that of straight motion: where a step would end
-    in an overlap, the fix sets the constraint's gap to what makes it exact for the step's end.
+    in an overlap, the fix sets the constraint's gap to what makes it exact for the step's end. A
+    contact at rest is a spring: with its impulse, which adds to the gap, it is like a rigid one.
     """
+    springs = record["compliance"] * record["impulse"]
     return {
         (min(first, second), max(first, second)): float(gap)
         for first, second, gap, now in zip(
-            record["id1"], record["id2"], record["gap"], record["gap_now"], strict=True
+            record["id1"], record["id2"], record["gap"] + springs, record["gap_now"], strict=True
         )
         if gap != now
     }

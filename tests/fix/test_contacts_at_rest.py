@@ -1,4 +1,4 @@
-"""Contacts at rest are springs: how far they give way, what they give back, and that beds are quiet.
+"""Contacts at rest are springs: how far they give way, what they give back, and quiet beds.
 
 See "Contacts at rest" in src_fix/doc/fix_inelastic.md.
 """
@@ -30,8 +30,8 @@ WEIGHT = float(mass(RADIUS)) * GRAVITY
 COLUMN = [[0.5, RADIUS * (1 + 2 * k), 0.5] for k in range(8)]
 # Steps after which every contact of a column is a spring.
 RESTED = 60
-# In g h: C / A_cc of the page times the sum of lambda_c A_cc / h over the springs of the column. Each
-# spring opens its own gap by no more than C lambda.
+# In g h: C / A_cc of the page times the sum of lambda_c A_cc / h over the springs of the column.
+# Each spring opens its own gap by no more than C lambda.
 GIVEN_BACK = 0.03 * (len(COLUMN) + 2 * sum(range(1, len(COLUMN))))
 
 
