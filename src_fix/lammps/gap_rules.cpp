@@ -55,9 +55,8 @@ void GapRules::rest(Side &side, const ContactMemory::Contact &known, double diag
 double GapRules::asked_gap(const Side &side) const
 {
   const double rigid = effective_gap(side) - side.wall_motion;
-  return side.compliance > 0.0
-      ? rigid - side.compliance * step_.impulse_per_force * side.preload
-      : rigid;
+  return side.compliance > 0.0 ? rigid - side.compliance * step_.impulse_per_force * side.preload
+                               : rigid;
 }
 
 double GapRules::effective_gap(const Side &side) const

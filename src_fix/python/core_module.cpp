@@ -253,8 +253,7 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
                    const Scalars &gap, double timestep, double tolerance,
                    const std::string &solver_name, long max_iterations,
                    const std::optional<Scalars> &impulse, const std::optional<Scalars> &compliance,
-                   const std::optional<Indices> &body,
-                   const std::optional<Vectors> &arm,
+                   const std::optional<Indices> &body, const std::optional<Vectors> &arm,
                    const std::optional<Scalars> &body_inverse_mass,
                    const std::optional<Matrices> &body_inverse_inertia)
 {
@@ -263,9 +262,9 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
   if (max_iterations < 0) throw nb::value_error("max_iterations must not be negative");
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
-  inelastic::ContactProblem problem =
-      make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance},
-                   timestep, {body, arm, body_inverse_mass, body_inverse_inertia});
+  inelastic::ContactProblem problem = make_problem(
+      predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance}, timestep,
+      {body, arm, body_inverse_mass, body_inverse_inertia});
   inelastic::SerialHost host;
   Projection projection;
   const inelastic::SolverResult result = solver->solve(problem, {tolerance, max_iterations}, host);
@@ -309,8 +308,8 @@ NB_MODULE(_core, module)
 
   module.def("project", &project, "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a,
              "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "solver"_a = "apgd",
-             "max_iterations"_a = 100000, "impulse"_a = nb::none(), "compliance"_a = nb::none(), "body"_a = nb::none(),
-             "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
+             "max_iterations"_a = 100000, "impulse"_a = nb::none(), "compliance"_a = nb::none(),
+             "body"_a = nb::none(), "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
              "body_inverse_inertia"_a = nb::none());
 
   module.def(
@@ -321,14 +320,15 @@ NB_MODULE(_core, module)
          const std::optional<Indices> &body, const std::optional<Vectors> &arm,
          const std::optional<Scalars> &body_inverse_mass,
          const std::optional<Matrices> &body_inverse_inertia) {
-        const inelastic::Residual worst = residual_of(
-            make_problem(predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance},
-                         timestep, {body, arm, body_inverse_mass, body_inverse_inertia}));
+        const inelastic::Residual worst = residual_of(make_problem(
+            predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance},
+            timestep, {body, arm, body_inverse_mass, body_inverse_inertia}));
         return nb::make_tuple(worst.feasibility, worst.complementarity);
       },
       "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, "gap"_a,
-      "impulse"_a, nb::kw_only(), "timestep"_a, "compliance"_a = nb::none(), "body"_a = nb::none(), "arm"_a = nb::none(),
-      "body_inverse_mass"_a = nb::none(), "body_inverse_inertia"_a = nb::none());
+      "impulse"_a, nb::kw_only(), "timestep"_a, "compliance"_a = nb::none(), "body"_a = nb::none(),
+      "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
+      "body_inverse_inertia"_a = nb::none());
 
   module.def(
       "largest_eigenvalue",
@@ -343,8 +343,9 @@ NB_MODULE(_core, module)
         const Scalars gap(zeros.data(), 1, gap_shape);
         inelastic::SerialHost host;
         return inelastic::largest_eigenvalue(
-            make_problem(velocity, inverse_mass, {first, second, normal, gap, std::nullopt, std::nullopt},
-                         timestep, {body, arm, body_inverse_mass, body_inverse_inertia}),
+            make_problem(velocity, inverse_mass,
+                         {first, second, normal, gap, std::nullopt, std::nullopt}, timestep,
+                         {body, arm, body_inverse_mass, body_inverse_inertia}),
             host);
       },
       "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, nb::kw_only(), "timestep"_a,
