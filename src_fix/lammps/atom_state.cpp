@@ -35,8 +35,12 @@ void AtomState::remember_contacts(GhostExchange &ranks)
     const Side &side = step_.sides[c];
     const int wall = side.wall;
     const double force = problem.contacts.impulse[c] * force_per_impulse;
+    const double compliance = problem.contacts.compliance[c];
+    const double spring_gap = compliance > 0.0
+        ? compliance * step_.impulse_per_force * (side.preload - force)
+        : ContactMemory::NONE;
     const ContactMemory::Contact contact = {
-        force, ContactMemory::next_sustained(side.sustained, force), side.preload};
+        force, ContactMemory::next_sustained(side.sustained, force), spring_gap};
     memory_.remember(i, wall ? -wall : atom->tag[j], contact);
     if (!wall) memory_.remember(j, atom->tag[i], contact);
   }

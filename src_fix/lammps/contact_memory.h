@@ -17,8 +17,8 @@ class ContactMemory {
   struct Contact {
     double force = 0.0;        // [force] of the last step
     double sustained = 0.0;    // [force] what it has carried for long (next_sustained)
-    // [force] at which the spring's gap is zero; negative where it overlaps without a force
-    double preload = NONE;    // no spring
+    // [length] the gap at which the spring has this force; the next step may have another compliance
+    double spring_gap = NONE;    // no spring
   };
   static constexpr double NONE = -1.0e300;
 
@@ -55,7 +55,7 @@ class ContactMemory {
 
   void copy(int from, int to) { remembered_[to] = remembered_[from]; }
 
-  // Buffer layout: number of partners, then partner, force, sustained force and preload of each.
+  // Buffer layout: number of partners, then partner, force, sustained force and spring gap of each.
   static constexpr int packed_size(int partners) { return 1 + 4 * partners; }
 
   // At most `partners` of them.
@@ -69,7 +69,7 @@ class ContactMemory {
       buffer[m++] = static_cast<double>(entry.partner);
       buffer[m++] = entry.contact.force;
       buffer[m++] = entry.contact.sustained;
-      buffer[m++] = entry.contact.preload;
+      buffer[m++] = entry.contact.spring_gap;
     }
     return m;
   }

@@ -313,7 +313,7 @@ inelastic::ProjectionResult FixInelastic::solve(Kick kick)
     }
     if (length_.accepts(unsolved_.named())) {
       step_.target = target;
-      step_.change = change;
+      step_.change = change / step_.kicks;
       return result;
     }
   }
@@ -324,9 +324,9 @@ void FixInelastic::predict(Kick kick)
 {
   const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   const int nall = atom->nlocal + atom->nghost;
-  const double kicks = kick == Kick::WHOLE ? 1.0 : 0.5;
+  step_.kicks = kick == Kick::WHOLE ? 1.0 : 0.5;
   inelastic::ContactProblem &problem = step_.problem;
-  step_.impulse_per_force = kicks * update->dt * force->ftm2v;
+  step_.impulse_per_force = step_.kicks * update->dt * force->ftm2v;
   problem.timestep = update->dt;
   problem.resize(nall);
   for (int i = 0; i < nall; ++i)

@@ -41,14 +41,15 @@ void GapRules::rest(Side &side, const ContactMemory::Contact &known, double diag
   side.sustained = known.sustained;
   const bool at_rest = known.force > 0.0 && known.sustained >= AT_REST * known.force;
   if (!at_rest || !(step_.change > 0.0) || overlaps_.is_bad(side.gap_now)) return;
-  side.compliance = diagonal *
+  // The same force is half of the impulse in half a kick.
+  side.compliance = diagonal / step_.kicks *
       std::min({MOST_COMPLIANCE, PER_ACCURACY * step_.settings.accuracy,
                 PER_TOLERANCE * tolerance / step_.change});
   const double length_per_force = side.compliance * step_.impulse_per_force;
   const double range = ELASTIC_RANGE * tolerance / length_per_force;
-  const double preload = known.preload == ContactMemory::NONE
+  const double preload = known.spring_gap == ContactMemory::NONE
       ? known.sustained + side.gap_now / length_per_force
-      : known.preload;
+      : known.force + known.spring_gap / length_per_force;
   side.preload = std::clamp(preload, known.sustained - range, known.sustained + range);
 }
 

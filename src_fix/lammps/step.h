@@ -43,8 +43,9 @@ struct Side {
   double force = 0.0;        // [force] that the last step left
   double sustained = 0.0;    // [force] see contact_memory.h
   // Of a contact at rest, which is a spring (gap_rules.h):
-  double compliance = 0.0;                 // [time / mass] 0 = rigid
-  double preload = ContactMemory::NONE;    // [force] at which its gap is zero
+  double compliance = 0.0;    // [time / mass] 0 = rigid
+  double preload =
+      0.0;    // [force] at which its gap is zero; negative: it overlaps without a force
   bool followed = false;    // the gap was set by where an earlier solution of the step ends
 };
 
@@ -58,6 +59,8 @@ struct Step {
   // compared with what moved.
   bool continues = false;
   Kick kick = Kick::WHOLE;
+  double kicks =
+      1.0;    // how much of a whole kick the forces act for: a half at the start of a run
   // The time for which forces act before the next move, in units that turn a force into a momentum.
   double impulse_per_force = 0.0;
   double regular_timestep = 0.0;    // [time] as the deck sets it; problem.timestep may be shorter
