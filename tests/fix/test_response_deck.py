@@ -22,7 +22,7 @@ PARTICLES, RADIUS = 250, 0.055
 PACKING = {
     "particles": PARTICLES,
     "steps_agitated": 200,
-    "steps_settling": 200,
+    "steps_settling": 300,
     "steps_resting": 0,
     "steps_tightening": 1,
     "steps_measuring": 1,

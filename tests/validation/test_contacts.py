@@ -39,8 +39,8 @@ def of_run(folder: Path, every: int) -> list[Statics]:
     ]
 
 
-# Floppy modes per thousand degrees of freedom. Of spheres 0 to 1.1 were measured, of dimers 0 to 5.6
-# in fifteen beds, and up to 7 with version 0.1: they come to rest more slowly.
+# Floppy modes per thousand degrees of freedom. Of spheres 0 to 1.1 were measured, of dimers 0 to
+# 5.6 in fifteen beds, and up to 7 with version 0.1: they come to rest more slowly.
 SCENES: dict[str, tuple[str, dict[str, object], float]] = {
     "spheres": ("spheres", {}, 2.0),
     "spheres, seed 2": ("spheres", {"seed": 2}, 2.0),
