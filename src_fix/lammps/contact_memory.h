@@ -32,7 +32,7 @@ class ContactMemory {
   }
 
   // The most contacts that a ghost tells its owned atom; what is beyond loses only a first guess, and
-  // is rigid for two steps.
+  // is rigid until it is at rest again.
   static constexpr int SHARED_PARTNERS = 16;
 
   void resize(int atoms) { remembered_.resize(atoms); }

@@ -20,13 +20,12 @@ class GapRules {
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Side &side) const;
 
-  // Makes a contact that has carried a force for two steps a spring. `diagonal` is what an impulse opens of
-  // its gap [time / mass]. A bed of rigid contacts is held by just as many as it needs: none can take
-  // over from another, a small error of any force lets some of them open, and the bed hums. A spring
-  // changes its force by little where its gap changes by little. Its gap is zero at the preload, which
-  // is the force when the contact came to rest, and slides where the force has changed so much that the
-  // gap would leave the elastic range.
-  // (After one step the force may be that of an impact, which would be given back.)
+  // Takes what is known of a contact, and makes it a spring if it is at rest. `diagonal` is the length by
+  // which a unit impulse opens its gap [time / mass]. A bed of rigid contacts is held by just as many as
+  // it needs: none can take over from another, a small error of any force lets some of them open, and
+  // the bed hums. A spring changes its force by little where its gap changes by little. Its gap is zero
+  // at the preload, the force when the contact came to rest, which slides where the force has changed
+  // so much that the gap would leave the elastic range.
   void rest(Side &side, const ContactMemory::Contact &known, double diagonal) const;
 
   // The gap [length] of the constraint, the wall's motion and the preload in it (contact_set.h).
