@@ -26,9 +26,9 @@ namespace inelastic {
 struct ContactSet {
   std::vector<int> first;         // index of a particle
   std::vector<int> second;        // index of a particle; the number of particles stands for a wall
-  std::vector<double> normal;        // 3 per constraint
-  std::vector<double> gap;           // [length]
-  std::vector<double> impulse;       // [mass length / time]
+  std::vector<double> normal;     // 3 per constraint
+  std::vector<double> gap;        // [length]
+  std::vector<double> impulse;    // [mass length / time]
   std::vector<double> compliance;    // [time / mass]
 
   std::size_t size() const { return gap.size(); }
