@@ -826,9 +826,9 @@ def test_long_rest(tmp_path: Path) -> None:
     print(
         f"100,000 steps of rest: centre of mass moves by {drift[0]:.1f}, {drift[1]:.1f}, "
         f"{drift[2]:.1f} eps (half of the spheres less than {np.median(moved):.1e} r; "
-        f"{loose.sum()} are loose and left out, one of which moves {moved.max():.1e} r), mean "
-        f"speed up to {speed * STEP / EPS:.1f} eps a step, overlap {depth / EPS:.6f} eps (in the dump), "
-        f"{said:g} (of all steps)"
+        f"{loose.sum()} are loose and left out, one of which moves {moved.max():.1e} r), "
+        f"mean speed up to {speed * STEP / EPS:.1f} eps a step, overlap {depth / EPS:.6f} eps "
+        f"(in the dump), {said:g} (of all steps)"
     )
     assert max(drift) <= 1
     # 1 and 3 were measured.
