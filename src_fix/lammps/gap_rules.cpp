@@ -92,6 +92,7 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   inelastic::ContactSet &contacts = step_.problem.contacts;
   const double h = step_.problem.timestep;
   const double tolerance = step_.settings.tolerance;
+  constexpr double MOST_GROWTH = 2.0;    // of a spring's force in a step
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const Side &side = step_.sides[c];
@@ -112,6 +113,15 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     contacts.gap[c] = linear_gap;
     contacts.compliance[c] = 0.0;
     ++changed;
+  }
+  // In an impact on a bed springs give way one after the other: all that have to carry much more than
+  // before become rigid at once.
+  for (std::size_t c = 0; changed > 0 && c < contacts.size(); ++c) {
+    Side &side = step_.sides[c];
+    const double before = step_.impulse_per_force * side.force;
+    if (contacts.compliance[c] == 0.0 || contacts.impulse[c] <= MOST_GROWTH * before) continue;
+    contacts.compliance[c] = side.compliance = 0.0;
+    contacts.gap[c] = asked_gap(side);
   }
   return changed;
 }
