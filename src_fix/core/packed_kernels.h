@@ -35,9 +35,9 @@ struct Ends {
 template <typename Real> struct Pass {
   std::size_t count;
   const Ends *ends;
-  const Vector<Real> *normal;    // the fourth number is the gap at the end without impulses
-  const Real *diagonal;          // of A
-  const Real *compliance;
+  const Vector<Real> *normal;      // the fourth number is the gap at the end without impulses
+  const Real *diagonal;            // of A
+  const Real *compliance;          // 0 for rigid constraints
   const Real *impulse;             // the present impulses
   Real *impulse_before;            // the impulses before; replaced by the next ones
   Real *gap_before;                // the gaps of the impulses before; replaced by the present ones
