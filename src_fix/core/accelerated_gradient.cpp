@@ -113,8 +113,14 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   // If double precision refuses so many residuals that single precision finds within the tolerance,
   // round-off shows and single precision is given up.
   constexpr long MOST_FAILURES = 4;
+  // Idle constraints are looked at in every so many iterations. (Measured with 10,000 spheres in
+  // impact and 1,000 dimers: 10 takes up to a sixth more iterations in impact, 50 a sixth more of
+  // dimers.) Constraints are idle above so many tolerances, a number that hardly matters.
+  constexpr long LOOK_EVERY = 20;
+  constexpr double IDLE_GAP = 5.0;
 
-  iterations.prepare(problem, gap_operator_.free_gap(), diagonal_, scales, host);
+  iterations.prepare(problem, gap_operator_.free_gap(), diagonal_, gap_,
+                     IDLE_GAP * limits.tolerance, scales, host);
   std::vector<double> &impulse = problem.contacts.impulse;
   const double target = result.target / scales.length;
   Momentum momentum;
@@ -137,7 +143,10 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     if (packed_residual <= target && result.iterations >= next_check) {
       iterations.impulses_before(scales, impulse);
       if (judge(problem, host, result)) return Status::CONVERGED;
-      if (++failures == MOST_FAILURES && sizeof(Real) < sizeof(double))
+      double joined = static_cast<double>(iterations.join(gap_, scales));
+      host.reduce(&joined, 1, nullptr, 0);
+      if (joined == 0.0) ++failures;
+      if (failures == MOST_FAILURES && sizeof(Real) < sizeof(double))
         return Status::OUT_OF_ITERATIONS;
       next_check = result.iterations + failures;
     }
@@ -157,6 +166,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     else
       momentum.grow();
     iterations.finish(host, momentum.value());
+    if (result.iterations % LOOK_EVERY == 0) iterations.look();
   }
   iterations.impulses(scales, impulse);
   if (judge(problem, host, result)) return Status::CONVERGED;
@@ -198,8 +208,10 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   if (suffices<float>(guess.largest_length, result.target))
     result.status = iterate(single_, problem, limits, scales, host, result);
   const bool settled = result.status == Status::CONVERGED || result.status == Status::INFEASIBLE;
-  if (!settled && result.iterations < limits.max_iterations)
+  if (!settled && result.iterations < limits.max_iterations) {
+    gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
     result.status = iterate(double_, problem, limits, scales, host, result);
+  }
   settle_for_tolerance(limits, result.residual.largest(), result);
   return result;
 }

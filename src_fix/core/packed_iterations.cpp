@@ -14,6 +14,25 @@ namespace {
   // have a particle in common, and a sum that was just written is slow to read again.
   constexpr std::size_t STREAMS = 8;
 
+  // Working constraints that have come to rest become idle when they are more than this part: each
+  // look would otherwise move them all to save little.
+  constexpr std::size_t FEW = 10;
+
+  // Orders constraints, given by their places, so that neighbours in the list come into different
+  // streams.
+  std::vector<std::size_t> in_streams(const std::vector<std::size_t> &places)
+  {
+    std::vector<std::size_t> ordered;
+    ordered.reserve(places.size());
+    for (std::size_t begin = 0; begin < places.size(); begin += packed::BLOCK) {
+      const std::size_t size = std::min(packed::BLOCK, places.size() - begin);
+      const std::size_t length = (size + STREAMS - 1) / STREAMS;
+      for (std::size_t k = 0; k < length; ++k)
+        for (std::size_t j = k; j < size; j += length) ordered.push_back(places[begin + j]);
+    }
+    return ordered;
+  }
+
   struct RodShape {
     double axis[3];    // unit vector
     double arm[2];     // of the two members along the axis [length]
@@ -87,10 +106,23 @@ namespace {
 template <typename Real>
 void PackedIterations<Real>::prepare(const ContactProblem &problem,
                                      const std::vector<double> &free_gap,
-                                     const std::vector<double> &diagonal, const Scales &scales,
-                                     Host &host)
+                                     const std::vector<double> &diagonal,
+                                     const std::vector<double> &gap, double idle_gap,
+                                     const Scales &scales, Host &host)
 {
-  pack_constraints(problem.contacts, free_gap, diagonal, scales);
+  idle_gap_ = static_cast<Real>(idle_gap / scales.length);
+  const std::vector<double> &impulse = problem.contacts.impulse;
+  std::vector<std::size_t> near, far;
+  for (std::size_t c = 0; c < gap.size(); ++c)
+    (impulse[c] > 0.0 || !(gap[c] > idle_gap) ? near : far).push_back(c);
+  near = in_streams(near);
+  pack(problem.contacts, near, free_gap, diagonal, scales, working_);
+  pack(problem.contacts, far, free_gap, diagonal, scales, idle_);
+  impulse_.resize(near.size());
+  for (std::size_t k = 0; k < near.size(); ++k)
+    impulse_[k] = static_cast<Real>(impulse[near[k]] / scales.impulse);
+  impulse_before_ = impulse_;
+  gap_before_.assign(near.size(), 0);
 
   const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
   const double mobility_unit = problem.timestep * (scales.impulse / scales.length);
@@ -124,45 +156,127 @@ template <typename Real> void PackedIterations<Real>::finish(Host &host, double 
                                             static_cast<Real>(momentum)});
 }
 
-// Sets an order in which neighbours in the problem's list come into different streams.
-template <typename Real> void PackedIterations<Real>::set_order(std::size_t count)
+template <typename Real> void PackedIterations<Real>::look()
 {
-  source_.clear();
-  for (std::size_t begin = 0; begin < count; begin += packed::BLOCK) {
-    const std::size_t size = std::min(packed::BLOCK, count - begin);
-    const std::size_t length = (size + STREAMS - 1) / STREAMS;
-    for (std::size_t k = 0; k < length; ++k)
-      for (std::size_t place = k; place < size; place += length) source_.push_back(begin + place);
-  }
+  rest();
+  looked_.resize((idle_.size() + 3) / 4);
+  packed::find_gaps(packed::Look<Real>{idle_.size(), idle_.ends.data(), idle_.normal.data(),
+                                       ahead_.data(), looked_.data()});
+  const Real *const gap = reinterpret_cast<const Real *>(looked_.data());
+  std::vector<std::size_t> near;
+  for (std::size_t k = 0; k < idle_.size(); ++k)
+    if (!(gap[k] > idle_gap_)) near.push_back(k);
+  wake(near, gap);
 }
 
 template <typename Real>
-void PackedIterations<Real>::pack_constraints(const ContactSet &contacts,
-                                              const std::vector<double> &free_gap,
-                                              const std::vector<double> &diagonal,
-                                              const Scales &scales)
+std::size_t PackedIterations<Real>::join(const std::vector<double> &gap, const Scales &scales)
 {
-  const std::size_t count = contacts.size();
-  set_order(count);
-  ends_.resize(count);
-  normal_.resize(count);
-  diagonal_.resize(count);
-  compliance_.resize(count);
-  impulse_.resize(count);
-  const double per_length = 1.0 / scales.length;
-  const double per_impulse = 1.0 / scales.impulse;
-  const double diagonal_unit = scales.impulse / scales.length;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t c = source_[k];
-    const double *const n = &contacts.normal[3 * c];
-    ends_[k] = {place<Real>(contacts.first[c]), place<Real>(contacts.second[c])};
-    set_lanes(normal_[k], n[0], n[1], n[2], free_gap[c] * per_length);
-    diagonal_[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
-    compliance_[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
-    impulse_[k] = static_cast<Real>(contacts.impulse[c] * per_impulse);
+  std::vector<Real> packed(idle_.size());
+  std::vector<std::size_t> near;
+  for (std::size_t k = 0; k < idle_.size(); ++k) {
+    packed[k] = static_cast<Real>(gap[idle_.source[k]] / scales.length);
+    if (!(packed[k] > idle_gap_)) near.push_back(k);
   }
-  impulse_before_ = impulse_;
-  gap_before_.assign(count, 0);
+  wake(near, packed.data());
+  return near.size();
+}
+
+// Makes idle constraints working, given by their places in ascending order. `gap` has one number per
+// idle constraint. It stands for the gaps of the impulses before, of which nothing is known; from the
+// next iteration on they are.
+template <typename Real>
+void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Real *gap)
+{
+  if (near.empty()) return;
+  std::size_t to = working_.size();
+  const std::size_t count = to + near.size();
+  working_.resize(count);
+  impulse_.resize(count, 0);
+  impulse_before_.resize(count, 0);
+  gap_before_.resize(count);
+  for (const std::size_t k : in_streams(near)) {
+    working_.copy(idle_, k, to);
+    gap_before_[to++] = gap[k];
+  }
+  std::size_t kept = near.front();
+  auto next = near.begin();
+  for (std::size_t k = kept; k < idle_.size(); ++k) {
+    if (next != near.end() && *next == k)
+      ++next;
+    else
+      idle_.copy(idle_, k, kept++);
+  }
+  idle_.resize(kept);
+}
+
+// Makes working constraints idle that have no impulse and are far from closed.
+template <typename Real> void PackedIterations<Real>::rest()
+{
+  const auto rests = [this](std::size_t k) {
+    return impulse_[k] == 0 && impulse_before_[k] == 0 && gap_before_[k] > idle_gap_;
+  };
+  std::size_t resting = 0;
+  for (std::size_t k = 0; k < working_.size(); ++k)
+    if (rests(k)) ++resting;
+  if (resting <= working_.size() / FEW) return;
+  std::size_t idle = idle_.size(), kept = 0;
+  idle_.resize(idle + resting);
+  for (std::size_t k = 0; k < working_.size(); ++k) {
+    if (rests(k)) {
+      idle_.copy(working_, k, idle++);
+      continue;
+    }
+    working_.copy(working_, k, kept);
+    impulse_[kept] = impulse_[k];
+    impulse_before_[kept] = impulse_before_[k];
+    gap_before_[kept++] = gap_before_[k];
+  }
+  working_.resize(kept);
+  impulse_.resize(kept);
+  impulse_before_.resize(kept);
+  gap_before_.resize(kept);
+}
+
+template <typename Real> void PackedIterations<Real>::Constraints::resize(std::size_t count)
+{
+  source.resize(count);
+  ends.resize(count);
+  normal.resize(count);
+  diagonal.resize(count);
+  compliance.resize(count);
+}
+
+template <typename Real>
+void PackedIterations<Real>::Constraints::copy(const Constraints &other, std::size_t k,
+                                               std::size_t to)
+{
+  source[to] = other.source[k];
+  ends[to] = other.ends[k];
+  normal[to] = other.normal[k];
+  diagonal[to] = other.diagonal[k];
+  compliance[to] = other.compliance[k];
+}
+
+template <typename Real>
+void PackedIterations<Real>::pack(const ContactSet &contacts,
+                                  const std::vector<std::size_t> &places,
+                                  const std::vector<double> &free_gap,
+                                  const std::vector<double> &diagonal, const Scales &scales,
+                                  Constraints &packed)
+{
+  packed.resize(places.size());
+  packed.source = places;
+  const double per_length = 1.0 / scales.length;
+  const double diagonal_unit = scales.impulse / scales.length;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const std::size_t c = places[k];
+    const double *const n = &contacts.normal[3 * c];
+    packed.ends[k] = {place<Real>(contacts.first[c]), place<Real>(contacts.second[c])};
+    set_lanes(packed.normal[k], n[0], n[1], n[2], free_gap[c] * per_length);
+    packed.diagonal[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
+    packed.compliance[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
+  }
 }
 
 template <typename Real>
@@ -227,11 +341,11 @@ void PackedIterations<Real>::pack_body(const RigidBodies &bodies, std::size_t b,
 template <typename Real>
 packed::Pass<Real> PackedIterations<Real>::pass(double momentum, double step)
 {
-  return {ends_.size(),
-          ends_.data(),
-          normal_.data(),
-          diagonal_.data(),
-          compliance_.data(),
+  return {working_.size(),
+          working_.ends.data(),
+          working_.normal.data(),
+          working_.diagonal.data(),
+          working_.compliance.data(),
           impulse_.data(),
           impulse_before_.data(),
           gap_before_.data(),
@@ -245,8 +359,9 @@ template <typename Real>
 void PackedIterations<Real>::unpack(const std::vector<Real> &packed, const Scales &scales,
                                     std::vector<double> &impulse) const
 {
+  for (const std::size_t c : idle_.source) impulse[c] = 0.0;
   for (std::size_t k = 0; k < packed.size(); ++k)
-    impulse[source_[k]] = scales.impulse * static_cast<double>(packed[k]);
+    impulse[working_.source[k]] = scales.impulse * static_cast<double>(packed[k]);
 }
 
 template class PackedIterations<float>;

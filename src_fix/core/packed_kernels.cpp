@@ -36,14 +36,14 @@ namespace {
 
   // Writes the four terms that a gap at the end of the step consists of: n_d dv_d of the three
   // directions, and the gap without impulses.
-  template <typename Real>
-  inline __attribute__((always_inline)) void split_gap(const Pass<Real> &pass, std::size_t c,
+  template <template <typename> typename Arrays, typename Real>
+  inline __attribute__((always_inline)) void split_gap(const Arrays<Real> &arrays, std::size_t c,
                                                        Vector<Real> &terms)
   {
     using Lanes = typename Vector<Real>::Lanes;
-    const Ends &ends = pass.ends[c];
-    const Lanes opening = at(pass.velocity, ends.first) - at(pass.velocity, ends.second);
-    terms.lanes = pass.normal[c].lanes * (opening + Lanes{0, 0, 0, 1});
+    const Ends &ends = arrays.ends[c];
+    const Lanes opening = at(arrays.velocity, ends.first) - at(arrays.velocity, ends.second);
+    terms.lanes = arrays.normal[c].lanes * (opening + Lanes{0, 0, 0, 1});
   }
 
   // Writes the sums over the lanes of each of four vectors.
@@ -58,18 +58,18 @@ namespace {
   }
 
   // Writes the gaps of a block, four at a time: up to three more are written than there are.
-  template <typename Real>
-  inline __attribute__((always_inline)) void gather(const Pass<Real> &pass, std::size_t begin,
+  template <template <typename> typename Arrays, typename Real>
+  inline __attribute__((always_inline)) void gather(const Arrays<Real> &arrays, std::size_t begin,
                                                     std::size_t end, Vector<Real> *gap)
   {
     Vector<Real> terms[4];
     std::size_t c = begin;
     for (; c + 4 <= end; c += 4, ++gap) {
-      for (std::size_t k = 0; k < 4; ++k) split_gap(pass, c + k, terms[k]);
+      for (std::size_t k = 0; k < 4; ++k) split_gap(arrays, c + k, terms[k]);
       add_up(terms, *gap);
     }
     if (c == end) return;
-    for (std::size_t k = 0; k < 4; ++k) split_gap(pass, std::min(c + k, end - 1), terms[k]);
+    for (std::size_t k = 0; k < 4; ++k) split_gap(arrays, std::min(c + k, end - 1), terms[k]);
     add_up(terms, *gap);
   }
 
@@ -201,6 +201,11 @@ INELASTIC_CLONES Passed advance_impulses(const Pass<float> &pass)
 { return advance(pass); }
 INELASTIC_CLONES Passed advance_impulses(const Pass<double> &pass)
 { return advance(pass); }
+
+INELASTIC_CLONES void find_gaps(const Look<float> &look)
+{ gather(look, 0, look.count, look.gap); }
+INELASTIC_CLONES void find_gaps(const Look<double> &look)
+{ gather(look, 0, look.count, look.gap); }
 
 // These run once per solve and are compiled for one instruction set only.
 void add_impulses(const Pass<float> &pass)

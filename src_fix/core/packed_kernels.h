@@ -63,6 +63,20 @@ struct Passed {
 Passed advance_impulses(const Pass<float> &pass);
 Passed advance_impulses(const Pass<double> &pass);
 
+// find_gaps works on these arrays of `count` constraints.
+template <typename Real> struct Look {
+  std::size_t count;
+  const Ends *ends;
+  const Vector<Real> *normal;
+  const Vector<Real> *velocity;    // as in Pass
+  Vector<Real> *gap;               // four in each
+};
+
+// Writes the gaps at the end of the step under the impulses ahead, of rigid constraints or such
+// without an impulse.
+void find_gaps(const Look<float> &look);
+void find_gaps(const Look<double> &look);
+
 // Adds the present impulses to `sum`.
 void add_impulses(const Pass<float> &pass);
 void add_impulses(const Pass<double> &pass);

@@ -195,6 +195,33 @@ def test_row_of_random_speeds_is_isotonic_regression(solve: Solve, seed: int) ->
     assert_within(projection.velocity[:, 0], expected, speed.size * accuracy)
 
 
+@pytest.mark.parametrize("dimers", [False, True])
+def test_push_reaches_spheres_far_away(solve: Solve, dimers: bool) -> None:
+    """Along a row with gaps: each is many tolerances wide until the one before it has closed."""
+    # The first sphere would go on by 1. Those that it reaches end in contact: by momentum
+    # k x - width (0 + 1 + ... + k - 1) = 1 with x how far the first one goes, and k as many as
+    # still are pushed forward, x > width (k - 1).
+    count, width, timestep = 60, 0.002, 0.01
+    pushed = max(k for k in range(1, count) if width * k * (k - 1) / 2 < 1)
+    reach = (1 + width * pushed * (pushed - 1) / 2) / pushed
+    speeds = np.maximum(0, reach - width * np.arange(count)) / timestep
+    speeds[pushed:] = 0
+    contacts = [(k + 1, k, (1, 0, 0), width) for k in range(count - 1)]
+    given = problem([(100, 0, 0)] + [(0, 0, 0)] * (count - 1), np.ones(count), contacts)
+    if dimers:  # both spheres of a dimer are pushed: the same motion
+        twice = problem(
+            np.repeat(given.predicted_velocity, 2, axis=0),
+            np.ones(2 * count),
+            [(2 * a + side, 2 * b + side, n, gap) for a, b, n, gap in contacts for side in (0, 1)],
+        )
+        places = [(k, side, 0) for k in range(count) for side in (0, 1)]
+        given = in_bodies(twice, places, [(2 * k, 2 * k + 1) for k in range(count)])
+        speeds = np.repeat(speeds, 2)
+    projection, accuracy = solve(given)
+    # Relative velocities add up along the spheres in contact.
+    assert_within(projection.velocity[:, 0], speeds, pushed * accuracy)
+
+
 def test_frozen_particle_acts_like_a_wall(solve: Solve) -> None:
     velocity = [(0.2, 0.1, -3), (0, 0, 0)]
     on_particle, _ = solve(problem(velocity, [2, np.inf], [(0, 1, UP, 0.01)]))
