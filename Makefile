@@ -79,7 +79,7 @@ $(VENV)/requirements.txt: pyproject.toml
 # installation would not do: mypy finds no package whose folder has another name than the package.
 $(VENV)/installed: $(VENV)/requirements.txt $(SOURCES)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
-	  --config-settings=wheel.packages= .
+	  $(LINKED:%='--config-settings=wheel.exclude=lammps_inelastic/%/**') .
 	package=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/lammps_inelastic \
 	  && for folder in $(LINKED); do \
 	    rm -rf "$$package/$$folder" && ln -s "$(CURDIR)/$$folder" "$$package/$$folder" || exit 1; \

@@ -14,13 +14,19 @@ held are taken off first.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import svd
 
+from lammps_inelastic.analysis import iterate_contact_frames, read_particle_frame
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+# The walls of these decks; the top is open.
+CONTAINER = np.array([[0.0, 1.0], [0.0, np.inf], [0.0, 1.0]])
 
 
 @dataclass(frozen=True)
@@ -101,3 +107,23 @@ def statics(
     to_walls = np.minimum(points - box[:, 0], box[:, 1] - points).min(axis=1)
     weight = float((stress[to_walls > 1.5 * diameter] ** 2).sum())
     return Statics(degrees, len(one), degrees - rank, len(one) - rank, weight)
+
+
+def statics_of_run(folder: Path) -> Statics:
+    """Analyse the last frame of a run of spheres.in or dimers.in."""
+    particles = read_particle_frame(folder / "particles.lammpsdump")
+    order = np.argsort(particles.ids)
+    ids = particles.ids[order]
+    bodies = np.arange(len(ids)) if particles.bodies is None else particles.bodies[order]
+    bodies = np.unique(bodies, return_inverse=True)[1]
+    *_, frame = iterate_contact_frames(folder / "contacts.lammpsdump")
+    return statics(
+        particles.positions[order],
+        bodies,
+        np.searchsorted(ids, frame.ids[:, 0]),
+        np.where(frame.ids[:, 1] > 0, np.searchsorted(ids, frame.ids[:, 1]), -1),
+        frame.points,
+        frame.normals,
+        2 * float(particles.radii[0]),
+        CONTAINER,
+    )

@@ -2,11 +2,12 @@
 
 `python -m tests.tables NAME` prints one of them. `contacts` shows the coordination number of
 spheres against time step, tolerance and solver, `near` that of dimers that are almost spheres
-against the tolerance, `start` a regular start of dimers beside a random one, `inertia` point masses
-beside solid spheres, `turning` the look at the end of the step beside a program without it, which
-is built for this, `convergence` the error of exactly known motions against time step and
-tolerance, `rest` what motion is left in a bed. Every row is nine seeds unless --seeds says
-otherwise; the last two need none. The paper's numbers are studies.
+against the tolerance, `network` the floppy modes and states of self-stress of measured contacts,
+`start` a regular start of dimers beside a random one, `inertia` point masses beside solid spheres,
+`turning` the look at the end of the step beside a program without it, which is built for this,
+`convergence` the error of exactly known motions against time step and tolerance, `rest` what motion
+is left in a bed. Every row is nine seeds unless --seeds says otherwise; the last two need none. The
+paper's numbers are studies.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from tests.pouring import (
     run_deck,
     shipped_deck,
 )
+from tests.statics import statics_of_run
 
 GRAVITY, RADIUS = 9.81, 0.055
 # So that every bed of dimers covers the paper's box
@@ -83,7 +85,8 @@ def contacts(seeds: int) -> Iterator[str]:
             for tolerance in (0.0005, 0.0001, 0.00002):
                 variables: dict[str, object] = {
                     "dt": timestep,
-                    # The same times for every time step
+                    # The same shaking and the same times for every time step
+                    "random_force": 30 * (0.01 / timestep) ** 0.5,
                     "steps_agitated": round(4 / timestep),
                     "steps_settling": round(8 / timestep),
                     # One time step from start to end
@@ -287,6 +290,41 @@ def rest(_: int) -> Iterator[str]:
                 )
 
 
+NETWORKS: list[tuple[str, str, dict[str, object], tuple[float, ...]]] = [
+    ("2,000 spheres", "spheres", {"particles": 2000, "diameter": 0.087}, (1e-4, 1e-5, 1e-6)),
+    ("1,000 dimers, 1.01", "dimers", {"aspect_ratio": 1.01}, (2e-5, 2e-6)),
+    ("1,000 dimers, 1.3", "dimers", {"aspect_ratio": 1.3}, (2e-5, 2e-6)),
+    ("1,000 dimers, 1.8", "dimers", {"aspect_ratio": 1.8}, (2e-5, 2e-6)),
+]
+
+
+def network(seeds: int) -> Iterator[str]:
+    yield "| packing | eps / r | iterations | floppy modes | self-stress | of it in the bulk |"
+    yield "|---|---|---|---|---|---|"
+    for name, deck, scene, tolerances in NETWORKS:
+        for tolerance in tolerances:
+            found, iterations = [], []
+            for seed in range(1, seeds + 1):
+                variables = {"tolerance_measuring": tolerance, "seed": seed, "dump_every": 100000}
+                with tempfile.TemporaryDirectory() as folder:
+                    log = run_deck(Path(folder), shipped_deck(deck), scene | variables)
+                    found.append(statics_of_run(Path(folder)))
+                iterations.append(float(sum(run.iterations for run in projections(log))))
+            columns = [
+                spread(
+                    [1000 * value / one.degrees for value, one in zip(values, found, strict=True)],
+                    1,
+                )
+                for values in (
+                    [one.floppy for one in found],
+                    [one.self_stress for one in found],
+                    [one.bulk_stress for one in found],
+                )
+            ]
+            cells = [f"{statistics.mean(iterations):.0f}", *columns]
+            yield f"| {name} | {tolerance:g} | {' | '.join(cells)} |"
+
+
 def summed(runs: Sequence[Projections]) -> Projections:
     """Return several runs of a log as one."""
     return Projections(
@@ -300,6 +338,7 @@ def summed(runs: Sequence[Projections]) -> Projections:
 TABLES = {
     "contacts": contacts,
     "near": near,
+    "network": network,
     "start": start,
     "inertia": inertia,
     "turning": turning,

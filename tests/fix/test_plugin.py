@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+from importlib.metadata import distribution, entry_points
 from pathlib import Path
 
 from tests.fix.lammps_run import LAUNCHER, Runner
@@ -15,6 +15,14 @@ def plugin_file() -> Path:
     """The file that the entry point leads LAMMPS to."""
     (entry,) = entry_points(group="lammps.plugins", name="inelastic")
     return Path(entry.load()()) / "inelasticplugin.so"
+
+
+def test_everything_is_in_one_package() -> None:
+    """Nothing else of the repository is installed: other packages may be called analysis or tests."""
+    installed = distribution("lammps-inelastic").files
+    assert installed
+    folders = {file.parts[0] for file in installed if file.parts[0] != ".."}  # the commands
+    assert {name for name in folders if not name.endswith(".dist-info")} == {"lammps_inelastic"}
 
 
 def test_found_without_a_plugin_command(lmp: Runner) -> None:
