@@ -18,7 +18,7 @@ def plugin_file() -> Path:
 
 
 def test_everything_is_in_one_package() -> None:
-    """Nothing else of the repository is installed: other packages may be called analysis or tests."""
+    """Nothing else of the repository is installed: `tests` may be another one's name."""
     installed = distribution("lammps-inelastic").files
     assert installed
     folders = {file.parts[0] for file in installed if file.parts[0] != ".."}  # the commands
