@@ -35,7 +35,9 @@ def poured(tmp_path_factory: pytest.TempPathFactory) -> Poured:
     @cache
     def pour(aspect_ratio: float, start: str, seed: int) -> Packing:
         folder = tmp_path_factory.mktemp("dimers")
-        variables = {"aspect_ratio": aspect_ratio, "start": start, "seed": seed}
+        variables: dict[str, object] = {"aspect_ratio": aspect_ratio, "start": start, "seed": seed}
+        if aspect_ratio < 1.04:  # at the deck's 2e-5 gaps that count as closed add 1 % to contacts
+            variables["tolerance_measuring"] = 5e-4 * (aspect_ratio - 1)
         run_deck(folder, shipped_deck("dimers"), DIMERS | variables)
         return measure(folder)
 
