@@ -567,7 +567,8 @@ def crushed(name: str, folder: Path, options: str) -> str:
         return scene([0.5, RADIUS, 0.5], RADIUS, folder, tolerance=EPS, skin=0.1, **lid)
     if name == "spheres":
         points = random_points(250, CENTRES, 2 * RADIUS, seed=1)
-        return scene(points, RADIUS, folder, tolerance=EPS, skin=0.2, **lid)
+        # Some are squeezed out fast before there is no room: they move by 0.2 in a step.
+        return scene(points, RADIUS, folder, tolerance=EPS, skin=0.5, **lid)
     if name == "dimers":
         bodies = random_bodies([dimer(1.5)] * 60, RADIUS, CENTRES, seed=1)
         return body_scene(bodies, RADIUS, folder, inertia="point", tolerance=EPS, skin=0.2, **lid)
