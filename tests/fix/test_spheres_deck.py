@@ -54,7 +54,7 @@ def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
         # More than there is memory for.
         ({"particles": 2147483647}, "no room: particles of this diameter would fill 299"),
         ({"drag": 100}, "drag times dt must be below 1, not 1"),
-        ({"drag": 30}, "drag times dt_resting must be below 1, not 1.5"),
+        ({"drag": 75}, "drag times dt_resting must be below 1, not 1.5"),
     ],
 )
 def test_wrong_parameters(
