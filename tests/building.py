@@ -42,6 +42,15 @@ def run(*command: str) -> None:
         pytest.fail(f"{' '.join(command)}\n{done.stdout}", pytrace=False)
 
 
+def plugin(sources: Path, build: Path) -> Path:
+    """Build the plugin of these sources in a folder; return the folder that holds it."""
+    options = ["-DINELASTIC_PYTHON=OFF", "-DINELASTIC_PLUGIN=ON"]
+    options += [f"-DPython_EXECUTABLE={sys.executable}", *generator()]
+    run(*cmake(), "-S", str(sources), "-B", str(build), *options)
+    run(*cmake(), "--build", str(build), "--target", "inelasticplugin")
+    return build / "src_fix" / "lammps"
+
+
 def sanitized_plugin(build: Path) -> Path:
     """Build the plugin with both sanitizers in a folder; return the folder that holds it."""
     run(

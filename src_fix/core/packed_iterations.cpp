@@ -170,7 +170,7 @@ template <typename Real> void PackedIterations<Real>::look()
 }
 
 template <typename Real>
-std::size_t PackedIterations<Real>::join(const std::vector<double> &gap, const Scales &scales)
+void PackedIterations<Real>::join(const std::vector<double> &gap, const Scales &scales)
 {
   std::vector<Real> packed(idle_.size());
   std::vector<std::size_t> near;
@@ -179,12 +179,11 @@ std::size_t PackedIterations<Real>::join(const std::vector<double> &gap, const S
     if (!(packed[k] > idle_gap_)) near.push_back(k);
   }
   wake(near, packed.data());
-  return near.size();
 }
 
 // Makes idle constraints working, given by their places in ascending order. `gap` has one number per
-// idle constraint. It stands for the gaps of the impulses before, of which nothing is known; from the
-// next iteration on they are.
+// idle constraint. It is kept as the gap of the impulses before, which is not known. Only the next
+// advance uses it, to tell how far from closed the constraint is.
 template <typename Real>
 void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Real *gap)
 {

@@ -53,8 +53,8 @@ template <typename Real> class PackedIterations {
   void look();
 
   // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per
-  // constraint of the problem [length]. Returns how many there were.
-  std::size_t join(const std::vector<double> &gap, const Scales &scales);
+  // constraint of the problem [length].
+  void join(const std::vector<double> &gap, const Scales &scales);
 
   // Writes the present impulses, in the order of the problem's constraints.
   void impulses(const Scales &scales, std::vector<double> &impulse) const

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.benchmark import machine, million, recorded, scenes_without, settling
+from tests.benchmark import earlier, machine, million, recorded, scenes_without, settling
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,10 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="smaller scenes: 9 minutes")
     parser.add_argument("--out", type=Path, default=Path("benchmark"), help="folder for the runs")
     parser.add_argument(
-        "parts", nargs="*", help="of: machine settling recorded growth parts million"
+        "parts", nargs="*", help="of: machine settling recorded growth parts million earlier"
+    )
+    parser.add_argument(
+        "--commit", help="with which the decks are compared, as `git` names it (part earlier)"
     )
     options = parser.parse_args()
     size = QUICK if options.quick else FULL
@@ -63,9 +66,14 @@ def main() -> int:
         "growth": lambda: settling.grow(out / "growth", size.growing, size.ranks),
         "parts": lambda: scenes_without.measure(each=not options.quick),
         "million": lambda: million.measure(out / "million"),
+        "earlier": lambda: earlier.measure(options.commit, size.particles, size.diameter),
     }
     if not size.million:
         del parts["million"]
+    if options.commit is None:
+        del parts["earlier"]
+        if "earlier" in options.parts:
+            parser.error("earlier needs --commit")
     for name in options.parts:
         if name not in parts:
             parser.error(f"no part {name}; there are {', '.join(parts)}")

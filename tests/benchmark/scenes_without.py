@@ -13,11 +13,10 @@ import re
 import shutil
 import statistics
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
-from tests.building import cmake, generator, run
+from tests import building
 from tests.fix.lammps_run import without_launcher
 
 ROOT = Path(__file__).parents[2]
@@ -107,12 +106,7 @@ def build(folder: Path, cuts: list[Cut]) -> Path:
         text = path.read_text()
         assert text.count(there) == 1, f"{name} has not one {there!r}"
         path.write_text(text.replace(there, instead))
-    target = folder / "build"
-    configure = ["-DINELASTIC_PYTHON=OFF", "-DINELASTIC_PLUGIN=ON"]
-    configure += [f"-DPython_EXECUTABLE={sys.executable}", *generator()]
-    run(*cmake(), "-S", str(sources), "-B", str(target), *configure)
-    run(*cmake(), "--build", str(target), "--target", "inelasticplugin")
-    return target / "src_fix" / "lammps"
+    return building.plugin(sources, folder / "build")
 
 
 def seconds(plugin: Path) -> float:

@@ -1,0 +1,105 @@
+"""The shipped decks with this code and with that of an earlier commit, in turn.
+
+Each runs its own decks with its own plugin, so that changed defaults count, too. The plugin of the
+earlier commit is built from what git has.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests import building
+from tests.pouring import Projections, projections, run_deck
+
+ROOT = Path(__file__).parents[2]
+NO_STEPS = {
+    f"steps_{phase}": 0 for phase in ("agitated", "settling", "resting", "tightening", "measuring")
+}
+
+
+@dataclass(frozen=True)
+class Code:
+    """A plugin, in this folder, and the decks that belong to it."""
+
+    plugin: Path
+    decks: Path
+
+    def run(self, folder: Path, name: str, variables: dict[str, object]) -> Projections:
+        """Run a deck in `folder`; return the sum of its runs, starts included."""
+        text = (self.decks / f"{name}.in").read_text()
+        known = {key: value for key, value in variables.items() if f"\n  {key} " in text}
+        runs = projections(run_deck(folder, text, known, self.plugin))
+        return Projections(
+            sum(one.projections for one in runs),
+            sum(one.iterations for one in runs),
+            max(one.overlap for one in runs),
+            sum(one.seconds for one in runs),
+        )
+
+
+def check_out(commit: str, folder: Path) -> None:
+    """Write the files of a commit into `folder`. Raises ValueError if git does not know it."""
+    archive = subprocess.run(
+        ["git", "archive", commit, "--", "CMakeLists.txt", "src_fix", "inputs"],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+    )
+    if archive.returncode != 0:
+        raise ValueError(f"{commit}: {archive.stderr.decode().strip()}")
+    folder.mkdir()
+    subprocess.run(["tar", "-x"], cwd=folder, input=archive.stdout, check=True)
+
+
+def scenes(particles: int, diameter: float) -> dict[str, tuple[str, dict[str, object]]]:
+    """Return name -> deck and variables."""
+    size: dict[str, object] = {"particles": particles, "diameter": diameter}
+    return {
+        "spheres.in": ("spheres", size),
+        "dimers.in, L/d 1.5": ("dimers", {**size, "aspect_ratio": 1.5}),
+        "dimers.in, L/d 1.01": ("dimers", {**size, "aspect_ratio": 1.01}),
+    }
+
+
+def settle(code: Code, folder: Path, particles: int, diameter: float) -> Projections:
+    """Let a start of spheres settle; return what settling.in took."""
+    size: dict[str, object] = {"particles": particles, "diameter": diameter}
+    code.run(folder / "start", "spheres", {**size, **NO_STEPS})
+    restart = str(folder / "start" / "packing.restart")
+    return code.run(folder / "run", "settling", {"packing": restart, "diameter": diameter})
+
+
+def measure(commit: str, particles: int, diameter: float) -> None:
+    """Print iterations and seconds of both, and how many times as fast this code is."""
+    with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
+        folder = Path(name)
+        check_out(commit, folder / "earlier")
+        codes = {
+            which: Code(building.plugin(sources, folder / f"build-{which}"), sources / "inputs")
+            for which, sources in ((commit, folder / "earlier"), ("now", ROOT))
+        }
+        for scene, (deck, variables) in scenes(particles, diameter).items():
+            report(
+                scene,
+                {which: code.run(folder / "run", deck, variables) for which, code in codes.items()},
+            )
+        report(
+            "settling.in",
+            {
+                which: settle(code, folder / which, particles, diameter)
+                for which, code in codes.items()
+            },
+        )
+
+
+def report(scene: str, took: dict[str, Projections]) -> None:
+    """Print a line."""
+    words = [
+        f"{which} {one.projections:,} steps, {one.iterations:,} iterations, {one.seconds:.1f} s"
+        for which, one in took.items()
+    ]
+    earlier, now = took.values()
+    print(f"{scene}: {'; '.join(words)}: {earlier.seconds / now.seconds:.2f} times", flush=True)
