@@ -78,7 +78,10 @@ def main() -> int:
         if name not in parts:
             parser.error(f"no part {name}; there are {', '.join(parts)}")
     for name in options.parts or parts:
-        parts[name]()
+        try:
+            parts[name]()
+        except ValueError as error:
+            parser.error(str(error))
     return 0
 
 
