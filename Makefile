@@ -4,7 +4,7 @@
 # make report    set up, write the report of the paper's studies from the results kept here
 # make validate  set up, check the physics (minutes)
 # make bench     set up, measure speed and accuracy (an hour and more; bench-quick: 9 minutes)
-# make tables    set up, print the measured tables of the documentation (an hour)
+# make tables    set up, print the measured tables of the documentation (hours)
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
 # make clean     remove what these made
 
