@@ -29,6 +29,12 @@ from tests.fix.lammps_run import without_launcher
 BULK = np.array([[0.25, 0.75]] * 3)  # the paper's box
 
 
+# Variables of a deck that makes a start and no more.
+NO_STEPS: dict[str, object] = {
+    f"steps_{phase}": 0 for phase in ("agitated", "settling", "resting", "tightening", "measuring")
+}
+
+
 def shipped_deck(name: str) -> str:
     """Text of the installed deck inputs/NAME.in."""
     return (files("lammps_inelastic.inputs") / f"{name}.in").read_text()
@@ -81,6 +87,16 @@ def projections(log: str) -> list[Projections]:
         re.MULTILINE | re.DOTALL,
     )
     return [Projections(int(a), int(b), float(c), float(d)) for a, b, c, d in pattern.findall(log)]
+
+
+def summed(runs: Sequence[Projections]) -> Projections:
+    """Return several runs of a log as one."""
+    return Projections(
+        sum(run.projections for run in runs),
+        sum(run.iterations for run in runs),
+        max(run.overlap for run in runs),
+        sum(run.seconds for run in runs),
+    )
 
 
 @dataclass(frozen=True)

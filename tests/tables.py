@@ -16,7 +16,7 @@ import argparse
 import statistics
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from tests.benchmark.scenes_without import TURNING, build
@@ -30,6 +30,7 @@ from tests.pouring import (
     projections,
     run_deck,
     shipped_deck,
+    summed,
 )
 from tests.statics import statics_of_run
 
@@ -329,16 +330,6 @@ def network(seeds: int) -> Iterator[str]:
             ]
             cells = [f"{statistics.mean(iterations):.0f}", *columns]
             yield f"| {name} | {tolerance:g} | {' | '.join(cells)} |"
-
-
-def summed(runs: Sequence[Projections]) -> Projections:
-    """Return several runs of a log as one."""
-    return Projections(
-        sum(run.projections for run in runs),
-        sum(run.iterations for run in runs),
-        max(run.overlap for run in runs),
-        sum(run.seconds for run in runs),
-    )
 
 
 TABLES = {

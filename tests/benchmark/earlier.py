@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests import building
-from tests.pouring import Projections, projections, run_deck
+from tests.pouring import NO_STEPS, Projections, projections, run_deck, summed
 
 ROOT = Path(__file__).parents[2]
-NO_STEPS = {
-    f"steps_{phase}": 0 for phase in ("agitated", "settling", "resting", "tightening", "measuring")
-}
 
 
 @dataclass(frozen=True)
@@ -30,14 +27,9 @@ class Code:
     def run(self, folder: Path, name: str, variables: dict[str, object]) -> Projections:
         """Run a deck in `folder`; return the sum of its runs, starts included."""
         text = (self.decks / f"{name}.in").read_text()
+        # An earlier deck may have fewer parameters, and refuses what it does not know.
         known = {key: value for key, value in variables.items() if f"\n  {key} " in text}
-        runs = projections(run_deck(folder, text, known, self.plugin))
-        return Projections(
-            sum(one.projections for one in runs),
-            sum(one.iterations for one in runs),
-            max(one.overlap for one in runs),
-            sum(one.seconds for one in runs),
-        )
+        return summed(projections(run_deck(folder, text, known, self.plugin)))
 
 
 def check_out(commit: str, folder: Path) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.pouring import shipped_deck
+from tests.pouring import NO_STEPS, shipped_deck
 
 STEPS = 20
 TOLERANCE = 0.005  # radii
@@ -78,10 +78,7 @@ def settle(folder: Path, particles: int, steps: int | None) -> Effort:
     if steps is not None:
         assert END in text
         text = text.replace(END, f"run {steps}\n")
-    nothing = {
-        f"steps_{p}": 0 for p in ("agitated", "settling", "resting", "tightening", "measuring")
-    }
-    start = {"particles": particles, "start": "lattice.data", "out": "start", **nothing, **common}
+    start = {"particles": particles, "start": "lattice.data", "out": "start", **NO_STEPS, **common}
     _lmp(folder, "spheres", shipped_deck("spheres"), start)
     memory = _lmp(folder, "settling", text, {"packing": "start/packing.restart", **common})
     log = (folder / "settling" / "log.lammps").read_text()

@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import read_run_log
-from tests.pouring import Recorded, read_record, recording, records, run_deck, shipped_deck
+from tests.pouring import (
+    NO_STEPS,
+    Recorded,
+    read_record,
+    recording,
+    records,
+    run_deck,
+    shipped_deck,
+)
 
 TOLERANCE = 0.0005  # of the runs that are recorded [radii]
 TOLERANCES = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
@@ -71,10 +79,7 @@ def record(scene: Scene, folder: Path) -> dict[str, Recorded]:
     values: dict[str, object] = {"particles": scene.particles, "diameter": scene.diameter}
     if scene.aspect_ratio is not None:
         values["aspect_ratio"] = scene.aspect_ratio
-    phases = ("agitated", "settling", "resting", "tightening", "measuring")
-    run_deck(
-        folder / "start", shipped_deck(scene.particle), values | {f"steps_{p}": 0 for p in phases}
-    )
+    run_deck(folder / "start", shipped_deck(scene.particle), values | NO_STEPS)
     run_deck(
         folder,
         recording(shipped_deck("settling"), RECORD_EVERY),
