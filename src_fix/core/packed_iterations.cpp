@@ -156,8 +156,9 @@ template <typename Real> void PackedIterations<Real>::finish(Host &host, double 
                                             static_cast<Real>(momentum)});
 }
 
-template <typename Real> void PackedIterations<Real>::look()
+template <typename Real> void PackedIterations<Real>::look(double idle_gap)
 {
+  idle_gap_ = static_cast<Real>(idle_gap);
   rest();
   looked_.resize((idle_.size() + 3) / 4);
   packed::find_gaps(packed::Look<Real>{idle_.size(), idle_.ends.data(), idle_.normal.data(),

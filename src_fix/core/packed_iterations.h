@@ -48,9 +48,9 @@ template <typename Real> class PackedIterations {
   void finish(Host &host, double momentum);
 
   // Makes the idle constraints working whose gaps under the impulses ahead are not above
-  // `idle_gap`, and idle the working ones without an impulse whose gaps are, where they are more
-  // than a few. Call it between finish and advance.
-  void look();
+  // `idle_gap`, in packed units, and idle the working ones without an impulse whose gaps are, where
+  // they are more than a few. Call it between finish and advance.
+  void look(double idle_gap);
 
   // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per
   // constraint of the problem [length].
