@@ -12,50 +12,47 @@ namespace {
 
   constexpr double UNIT_ROUND_OFF = 0.5 * std::numeric_limits<double>::epsilon();
 
-  // Returns whether round-off, a few 1e-7 of the largest length in single precision, is far below
-  // the target. Double precision is the best there is.
-  template <typename Real> bool suffices(double largest_length, double target)
+  // Returns the least residual that iterations can reach: round-off, a few 1e-7 of the largest change
+  // in single precision, is far below. Double precision is the best there is.
+  template <typename Real> double least_residual(double largest_change)
   {
-    constexpr double MOST_TARGETS = 3.0e5;
-    return sizeof(Real) == sizeof(double) || largest_length < MOST_TARGETS * target;
+    constexpr double PART = 1.0 / 3.0e5;
+    return sizeof(Real) == sizeof(double) ? 0.0 : PART * largest_change;
   }
 
-  // Nesterov's momentum is beta_k = (t_k - 1) / t_(k+1) with t_1 = 1 and
-  // t_(k+1) = (1 + sqrt(1 + 4 t_k^2)) / 2.
+  // The weights of accelerated_gradient.h.
   class Momentum {
    public:
-    double value() const { return value_; }
-
-    void restart()
-    {
-      value_ = 0.0;
-      time_ = 1.0;
-    }
-
-    void grow()
+    Weights next(double curvature)
     {
       const double next_time = 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * time_ * time_));
-      value_ = (time_ - 1.0) / next_time;
+      const Weights weights = {(time_ - 1.0) / next_time, time_ / next_time,
+                               (time_ - 1.0) / (next_time * curvature * length_)};
+      length_ = (2.0 * time_ + next_time - 1.0) / (next_time * curvature);
       time_ = next_time;
+      return weights;
     }
 
+    void restart() { time_ = 1.0; }
+
    private:
-    double value_ = 0.0;
-    double time_ = 1.0;    // t
+    double time_ = 1.0;      // t
+    double length_ = 1.0;    // g / L, of no meaning where t is 1
   };
 
   packed::Passed over_ranks(const packed::Passed &mine, Host &host)
   {
-    double sums[3] = {mine.uphill, mine.change_squared, mine.curved};
-    double maxima[3] = {-mine.least_gap, mine.most_under_force, mine.heaviest};
-    host.reduce(sums, 3, maxima, 3);
+    double sums[3] = {mine.uphill, mine.curved, mine.steep};
+    double maxima[4] = {-mine.least_gap, mine.most_under_force, mine.heaviest, mine.farthest};
+    host.reduce(sums, 3, maxima, 4);
     packed::Passed all;
     all.uphill = sums[0];
-    all.change_squared = sums[1];
-    all.curved = sums[2];
+    all.curved = sums[1];
+    all.steep = sums[2];
     all.least_gap = -maxima[0];
     all.most_under_force = maxima[1];
     all.heaviest = maxima[2];
+    all.farthest = maxima[3];
     return all;
   }
 
@@ -98,11 +95,11 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   return infeasible ? Status::INFEASIBLE : Status::ROUND_OFF;
 }
 
-void AcceleratedProjectedGradient::raise_curvature(double curved, double change_squared)
+void AcceleratedProjectedGradient::raise_curvature(const packed::Passed &passed)
 {
-  constexpr double MARGIN = 1.05;
-  if (curved > curvature_ * change_squared && change_squared > 0.0)
-    curvature_ = MARGIN * curved / change_squared;
+  constexpr double MARGIN = 1.02;
+  if (passed.steep > curvature_ * passed.curved && passed.curved > 0.0)
+    curvature_ = MARGIN * passed.steep / passed.curved;
 }
 
 template <typename Real>
@@ -111,8 +108,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
                                              const Scales &scales, Host &host, SolverResult &result)
 {
   // If double precision refuses so many residuals that single precision finds within the tolerance,
-  // round-off shows and single precision is given up. (It also refuses where a constraint was idle
-  // for too long, once or twice in a solve.)
+  // round-off shows and this search is given up. (It also refuses where a constraint was idle for too
+  // long, once or twice in a solve.)
   constexpr long MOST_FAILURES = 8;
   // Idle constraints are looked at in every so many iterations. A constraint is idle above so many
   // residuals, or tolerances where they are more: gaps change by some residuals until the end. (With
@@ -121,39 +118,35 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   constexpr long LOOK_EVERY = 20;
   constexpr double IDLE_GAP = 5.0;
 
-  iterations.prepare(problem, gap_operator_.free_gap(), diagonal_, gap_,
+  iterations.prepare(problem, diagonal_, gap_,
                      IDLE_GAP * std::max(limits.tolerance, result.residual.largest()), scales,
                      host);
   std::vector<double> &impulse = problem.contacts.impulse;
   const double target = result.target / scales.length;
   Momentum momentum;
-  double last_change_squared = 0.0;
   long next_check = 0;
   long failures = 0;
   while (result.iterations < limits.max_iterations) {
     const packed::Passed passed =
-        over_ranks(iterations.advance(momentum.value(), 1.0 / curvature_), host);
+        over_ranks(iterations.advance(momentum.next(curvature_), 1.0 / curvature_), host);
     ++result.iterations;
-    if (!std::isfinite(passed.curved)) {
+    if (!std::isfinite(passed.steep)) {
       result.residual = UNSOLVED;
       return Status::NOT_FINITE;
     }
-    raise_curvature(passed.curved, last_change_squared);
-    last_change_squared = passed.change_squared;
+    raise_curvature(passed);
     const double packed_residual = std::max(-passed.least_gap, passed.most_under_force);
     result.trend.see(result.iterations, scales.length * packed_residual);
 
-    if (packed_residual <= target && result.iterations >= next_check) {
+    const double least = least_residual<Real>(passed.farthest);
+    if (packed_residual <= std::max(target, least) && result.iterations >= next_check) {
       iterations.impulses_before(scales, impulse);
       if (judge(problem, host, result)) return Status::CONVERGED;
+      if (packed_residual > target) return Status::OUT_OF_ITERATIONS;
       iterations.join(gap_, scales);
       if (++failures == MOST_FAILURES && sizeof(Real) < sizeof(double))
         return Status::OUT_OF_ITERATIONS;
       next_check = result.iterations + failures;
-    }
-    if (!suffices<Real>(passed.heaviest, target)) {
-      iterations.impulses(scales, impulse);
-      return Status::OUT_OF_ITERATIONS;
     }
     result.round_off = UNIT_ROUND_OFF * scales.length * passed.heaviest;
     if (result.iterations % CHECK_EVERY == 0) {
@@ -162,11 +155,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
       if (end) return *end;
     }
 
-    if (passed.uphill > 0.0)
-      momentum.restart();
-    else
-      momentum.grow();
-    iterations.finish(host, momentum.value());
+    if (passed.uphill > 0.0) momentum.restart();
+    iterations.finish(host);
     if (result.iterations % LOOK_EVERY == 0)
       iterations.look(IDLE_GAP * std::max(limits.tolerance / scales.length, packed_residual));
   }
@@ -179,6 +169,10 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
 SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
                                                  const SolverLimits &limits, Host &host)
 {
+  // Residuals of more targets are left to double precision from the start. Otherwise there are so
+  // many searches in single precision before.
+  constexpr double WITHIN_SINGLE = 1.0e12;
+  constexpr int MOST_SEARCHES = 3;
   // L is let down a little between calls, so that it can follow a packing that becomes less
   // connected.
   constexpr double RELAXATION = 0.998;
@@ -201,17 +195,27 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   if (result.status != Status::OUT_OF_ITERATIONS) return result;
 
   const double factor = scale(guess);
-  for (double &value : impulse) value *= factor;
+  const std::vector<double> &free_gap = gap_operator_.free_gap();
+  for (std::size_t c = 0; c < impulse.size(); ++c) {
+    impulse[c] *= factor;
+    gap_[c] = free_gap[c] + factor * (gap_[c] - free_gap[c]);
+  }
   curvature_ = curvature_ == 0.0 ? FIRST_CURVATURE : std::max(1.0, RELAXATION * curvature_);
 
   Scales scales;
   scales.length = std::exp2(std::ilogb(guess.largest_length));
   scales.impulse = scales.length / std::exp2(std::ilogb(guess.largest_diagonal));
-  if (suffices<float>(guess.largest_length, result.target))
+  const auto settled = [&] {
+    return result.status == Status::CONVERGED || result.status == Status::INFEASIBLE ||
+        result.iterations >= limits.max_iterations;
+  };
+  const bool of_use = guess.residual.largest() < WITHIN_SINGLE * result.target;
+  for (int search = 0; of_use && search < MOST_SEARCHES && !settled(); ++search) {
+    if (search > 0) gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
     result.status = iterate(single_, problem, limits, scales, host, result);
-  const bool settled = result.status == Status::CONVERGED || result.status == Status::INFEASIBLE;
-  if (!settled && result.iterations < limits.max_iterations) {
-    gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
+  }
+  if (!settled()) {
+    if (of_use) gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
     result.status = iterate(double_, problem, limits, scales, host, result);
   }
   settle_for_tolerance(limits, result.residual.largest(), result);

@@ -18,6 +18,9 @@ namespace {
   // look would otherwise move them all to save little.
   constexpr std::size_t FEW = 10;
 
+  // A gap is known to a few units of round-off of the largest change.
+  constexpr double ROUND_OFFS = 2.0;
+
   // Orders constraints, given by their places, so that neighbours in the list come into different
   // streams.
   std::vector<std::size_t> in_streams(const std::vector<std::size_t> &places)
@@ -105,24 +108,21 @@ namespace {
 
 template <typename Real>
 void PackedIterations<Real>::prepare(const ContactProblem &problem,
-                                     const std::vector<double> &free_gap,
                                      const std::vector<double> &diagonal,
                                      const std::vector<double> &gap, double idle_gap,
                                      const Scales &scales, Host &host)
 {
   idle_gap_ = static_cast<Real>(idle_gap / scales.length);
-  const std::vector<double> &impulse = problem.contacts.impulse;
+  start_ = problem.contacts.impulse;
   std::vector<std::size_t> near, far;
   for (std::size_t c = 0; c < gap.size(); ++c)
-    (impulse[c] > 0.0 || !(gap[c] > idle_gap) ? near : far).push_back(c);
-  near = in_streams(near);
-  pack(problem.contacts, near, free_gap, diagonal, scales, working_);
-  pack(problem.contacts, far, free_gap, diagonal, scales, idle_);
-  impulse_.resize(near.size());
-  for (std::size_t k = 0; k < near.size(); ++k)
-    impulse_[k] = static_cast<Real>(impulse[near[k]] / scales.impulse);
-  impulse_before_ = impulse_;
-  gap_before_.assign(near.size(), 0);
+    (start_[c] > 0.0 || !(gap[c] > idle_gap) ? near : far).push_back(c);
+  pack(problem.contacts, in_streams(near), diagonal, gap, scales, working_);
+  pack(problem.contacts, far, diagonal, gap, scales, idle_);
+  for (std::vector<Real> *const state : states()) state->assign(near.size(), 0);
+  inverse_diagonals_ = 0.0;
+  for (const Constraints *const packed : {&working_, &idle_})
+    for (const Real value : packed->diagonal) inverse_diagonals_ += 1.0 / value;
 
   const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
   const double mobility_unit = problem.timestep * (scales.impulse / scales.length);
@@ -132,28 +132,32 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   pack_bodies(problem.bodies, mobility_unit);
   sum_.assign(particles, Vector{});
   velocity_.assign(particles, Vector{});
-  ahead_.assign(particles, Vector{});
   choose_ghosts(problem, host);
-  packed::add_impulses(pass(0.0, 0.0));
-  finish(host, 0.0);
 }
 
 template <typename Real>
-packed::Passed PackedIterations<Real>::advance(double momentum, double step)
+packed::Passed PackedIterations<Real>::advance(const Weights &weights, double step)
 {
-  const packed::Passed passed = packed::advance_impulses(pass(momentum, step));
-  impulse_.swap(impulse_before_);
+  packed::Passed passed = packed::advance_impulses(packed::Pass<Real>{
+      working_.size(), working_.ends.data(), working_.normal.data(), working_.diagonal.data(),
+      working_.compliance.data(), working_.least.data(), velocity_.data(), unbound_.data(),
+      change_before_.data(), gap_before_.data(), sum_.data(), static_cast<Real>(step),
+      static_cast<Real>(step_before_), static_cast<Real>(weights.along),
+      static_cast<Real>(weights.beyond), static_cast<Real>(weights.back)});
+  step_before_ = step;
+  // Where gaps change by no more than round-off, squares of the changes tell nothing.
+  const double round_off = ROUND_OFFS * std::numeric_limits<Real>::epsilon() * passed.farthest;
+  if (passed.steep <= inverse_diagonals_ * round_off * round_off) passed.steep = 0.0;
   return passed;
 }
 
-template <typename Real> void PackedIterations<Real>::finish(Host &host, double momentum)
+template <typename Real> void PackedIterations<Real>::finish(Host &host)
 {
   host.sum_over_chosen_ghosts(reinterpret_cast<Real *>(sum_.data()));
   if (!rods_.empty() || !bodies_.empty())
     packed::turn_bodies(rods_, bodies_, members_.data(), sum_.data());
-  packed::move_particles(packed::Move<Real>{velocity_.size(), inverse_mass_.data(), sum_.data(),
-                                            velocity_.data(), ahead_.data(),
-                                            static_cast<Real>(momentum)});
+  packed::move_particles(
+      packed::Move<Real>{velocity_.size(), inverse_mass_.data(), sum_.data(), velocity_.data()});
 }
 
 template <typename Real> void PackedIterations<Real>::look(double idle_gap)
@@ -162,7 +166,7 @@ template <typename Real> void PackedIterations<Real>::look(double idle_gap)
   rest();
   looked_.resize((idle_.size() + 3) / 4);
   packed::find_gaps(packed::Look<Real>{idle_.size(), idle_.ends.data(), idle_.normal.data(),
-                                       ahead_.data(), looked_.data()});
+                                       velocity_.data(), looked_.data()});
   const Real *const gap = reinterpret_cast<const Real *>(looked_.data());
   std::vector<std::size_t> near;
   for (std::size_t k = 0; k < idle_.size(); ++k)
@@ -192,9 +196,7 @@ void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Re
   std::size_t to = working_.size();
   const std::size_t count = to + near.size();
   working_.resize(count);
-  impulse_.resize(count, 0);
-  impulse_before_.resize(count, 0);
-  gap_before_.resize(count);
+  for (std::vector<Real> *const state : states()) state->resize(count, 0);
   for (const std::size_t k : in_streams(near)) {
     working_.copy(idle_, k, to);
     gap_before_[to++] = gap[k];
@@ -214,7 +216,8 @@ void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Re
 template <typename Real> void PackedIterations<Real>::rest()
 {
   const auto rests = [this](std::size_t k) {
-    return impulse_[k] == 0 && impulse_before_[k] == 0 && gap_before_[k] > idle_gap_;
+    return working_.least[k] == 0 && !(unbound_[k] > 0) && change_before_[k] == 0 &&
+        gap_before_[k] > idle_gap_;
   };
   std::size_t resting = 0;
   for (std::size_t k = 0; k < working_.size(); ++k)
@@ -228,14 +231,11 @@ template <typename Real> void PackedIterations<Real>::rest()
       continue;
     }
     working_.copy(working_, k, kept);
-    impulse_[kept] = impulse_[k];
-    impulse_before_[kept] = impulse_before_[k];
-    gap_before_[kept++] = gap_before_[k];
+    for (std::vector<Real> *const state : states()) (*state)[kept] = (*state)[k];
+    ++kept;
   }
   working_.resize(kept);
-  impulse_.resize(kept);
-  impulse_before_.resize(kept);
-  gap_before_.resize(kept);
+  for (std::vector<Real> *const state : states()) state->resize(kept);
 }
 
 template <typename Real> void PackedIterations<Real>::Constraints::resize(std::size_t count)
@@ -245,6 +245,7 @@ template <typename Real> void PackedIterations<Real>::Constraints::resize(std::s
   normal.resize(count);
   diagonal.resize(count);
   compliance.resize(count);
+  least.resize(count);
 }
 
 template <typename Real>
@@ -256,13 +257,14 @@ void PackedIterations<Real>::Constraints::copy(const Constraints &other, std::si
   normal[to] = other.normal[k];
   diagonal[to] = other.diagonal[k];
   compliance[to] = other.compliance[k];
+  least[to] = other.least[k];
 }
 
 template <typename Real>
 void PackedIterations<Real>::pack(const ContactSet &contacts,
                                   const std::vector<std::size_t> &places,
-                                  const std::vector<double> &free_gap,
-                                  const std::vector<double> &diagonal, const Scales &scales,
+                                  const std::vector<double> &diagonal,
+                                  const std::vector<double> &gap, const Scales &scales,
                                   Constraints &packed)
 {
   packed.resize(places.size());
@@ -273,9 +275,10 @@ void PackedIterations<Real>::pack(const ContactSet &contacts,
     const std::size_t c = places[k];
     const double *const n = &contacts.normal[3 * c];
     packed.ends[k] = {place<Real>(contacts.first[c]), place<Real>(contacts.second[c])};
-    set_lanes(packed.normal[k], n[0], n[1], n[2], free_gap[c] * per_length);
+    set_lanes(packed.normal[k], n[0], n[1], n[2], gap[c] * per_length);
     packed.diagonal[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
     packed.compliance[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
+    packed.least[k] = static_cast<Real>(-contacts.impulse[c] / scales.impulse);
   }
 }
 
@@ -338,30 +341,18 @@ void PackedIterations<Real>::pack_body(const RigidBodies &bodies, std::size_t b,
   bodies_.push_back(body);
 }
 
+// `change` may be below the least one.
 template <typename Real>
-packed::Pass<Real> PackedIterations<Real>::pass(double momentum, double step)
-{
-  return {working_.size(),
-          working_.ends.data(),
-          working_.normal.data(),
-          working_.diagonal.data(),
-          working_.compliance.data(),
-          impulse_.data(),
-          impulse_before_.data(),
-          gap_before_.data(),
-          ahead_.data(),
-          sum_.data(),
-          static_cast<Real>(momentum),
-          static_cast<Real>(step)};
-}
-
-template <typename Real>
-void PackedIterations<Real>::unpack(const std::vector<Real> &packed, const Scales &scales,
+void PackedIterations<Real>::unpack(const std::vector<Real> &change, const Scales &scales,
                                     std::vector<double> &impulse) const
 {
   for (const std::size_t c : idle_.source) impulse[c] = 0.0;
-  for (std::size_t k = 0; k < packed.size(); ++k)
-    impulse[working_.source[k]] = scales.impulse * static_cast<double>(packed[k]);
+  for (std::size_t k = 0; k < change.size(); ++k) {
+    const std::size_t c = working_.source[k];
+    impulse[c] = change[k] > working_.least[k]
+        ? std::max(0.0, start_[c] + scales.impulse * static_cast<double>(change[k]))
+        : 0.0;
+  }
 }
 
 template class PackedIterations<float>;

@@ -22,10 +22,10 @@ namespace {
 
   template <typename Real>
   inline __attribute__((always_inline)) void scatter(const Pass<Real> &pass, std::size_t begin,
-                                                     std::size_t end, const Real *impulse)
+                                                     std::size_t end, const Real *change)
   {
     for (std::size_t c = begin; c < end; ++c) {
-      const auto push = pass.normal[c].lanes * impulse[c];
+      const auto push = pass.normal[c].lanes * change[c - begin];
       auto &first = at(pass.sum, pass.ends[c].first);
       auto &second = at(pass.sum, pass.ends[c].second);
       const auto first_sum = first + push, second_sum = second - push;
@@ -79,48 +79,57 @@ namespace {
     Passed passed;
     Vector<Real> gaps[(BLOCK + 3) / 4];
     const Real *const gap = reinterpret_cast<const Real *>(gaps);
+    Real next[BLOCK];
     for (std::size_t begin = 0; begin < pass.count; begin += BLOCK) {
       const std::size_t end = std::min(begin + BLOCK, pass.count);
       gather(pass, begin, end, gaps);
-      Real uphill = 0, change_squared = 0, curved = 0, least = 0, most = 0, heaviest = 0;
-      const Real *const impulse = pass.impulse + begin;
-      Real *const next = pass.impulse_before + begin;
+      Real uphill = 0, curved = 0, steep = 0, lowest = 0, most = 0, heaviest = 0, farthest = 0;
       const Real *const diagonal = pass.diagonal + begin;
       const Real *const compliance = pass.compliance + begin;
+      const Real *const least = pass.least + begin;
+      Real *const unbound = pass.unbound + begin;
+      Real *const change_before = pass.change_before + begin;
       Real *const gap_before = pass.gap_before + begin;
-      const Real momentum = pass.momentum, step = pass.step;
-      const Real share = 1 / (1 + momentum);
+      const Real step = pass.step, step_before = pass.step_before, along = pass.along,
+                 beyond = pass.beyond, back = pass.back;
       const std::size_t size = end - begin;
-#pragma omp simd simdlen(16) reduction(+ : uphill, change_squared, curved) reduction(min : least) \
-    reduction(max : most, heaviest)
+#pragma omp simd simdlen(16) reduction(+ : uphill, curved, steep) reduction(min : lowest) \
+    reduction(max : most, heaviest, farthest)
       for (std::size_t k = 0; k < size; ++k) {
-        const Real last_change = impulse[k] - next[k];
-        const Real ahead = impulse[k] + momentum * last_change;
-        const Real there = gap[k] + compliance[k] * ahead;
-        const Real free = ahead - step * there / diagonal[k];
-        const Real value = free > 0 ? free : 0;
-        const Real change = value - impulse[k];
-        uphill += (ahead - value) * change * diagonal[k];
-        change_squared += change * change * diagonal[k];
-        // This is w of the impulses ahead. It is affine in the impulses, so that
-        // there = here + momentum * (here - gap_before), solved for w of the present impulses:
-        const Real here = (there + momentum * gap_before[k]) * share;
-        const Real under_force = impulse[k] > 0 ? here : 0;
-        least = here < least ? here : least;
+        const Real present = unbound[k] > least[k] ? unbound[k] : least[k];
+        const Real here = gap[k] + compliance[k] * present;
+        const Real per_diagonal = 1 / diagonal[k];
+        const Real down = -step * here * per_diagonal;
+        const Real down_before = -step_before * gap_before[k] * per_diagonal;
+        const Real last_change = present - change_before[k];
+        const Real free = present + down + along * (last_change + down - down_before) +
+            beyond * down + back * (unbound[k] - present);
+        const Real value = free > least[k] ? free : least[k];
+        const Real opened = here - gap_before[k];
+        uphill += here * last_change;
+        curved += opened * last_change;
+        const Real larger = present > change_before[k] ? present : change_before[k];
+        steep += larger > least[k] ? opened * opened * per_diagonal : 0;
+        const Real under_force = present > least[k] ? here : 0;
+        lowest = here < lowest ? here : lowest;
         most = under_force > most ? under_force : most;
-        curved += last_change * (here - gap_before[k]);
+        const Real load = (value - least[k]) * diagonal[k];
+        heaviest = load > heaviest ? load : heaviest;
+        const Real far = (value > 0 ? value : -value) * diagonal[k];
+        farthest = far > farthest ? far : farthest;
+        unbound[k] = free;
+        change_before[k] = present;
         gap_before[k] = here;
         next[k] = value;
-        const Real load = value * diagonal[k];
-        heaviest = load > heaviest ? load : heaviest;
       }
       passed.uphill += uphill;
-      passed.change_squared += change_squared;
       passed.curved += curved;
-      passed.least_gap = std::min(passed.least_gap, static_cast<double>(least));
+      passed.steep += steep;
+      passed.least_gap = std::min(passed.least_gap, static_cast<double>(lowest));
       passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
       passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
-      scatter(pass, begin, end, pass.impulse_before);
+      passed.farthest = std::max(passed.farthest, static_cast<double>(farthest));
+      scatter(pass, begin, end, next);
     }
     return passed;
   }
@@ -131,7 +140,6 @@ namespace {
     for (std::size_t i = 0; i < m.count; ++i) {
       Lanes next = m.sum[i].lanes * m.inverse_mass[i];
       next[3] = 0;
-      m.ahead[i].lanes = next + (next - m.velocity[i].lanes) * m.momentum;
       m.velocity[i].lanes = next;
       m.sum[i].lanes = Lanes{0, 0, 0, 0};
     }
@@ -206,12 +214,6 @@ INELASTIC_CLONES void find_gaps(const Look<float> &look)
 { gather(look, 0, look.count, look.gap); }
 INELASTIC_CLONES void find_gaps(const Look<double> &look)
 { gather(look, 0, look.count, look.gap); }
-
-// These run once per solve and are compiled for one instruction set only.
-void add_impulses(const Pass<float> &pass)
-{ scatter(pass, 0, pass.count, pass.impulse); }
-void add_impulses(const Pass<double> &pass)
-{ scatter(pass, 0, pass.count, pass.impulse); }
 
 INELASTIC_CLONES void turn_bodies(const std::vector<Rod<float>> &rods,
                                   const std::vector<Body<float>> &bodies,

@@ -31,35 +31,38 @@ struct Ends {
   std::uint32_t first, second;
 };
 
-// advance_impulses works on these arrays; those of constraints have `count` entries.
+// advance_impulses works on these arrays; those of constraints have `count` entries. All changes of
+// impulses are since the start of the search.
 template <typename Real> struct Pass {
   std::size_t count;
   const Ends *ends;
-  const Vector<Real> *normal;      // the fourth number is the gap at the end without impulses
-  const Real *diagonal;            // of A
-  const Real *compliance;          // 0 for rigid constraints
-  const Real *impulse;             // the present impulses
-  Real *impulse_before;            // the impulses before; replaced by the next ones
-  Real *gap_before;                // the gaps of the impulses before; replaced by the present ones
-  const Vector<Real> *velocity;    // per particle: change of velocity of the impulses ahead
-  Vector<Real> *sum;               // per particle: sum of the next impulses; zero before
-  Real momentum;                   // impulses ahead = present + momentum * (present - before)
-  Real step;                       // 1 / L
+  const Vector<Real> *normal;    // the fourth number is the gap at the end of the step at the start
+  const Real *diagonal;          // of A
+  const Real *compliance;        // 0 for rigid constraints
+  const Real *least;             // the change that leaves no impulse
+  const Vector<Real> *velocity;    // per particle: change of velocity of the present changes
+  Real *unbound;               // the present changes before projection; replaced by the next ones
+  Real *change_before;         // the changes before; replaced by the present ones
+  Real *gap_before;            // the gaps of the changes before; replaced by the present ones
+  Vector<Real> *sum;           // per particle: sum of the next changes; zero before
+  Real step, step_before;      // 1 / L, and that of the pass before
+  Real along, beyond, back;    // the weights of accelerated_gradient.h
 };
 
 // A pass returns these sums and maxima over the constraints. D is the diagonal of A: the algorithm
-// works in impulses scaled by the root of D.
+// works in impulses scaled by the root of D. The last change is present impulses - those before.
 struct Passed {
-  double uphill = 0.0;            // > 0: the momentum points uphill on the dual function
-  double heaviest = 0.0;          // largest of the next impulses, times D: a length
-  double change_squared = 0.0;    // change^T D change, with change = next - present impulses
-  // The others are of the present impulses.
-  double curved = 0.0;              // change^T A change, with change = present impulses - before
-  double least_gap = 0.0;           // least gap at the end of the step, at most 0
-  double most_under_force = 0.0;    // largest gap where an impulse acts, at least 0
+  double uphill = 0.0;       // last change . gaps; > 0: the last change increased the dual function
+  double curved = 0.0;       // last change^T A last change
+  double steep = 0.0;        // |A last change|^2 by D^-1
+  double least_gap = 0.0;    // least present gap at the end of the step, at most 0
+  double most_under_force = 0.0;    // largest present gap where an impulse acts, at least 0
+  double heaviest = 0.0;            // largest of the next impulses, times D: a length
+  double farthest = 0.0;            // largest of the next changes, times D
 };
 
-// Makes a projected gradient step from the impulses ahead. `sum` gets the impulses' sums.
+// Makes a gradient step from the present changes and the step of the momentum, and projects. `sum`
+// gets the sums of the changes that are next.
 Passed advance_impulses(const Pass<float> &pass);
 Passed advance_impulses(const Pass<double> &pass);
 
@@ -72,14 +75,9 @@ template <typename Real> struct Look {
   Vector<Real> *gap;               // four in each
 };
 
-// Writes the gaps at the end of the step under the impulses ahead, of rigid constraints or such
-// without an impulse.
+// Writes the present gaps at the end of the step, of constraints without an impulse.
 void find_gaps(const Look<float> &look);
 void find_gaps(const Look<double> &look);
-
-// Adds the present impulses to `sum`.
-void add_impulses(const Pass<float> &pass);
-void add_impulses(const Pass<double> &pass);
 
 // The members of a rigid body (rigid_bodies.h) are those from `first` to before `end` of an array.
 template <typename Real> struct Body {
@@ -116,10 +114,8 @@ void turn_bodies(const std::vector<Rod<double>> &rods, const std::vector<Body<do
 template <typename Real> struct Move {
   std::size_t count;
   const Real *inverse_mass;    // 1 for particles in bodies, whose sums are changes of velocity
-  Vector<Real> *sum;           // sums of the next impulses; left at zero
-  Vector<Real> *velocity;      // change of velocity of the present impulses; replaced by the next
-  Vector<Real> *ahead;         // set to next + momentum * (next - present); the fourth number is 0
-  Real momentum;
+  Vector<Real> *sum;           // sums of the changes of impulses; left at zero
+  Vector<Real> *velocity;      // set to the changes of velocity; the fourth number is 0
 };
 
 void move_particles(const Move<float> &arrays);
