@@ -89,10 +89,21 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   // The residual comes down to 0.6 to 1.6 times the unit round-off of the heaviest impulse as a
   // length (measured in columns, heaps and crystals of 2 to 600 particles).
   constexpr double BELOW_ROUND_OFF = 0.5;
+  // A residual that came down by less than a tenth over half of so many iterations comes down no more:
+  // where there is hardly any room, the target is not to be had, but the tolerance may be.
+  constexpr long LONG = 5000;
+  constexpr double STUCK = 0.9;
   const bool infeasible = is_infeasible(problem, gap_operator_, limits, host);
-  if (!infeasible && !(result.target < BELOW_ROUND_OFF * result.round_off)) return std::nullopt;
+  const bool blurred = result.target < BELOW_ROUND_OFF * result.round_off;
+  const bool stuck =
+      result.iterations >= LONG && result.trend.least() > STUCK * result.trend.earlier();
+  if (!infeasible && !blurred && !stuck) return std::nullopt;
   if (judge(problem, host, result)) return Status::CONVERGED;
-  return infeasible ? Status::INFEASIBLE : Status::ROUND_OFF;
+  if (infeasible) return Status::INFEASIBLE;
+  if (blurred) return Status::ROUND_OFF;
+  if (!(result.residual.largest() <= limits.tolerance)) return std::nullopt;
+  result.target = result.residual.largest();
+  return Status::CONVERGED;
 }
 
 void AcceleratedProjectedGradient::raise_curvature(const packed::Passed &passed)

@@ -124,7 +124,8 @@ def assert_sound(result: Measured, allowed: float = 1.0, round_off: float = 0.0)
     """Overlap within `allowed` tolerances, residuals within one. `round_off` in tolerances."""
     # The residual here is added up in another order than the solver's.
     assert result.overlap <= allowed * SLACK + round_off
-    assert result.feasibility <= SLACK + round_off
+    # A body's contact at rest may give way by half of a tolerance before the residual is added.
+    assert result.feasibility <= min(allowed, 1.5) * SLACK + round_off
     assert result.complementarity <= SLACK + round_off
     # Energies are sums of squares of some thousand velocities.
     assert result.energy <= 1e-12

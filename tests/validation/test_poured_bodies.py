@@ -18,6 +18,8 @@ pytestmark = pytest.mark.validation
 DIAMETER = 0.085
 DIMERS: dict[str, object] = {"particles": 2000, "diameter": DIAMETER, "dump_every": 100000}
 SEEDS = (1, 2)
+# Orientations scatter over seeds by 1.2 times the error that one packing tells.
+MORE_SEEDS = (1, 2, 3, 4, 5, 6)
 # The paper, for every aspect ratio above 1; within what it states
 PAPER_Z, PAPER_Z_TOLERANCE = 10.0, 0.2
 # [standard errors] Of ten comparisons, all independent, one in 30 repetitions would exceed it.
@@ -62,7 +64,7 @@ def test_no_memory_of_the_start(poured: Poured) -> None:
     """Dimers that all start along x end as those that start anyhow, and x and z are alike."""
     directions = {}
     for start in ("random", "regular"):
-        found = [poured(1.95, start, seed).orientation for seed in SEEDS]
+        found = [poured(1.95, start, seed).orientation for seed in MORE_SEEDS]
         squares = np.mean([o.components**2 for o in found], axis=0)
         # Of the mean square, from those of its root
         errors = [2 * o.components * o.standard_errors for o in found]
