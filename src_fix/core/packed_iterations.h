@@ -52,8 +52,9 @@ template <typename Real> class PackedIterations {
   // Ends an iteration: computes the changes of velocity of the present impulses.
   void finish(Host &host);
 
-  // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units, and idle the working ones without an impulse whose gaps are, where
-  // they are more than a few. Call it between finish and advance.
+  // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units, and idle
+  // the working ones without an impulse whose gaps are, where they are more than a few. Call it between
+  // finish and advance.
   void look(double idle_gap);
 
   // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per

@@ -52,10 +52,11 @@ template <typename Real> struct Pass {
 // A pass returns these sums and maxima over the constraints. D is the diagonal of A: the algorithm
 // works in impulses scaled by the root of D. The last change is present impulses - those before.
 struct Passed {
-  double uphill = 0.0;       // last change . gaps; > 0: the last change increased the dual function
-  double curved = 0.0;       // last change^T A last change
-  double steep = 0.0;        // |A last change|^2 by D^-1
-  double least_gap = 0.0;    // least present gap at the end of the step, at most 0
+  double uphill = 0.0;    // last change . gaps; > 0: the last change increased the dual function
+  double curved = 0.0;    // last change^T A last change
+  // |A last change|^2 by D^-1, over the constraints with an impulse now or before
+  double steep = 0.0;
+  double least_gap = 0.0;           // least present gap at the end of the step, at most 0
   double most_under_force = 0.0;    // largest present gap where an impulse acts, at least 0
   double heaviest = 0.0;            // largest of the next impulses, times D: a length
   double farthest = 0.0;            // largest of the next changes, times D
