@@ -25,7 +25,7 @@ from lammps_inelastic.analysis import iterate_contact_frames, read_particle_fram
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# The walls of these decks; the top is open.
+# The walls of these decks; nothing reaches the lid.
 CONTAINER = np.array([[0.0, 1.0], [0.0, np.inf], [0.0, 1.0]])
 
 
@@ -63,6 +63,8 @@ def statics(
     diameter : of the spheres
     box : (3, 2), infinite where there is no wall
     """
+    # Fewer contacts hold no sphere. (Dimers that are held by three or four are kept: they count as
+    # floppy, since a measurement may have missed one of their contacts.)
     least = 3
     one = bodies[first]
     two = np.where(second >= 0, bodies[second], -1)
@@ -102,6 +104,7 @@ def statics(
                 moment = np.cross(point - centres[int(body)], normal) / diameter
                 rows[row, at + 3 : at + 5] += sign * turns @ moment
     left, values, _ = svd(rows, full_matrices=True, lapack_driver="gesdd")
+    # The smallest value that is none of round-off was above 1e-4 of the largest one in every bed.
     rank = int((values > 1e-8 * values[0]).sum())
     stress = left[:, rank:]
     to_walls = np.minimum(points - box[:, 0], box[:, 1] - points).min(axis=1)

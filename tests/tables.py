@@ -78,13 +78,29 @@ MEASURED_AT = {
 }
 
 
+def shaken_alike(
+    force: float, agitated: float, settling: float, timestep: float
+) -> dict[str, object]:
+    """Variables of a deck for shaking of the same strength and the same times, whatever the step.
+
+    `force` is the random force at a time step of 0.01: one that changes in every step shakes as
+    force^2 h. `agitated` and `settling` are times.
+    """
+    return {
+        "dt": timestep,
+        "random_force": force * (0.01 / timestep) ** 0.5,
+        "steps_agitated": round(agitated / timestep),
+        "steps_settling": round(settling / timestep),
+    }
+
+
 def contacts(seeds: int) -> Iterator[str]:
     yield "| solver | h | eps / r | eps / (g h^2) | packing fraction % | coordination number |"
     yield "|---|---|---|---|---|---|"
     for solver, (timesteps, tolerances) in MEASURED_AT.items():
         deck = shipped_deck("spheres")
         if solver == "uzawa":
-            # The packing is made by apgd: Uzawa only measures, over fewer steps.
+            # The packing is made by apgd: Uzawa only measures.
             deck = deck.replace(
                 "fix_modify      contact tolerance ${eps_last}",
                 "fix contact all inelastic ${eps_last} region container "
@@ -92,12 +108,7 @@ def contacts(seeds: int) -> Iterator[str]:
             )
         for timestep in timesteps:
             for tolerance in tolerances:
-                variables: dict[str, object] = {
-                    "dt": timestep,
-                    # The same shaking and the same times for every time step
-                    "random_force": 30 * (0.01 / timestep) ** 0.5,
-                    "steps_agitated": round(4 / timestep),
-                    "steps_settling": round(8 / timestep),
+                variables = shaken_alike(30, 4, 8, timestep) | {
                     # One time step from start to end
                     "steps_resting": 0,
                     "dt_resting": timestep,
@@ -219,7 +230,7 @@ def convergence(_: int) -> Iterator[str]:
 
 
 def rest(seeds: int) -> Iterator[str]:
-    yield "| bed | `EPS` / d | h | at rest after | v_rms / (g h) | iterations a step |"
+    yield "| bed | `EPS` / d | h | time until at rest | v_rms / (g h) | iterations a step |"
     yield "|---|---|---|---|---|---|"
     for bed in BEDS:
         for tolerance in (1e-3, 1e-5, 1e-7):
@@ -236,23 +247,45 @@ def rest(seeds: int) -> Iterator[str]:
                 yield f"| {bed} | {tolerance:g} | {timestep:g} | {' | '.join(columns)} |"
 
 
-NETWORKS: list[tuple[str, str, dict[str, object], tuple[float, ...]]] = [
-    ("1,000 spheres", "spheres", {}, (1e-4, 1e-5, 1e-6)),
-    ("500 dimers, 1.01", "dimers", {"particles": 500, "aspect_ratio": 1.01}, (2e-5, 2e-6)),
-    ("500 dimers, 1.3", "dimers", {"particles": 500, "aspect_ratio": 1.3}, (2e-5, 2e-6)),
+# What is poured, by which deck, with which random force; time steps and tolerances / r: the default
+# at three time steps, others at one.
+NETWORKS: list[tuple[str, str, dict[str, float], float, list[tuple[float, float]]]] = [
+    (
+        "2,000 spheres",
+        "spheres",
+        {"particles": 2000, "diameter": 0.087},
+        30,
+        [(0.005, 1e-5), (0.01, 1e-5), (0.02, 1e-5), (0.01, 1e-4), (0.01, 1e-6)],
+    ),
+    *(
+        (
+            f"1,000 dimers, {aspect_ratio}",
+            "dimers",
+            {"aspect_ratio": aspect_ratio},
+            200,
+            [(0.005, 2e-5), (0.01, 2e-5), (0.02, 2e-5), (0.01, 2e-6)],
+        )
+        for aspect_ratio in (1.01, 1.3, 1.8)
+    ),
 ]
 
 
 def network(seeds: int) -> Iterator[str]:
-    yield "| packing | eps / r | iterations | floppy modes | self-stress | of it in the bulk |"
-    yield "|---|---|---|---|---|---|"
-    for name, deck, scene, tolerances in NETWORKS:
-        for tolerance in tolerances:
+    yield "| packing | h | eps / r | iterations | floppy modes | self-stress | of it in the bulk |"
+    yield "|---|---|---|---|---|---|---|"
+    for name, deck, scene, force, measured in NETWORKS:
+        for timestep, tolerance in measured:
             found, iterations = [], []
             for seed in range(1, seeds + 1):
-                variables = {"tolerance_measuring": tolerance, "seed": seed, "dump_every": 100000}
+                variables = {
+                    **scene,
+                    **shaken_alike(force, 4, 2, timestep),
+                    "tolerance_measuring": tolerance,
+                    "seed": seed,
+                    "dump_every": 100000,
+                }
                 with tempfile.TemporaryDirectory() as folder:
-                    log = run_deck(Path(folder), shipped_deck(deck), scene | variables)
+                    log = run_deck(Path(folder), shipped_deck(deck), variables)
                     found.append(statics_of_run(Path(folder)))
                 iterations.append(float(sum(run.iterations for run in projections(log))))
             columns = [
@@ -267,7 +300,7 @@ def network(seeds: int) -> Iterator[str]:
                 )
             ]
             cells = [f"{statistics.mean(iterations):.0f}", *columns]
-            yield f"| {name} | {tolerance:g} | {' | '.join(cells)} |"
+            yield f"| {name} | {timestep:g} | {tolerance:g} | {' | '.join(cells)} |"
 
 
 TABLES = {

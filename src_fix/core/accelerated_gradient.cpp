@@ -12,8 +12,8 @@ namespace {
 
   constexpr double UNIT_ROUND_OFF = 0.5 * std::numeric_limits<double>::epsilon();
 
-  // Returns the least residual that iterations can reach: round-off, a few 1e-7 of the largest change
-  // in single precision, is far below. Double precision is the best there is.
+  // Returns the residual at which a search ends because of its precision, in packed units: some ten times
+  // the round-off of the largest change in single precision; double precision is the best there is.
   template <typename Real> double least_residual(double largest_change)
   {
     constexpr double PART = 1.0 / 3.0e5;
@@ -39,6 +39,23 @@ namespace {
     double time_ = 1.0;      // t
     double length_ = 1.0;    // g / L, of no meaning where t is 1
   };
+
+  // Chooses the ghosts that are in constraints of this rank, and all members of a body of which one
+  // is. Most ghosts are in none. Collective.
+  void choose_ghosts(const ContactProblem &problem, Host &host)
+  {
+    if (!host.has_ghosts()) return;
+    std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
+    for (const int i : problem.contacts.first) chosen[i] = 1;
+    for (const int i : problem.contacts.second) chosen[i] = 1;
+    const RigidBodies &bodies = problem.bodies;
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      char any = 0;
+      for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) any |= chosen[bodies.member[k]];
+      for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) chosen[bodies.member[k]] = any;
+    }
+    host.choose_ghosts(chosen);
+  }
 
   packed::Passed over_ranks(const packed::Passed &mine, Host &host)
   {
@@ -83,6 +100,7 @@ bool AcceleratedProjectedGradient::judge(const ContactProblem &problem, Host &ho
 
 std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const ContactProblem &problem,
                                                                     const SolverLimits &limits,
+                                                                    bool single_precision,
                                                                     Host &host,
                                                                     SolverResult &result)
 {
@@ -101,16 +119,22 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   if (judge(problem, host, result)) return Status::CONVERGED;
   if (infeasible) return Status::INFEASIBLE;
   if (blurred) return Status::ROUND_OFF;
-  if (!(result.residual.largest() <= limits.tolerance)) return std::nullopt;
+  if (!(result.residual.largest() <= limits.tolerance)) {
+    // It may be round-off that keeps it.
+    if (!single_precision) return std::nullopt;
+    result.trend = ResidualTrend();
+    return Status::OUT_OF_ITERATIONS;
+  }
   result.target = result.residual.largest();
   return Status::CONVERGED;
 }
 
 void AcceleratedProjectedGradient::raise_curvature(const packed::Passed &passed)
 {
-  constexpr double MARGIN = 1.02;
+  // A change that A nearly takes to nothing tells L badly: round-off could raise it without bound.
+  constexpr double MARGIN = 1.02, MOST_RAISE = 2.0;
   if (passed.steep > curvature_ * passed.curved && passed.curved > 0.0)
-    curvature_ = MARGIN * passed.steep / passed.curved;
+    curvature_ = std::min(MARGIN * passed.steep / passed.curved, MOST_RAISE * curvature_);
 }
 
 template <typename Real>
@@ -128,10 +152,10 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   // the step came in late.)
   constexpr long LOOK_EVERY = 20;
   constexpr double IDLE_GAP = 5.0;
+  constexpr bool SINGLE = sizeof(Real) < sizeof(double);
 
   iterations.prepare(problem, diagonal_, gap_,
-                     IDLE_GAP * std::max(limits.tolerance, result.residual.largest()), scales,
-                     host);
+                     IDLE_GAP * std::max(limits.tolerance, result.residual.largest()), scales);
   std::vector<double> &impulse = problem.contacts.impulse;
   const double target = result.target / scales.length;
   Momentum momentum;
@@ -155,14 +179,15 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
       if (judge(problem, host, result)) return Status::CONVERGED;
       if (packed_residual > target) return Status::OUT_OF_ITERATIONS;
       iterations.join(gap_, scales);
-      if (++failures == MOST_FAILURES && sizeof(Real) < sizeof(double))
-        return Status::OUT_OF_ITERATIONS;
+      // The residuals so far were not those of all constraints.
+      result.trend = ResidualTrend();
+      if (++failures == MOST_FAILURES && SINGLE) return Status::OUT_OF_ITERATIONS;
       next_check = result.iterations + failures;
     }
     result.round_off = UNIT_ROUND_OFF * scales.length * passed.heaviest;
     if (result.iterations % CHECK_EVERY == 0) {
       iterations.impulses_before(scales, impulse);
-      const std::optional<Status> end = judge_prospects(problem, limits, host, result);
+      const std::optional<Status> end = judge_prospects(problem, limits, SINGLE, host, result);
       if (end) return *end;
     }
 
@@ -180,8 +205,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
 SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
                                                  const SolverLimits &limits, Host &host)
 {
-  // Residuals of more targets are left to double precision from the start. Otherwise there are so
-  // many searches in single precision before.
+  // A first guess whose residual is above so many targets is left to double precision. Otherwise at most so
+  // many searches in single precision come first.
   constexpr double WITHIN_SINGLE = 1.0e12;
   constexpr int MOST_SEARCHES = 3;
   // L is let down a little between calls, so that it can follow a packing that becomes less
@@ -203,7 +228,9 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
     result.status = Status::CONVERGED;
   else if (!std::isfinite(result.residual.feasibility))
     result.status = Status::NOT_FINITE;
-  if (result.status != Status::OUT_OF_ITERATIONS) return result;
+  if (result.status == Status::OUT_OF_ITERATIONS && limits.max_iterations <= 0)
+    settle_for_tolerance(limits, result.residual.largest(), result);
+  if (result.status != Status::OUT_OF_ITERATIONS || limits.max_iterations <= 0) return result;
 
   const double factor = scale(guess);
   const std::vector<double> &free_gap = gap_operator_.free_gap();
@@ -216,19 +243,19 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   Scales scales;
   scales.length = std::exp2(std::ilogb(guess.largest_length));
   scales.impulse = scales.length / std::exp2(std::ilogb(guess.largest_diagonal));
+  choose_ghosts(problem, host);
   const auto settled = [&] {
     return result.status == Status::CONVERGED || result.status == Status::INFEASIBLE ||
         result.iterations >= limits.max_iterations;
   };
   const bool of_use = guess.residual.largest() < WITHIN_SINGLE * result.target;
   for (int search = 0; of_use && search < MOST_SEARCHES && !settled(); ++search) {
-    if (search > 0) gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
     result.status = iterate(single_, problem, limits, scales, host, result);
+    // All other ends of a search have judged what they leave.
+    if (result.status == Status::NOT_FINITE)
+      gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
   }
-  if (!settled()) {
-    if (of_use) gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
-    result.status = iterate(double_, problem, limits, scales, host, result);
-  }
+  if (!settled()) result.status = iterate(double_, problem, limits, scales, host, result);
   settle_for_tolerance(limits, result.residual.largest(), result);
   return result;
 }

@@ -17,7 +17,7 @@
 //   back_k   = (t_k - 1) / (t_k+1 g_k),   g_0 = 1,   g_k+1 = (2 t_k + t_k+1 - 1) / t_k+1
 //
 // (L as of iteration k; g is L times the length of the step that unbound_k made), and t is 1 again
-// where the dual function increases. L must not be below the largest eigenvalue of the scaled A, of the
+// where the dual function rises along the last change. L must not be below the largest eigenvalue of the scaled A, of the
 // constraints with impulses: the method then diverges, as Nesterov's does not for long. With u the last
 // change it is raised to |A u|^2 / u.A u over these constraints, where that is more, which costs no
 // product with A, and is remembered from one call to the next.
@@ -53,12 +53,14 @@ class AcceleratedProjectedGradient final : public Solver {
                  const SolverLimits &limits, const Scales &scales, Host &host,
                  SolverResult &result);
 
-  // Sets the residual of the impulses in `problem`. Returns whether it is at most the target.
+  // Sets the gaps gap_ and the residual of the impulses in `problem`. Returns whether it is at most the
+  // target.
   bool judge(const ContactProblem &problem, Host &host, SolverResult &result);
 
-  // Returns how the search ends if more iterations from the impulses in `problem` are of no use.
+  // Returns how the search ends if more iterations from the impulses in `problem` are of no use, in the
+  // precision that it has.
   std::optional<Status> judge_prospects(const ContactProblem &problem, const SolverLimits &limits,
-                                        Host &host, SolverResult &result);
+                                        bool single_precision, Host &host, SolverResult &result);
 
   // Raises L if the last change of the impulses shows it too small.
   void raise_curvature(const packed::Passed &passed);

@@ -14,8 +14,8 @@ namespace {
   // have a particle in common, and a sum that was just written is slow to read again.
   constexpr std::size_t STREAMS = 8;
 
-  // Working constraints that have come to rest become idle when they are more than this part: each
-  // look would otherwise move them all to save little.
+  // Working constraints that could be idle become so when they are more than one in so many: each look would
+  // otherwise move them all to save little.
   constexpr std::size_t FEW = 10;
 
   // A gap is known to a few units of round-off of the largest change.
@@ -75,23 +75,6 @@ namespace {
     return across >= 0.0;
   }
 
-  // Chooses the ghosts that are in constraints of this rank, and all members of a body of which one
-  // is. Most ghosts are in none.
-  void choose_ghosts(const ContactProblem &problem, Host &host)
-  {
-    if (!host.has_ghosts()) return;
-    std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
-    for (const int i : problem.contacts.first) chosen[i] = 1;
-    for (const int i : problem.contacts.second) chosen[i] = 1;
-    const RigidBodies &bodies = problem.bodies;
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-      char any = 0;
-      for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) any |= chosen[bodies.member[k]];
-      for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) chosen[bodies.member[k]] = any;
-    }
-    host.choose_ghosts(chosen);
-  }
-
   template <typename Real>
   void set_lanes(packed::Vector<Real> &vector, double x, double y, double z, double fourth)
   {
@@ -110,19 +93,17 @@ template <typename Real>
 void PackedIterations<Real>::prepare(const ContactProblem &problem,
                                      const std::vector<double> &diagonal,
                                      const std::vector<double> &gap, double idle_gap,
-                                     const Scales &scales, Host &host)
+                                     const Scales &scales)
 {
   idle_gap_ = static_cast<Real>(idle_gap / scales.length);
   start_ = problem.contacts.impulse;
   std::vector<std::size_t> near, far;
   for (std::size_t c = 0; c < gap.size(); ++c)
     (start_[c] > 0.0 || !(gap[c] > idle_gap) ? near : far).push_back(c);
+  inverse_diagonals_ = 0.0;
   pack(problem.contacts, in_streams(near), diagonal, gap, scales, working_);
   pack(problem.contacts, far, diagonal, gap, scales, idle_);
   for (std::vector<Real> *const state : states()) state->assign(near.size(), 0);
-  inverse_diagonals_ = 0.0;
-  for (const Constraints *const packed : {&working_, &idle_})
-    for (const Real value : packed->diagonal) inverse_diagonals_ += 1.0 / value;
 
   const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
   const double mobility_unit = problem.timestep * (scales.impulse / scales.length);
@@ -132,7 +113,6 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   pack_bodies(problem.bodies, mobility_unit);
   sum_.assign(particles, Vector{});
   velocity_.assign(particles, Vector{});
-  choose_ghosts(problem, host);
 }
 
 template <typename Real>
@@ -163,7 +143,7 @@ template <typename Real> void PackedIterations<Real>::finish(Host &host)
 template <typename Real> void PackedIterations<Real>::look(double idle_gap)
 {
   idle_gap_ = static_cast<Real>(idle_gap);
-  rest();
+  set_idle();
   looked_.resize((idle_.size() + 3) / 4);
   packed::find_gaps(packed::Look<Real>{idle_.size(), idle_.ends.data(), idle_.normal.data(),
                                        velocity_.data(), looked_.data()});
@@ -187,8 +167,8 @@ void PackedIterations<Real>::join(const std::vector<double> &gap, const Scales &
 }
 
 // Makes idle constraints working, given by their places in ascending order. `gap` has one number per
-// idle constraint. It is kept as the gap of the impulses before, which is not known. Only the next
-// advance uses it, to tell how far from closed the constraint is.
+// idle constraint. It is kept as the gap of the impulses before, which is not known: the next advance uses
+// it in the momentum alone.
 template <typename Real>
 void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Real *gap)
 {
@@ -213,20 +193,20 @@ void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Re
 }
 
 // Makes working constraints idle that have no impulse and are far from closed.
-template <typename Real> void PackedIterations<Real>::rest()
+template <typename Real> void PackedIterations<Real>::set_idle()
 {
-  const auto rests = [this](std::size_t k) {
+  const auto is_idle = [this](std::size_t k) {
     return working_.least[k] == 0 && !(unbound_[k] > 0) && change_before_[k] == 0 &&
         gap_before_[k] > idle_gap_;
   };
-  std::size_t resting = 0;
+  std::size_t more = 0;
   for (std::size_t k = 0; k < working_.size(); ++k)
-    if (rests(k)) ++resting;
-  if (resting <= working_.size() / FEW) return;
+    if (is_idle(k)) ++more;
+  if (more <= working_.size() / FEW) return;
   std::size_t idle = idle_.size(), kept = 0;
-  idle_.resize(idle + resting);
+  idle_.resize(idle + more);
   for (std::size_t k = 0; k < working_.size(); ++k) {
-    if (rests(k)) {
+    if (is_idle(k)) {
       idle_.copy(working_, k, idle++);
       continue;
     }
@@ -277,6 +257,7 @@ void PackedIterations<Real>::pack(const ContactSet &contacts,
     packed.ends[k] = {place<Real>(contacts.first[c]), place<Real>(contacts.second[c])};
     set_lanes(packed.normal[k], n[0], n[1], n[2], gap[c] * per_length);
     packed.diagonal[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
+    inverse_diagonals_ += 1.0 / packed.diagonal[k];
     packed.compliance[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
     packed.least[k] = static_cast<Real>(-contacts.impulse[c] / scales.impulse);
   }

@@ -10,8 +10,8 @@
 // until they are looked at and found to be near. The others are working. Each rank chooses for
 // itself; nothing is communicated for it.
 //
-// Constraints and n particles are packed as normals with gaps, diagonal entries and impulses, one
-// for each constraint, and n + 1 vectors (contact_problem.h has the dummy particle). Everything has
+// Constraints and n particles are packed as normals with gaps, diagonal entries, compliances and least
+// changes, one for each constraint, and n + 1 vectors (contact_problem.h has the dummy particle). Everything has
 // units in which the largest length is near 1, so that single precision can hold it.
 
 #pragma once
@@ -41,20 +41,21 @@ template <typename Real> class PackedIterations {
  public:
   // Packs a problem, whose impulses are the start. `diagonal` is that of A, `gap` has the gaps w of
   // these impulses, one number per constraint each (contact_problem.h). Constraints without an
-  // impulse whose gap is above `idle_gap` [length] are idle. Collective, like finish.
+  // impulse whose gap is above `idle_gap` [length] are idle.
   void prepare(const ContactProblem &problem, const std::vector<double> &diagonal,
-               const std::vector<double> &gap, double idle_gap, const Scales &scales, Host &host);
+               const std::vector<double> &gap, double idle_gap, const Scales &scales);
 
   // Begins an iteration with a step of 1 / L: the next impulses become the present ones. Returns sums
   // and maxima over this rank's constraints; those of gaps and changes are of the impulses before.
   packed::Passed advance(const Weights &weights, double step);
 
-  // Ends an iteration: computes the changes of velocity of the present impulses.
+  // Ends an iteration: computes the changes of velocity of the present impulses. Collective. The host must
+  // know which ghosts are in constraints (Host::choose_ghosts).
   void finish(Host &host);
 
-  // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units, and idle
-  // the working ones without an impulse whose gaps are, where they are more than a few. Call it between
-  // finish and advance.
+  // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units. Makes the
+  // working ones idle that have no impulse and gaps above it, where they are more than a few. Call it
+  // between finish and advance.
   void look(double idle_gap);
 
   // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per
@@ -74,7 +75,7 @@ template <typename Real> class PackedIterations {
   struct Constraints {
     std::vector<std::size_t> source;    // the place in the problem
     std::vector<packed::Ends> ends;
-    std::vector<Vector> normal;    // the fourth number is the gap at the start
+    std::vector<Vector> normal;    // the fourth number: the gap of the impulses at the start
     std::vector<Real> diagonal, compliance, least;
 
     std::size_t size() const { return source.size(); }
@@ -87,7 +88,7 @@ template <typename Real> class PackedIterations {
             const std::vector<double> &diagonal, const std::vector<double> &gap,
             const Scales &scales, Constraints &packed);
   void wake(const std::vector<std::size_t> &near, const Real *gap);
-  void rest();
+  void set_idle();
   void pack_bodies(const RigidBodies &bodies, double mobility_unit);
   bool pack_rod(const RigidBodies &bodies, std::size_t b, double mobility_unit);
   void pack_body(const RigidBodies &bodies, std::size_t b, double mobility_unit);

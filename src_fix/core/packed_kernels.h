@@ -36,10 +36,11 @@ struct Ends {
 template <typename Real> struct Pass {
   std::size_t count;
   const Ends *ends;
-  const Vector<Real> *normal;    // the fourth number is the gap at the end of the step at the start
-  const Real *diagonal;          // of A
-  const Real *compliance;        // 0 for rigid constraints
-  const Real *least;             // the change that leaves no impulse
+  const Vector<Real>
+      *normal;               // the fourth number: the gap that the first impulses end the step with
+  const Real *diagonal;      // of A
+  const Real *compliance;    // 0 for rigid constraints
+  const Real *least;         // the change that leaves no impulse
   const Vector<Real> *velocity;    // per particle: change of velocity of the present changes
   Real *unbound;               // the present changes before projection; replaced by the next ones
   Real *change_before;         // the changes before; replaced by the present ones
@@ -52,7 +53,7 @@ template <typename Real> struct Pass {
 // A pass returns these sums and maxima over the constraints. D is the diagonal of A: the algorithm
 // works in impulses scaled by the root of D. The last change is present impulses - those before.
 struct Passed {
-  double uphill = 0.0;    // last change . gaps; > 0: the last change increased the dual function
+  double uphill = 0.0;    // last change . gaps; > 0: the dual function rises along it
   double curved = 0.0;    // last change^T A last change
   // |A last change|^2 by D^-1, over the constraints with an impulse now or before
   double steep = 0.0;

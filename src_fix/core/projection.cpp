@@ -54,7 +54,7 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
   while (true) {
     SolverLimits remaining = limits;
     remaining.max_iterations -= result.iterations;
-    remaining.enough = std::max(limits.enough, result.target);
+    remaining.least_target = std::max(limits.least_target, result.target);
     const SolverResult solved = solver.solve(problem, remaining, host);
     ++result.rounds;
     result.status = solved.status;

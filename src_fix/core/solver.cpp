@@ -35,7 +35,7 @@ double target_residual(const SolverLimits &limits, const Guess &guess)
   const double changed = std::max(CARRIED * guess.mean_change, guess.residual.largest());
   return std::min(
       limits.tolerance,
-      std::max({limits.accuracy * changed, ROUND_OFF * guess.largest_length, limits.enough}));
+      std::max({limits.accuracy * changed, ROUND_OFF * guess.largest_length, limits.least_target}));
 }
 
 Guess Solver::judge_first_guess(ContactProblem &problem, Host &host)

@@ -3,7 +3,7 @@
 // Solvers work on the dual problem: they look for the impulses lambda. All are judged by the same
 // two residuals, in units of length, with w the gaps at the end of the step:
 //
-//   feasibility       the largest -w_c of all constraints: the overlap that is left
+//   feasibility       the largest -w_c of all constraints: what is lacking of the gap that they ask for
 //   complementarity   the largest w_c of the constraints with impulse: the gap that is left where a
 //                     force acts
 //
@@ -91,7 +91,9 @@ struct SolverLimits {
   // The largest residual of a solution as a part of what contacts change in the step
   // (target_residual); 0 = only the tolerance counts.
   double accuracy = 0.0;
-  double enough = 0.0;    // [length] the target of an earlier round of the same step
+  // [length] The target is not below this: that of an earlier round of the step, or a part of that of the
+  // step before.
+  double least_target = 0.0;
 };
 
 // What is known before the iterations, from the first guess of the impulses; over all ranks.
@@ -111,7 +113,9 @@ struct Guess {
 };
 
 // Returns the residual [length] at which the iterations end: the accuracy times what the first guess
-// lacks, or times a tenth of what it does, whichever is more; at most the tolerance.
+// lacks, or times a tenth of what it does, whichever is more. It is not below 8 machine epsilons of the
+// largest length, nor below limits.least_target, and at most the tolerance. Where the accuracy is 0 it is
+// the tolerance.
 double target_residual(const SolverLimits &limits, const Guess &guess);
 
 struct SolverResult {

@@ -10,8 +10,6 @@
 
 #include "solver.h"
 
-#include <vector>
-
 namespace inelastic {
 
 class Uzawa final : public Solver {

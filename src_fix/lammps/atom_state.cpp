@@ -39,8 +39,11 @@ void AtomState::remember_contacts(GhostExchange &ranks)
     const double spring_gap = compliance > 0.0
         ? compliance * step_.impulse_per_force * (side.preload - force)
         : ContactMemory::NONE;
-    const ContactMemory::Contact contact = {
-        force, ContactMemory::next_sustained(side.sustained, force), spring_gap};
+    // No time passes in the half kick with which a run starts.
+    const double sustained = step_.kick == Kick::WHOLE
+        ? ContactMemory::next_sustained(side.sustained, force)
+        : std::min(side.sustained, force);
+    const ContactMemory::Contact contact = {force, sustained, spring_gap};
     memory_.remember(i, wall ? -wall : atom->tag[j], contact);
     if (!wall) memory_.remember(j, atom->tag[i], contact);
   }

@@ -61,8 +61,10 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
     if (wall_constraints_.need_relinearising())
       relinearised += wall_constraints_.relinearise(margin_);
   }
-  double sums[2] = {static_cast<double>(added), static_cast<double>(relinearised)};
-  ranks_.reduce(sums, 2, &step_.excess, 1);
+  double sums[3] = {static_cast<double>(added), static_cast<double>(relinearised),
+                    static_cast<double>(changed)};
+  ranks_.reduce(sums, 3, &step_.excess, 1);
+  if (sums[2] > 0.0) rules_.make_overloaded_rigid();
   came_back_ = came_back_ || sums[0] > 0.0;
   relinearised_ = relinearised_ || sums[1] > 0.0;
   ranks_.fail_together(step_.problem_found);

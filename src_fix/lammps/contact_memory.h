@@ -43,12 +43,17 @@ class ContactMemory {
   void remember(int atom, tagint partner, const Contact &contact)
   { remembered_[atom].push_back({partner, contact}); }
 
-  // Without a force when nothing is remembered.
+  // Without a force when nothing is remembered. Of two contacts with one partner (in the tip of a cone, or
+  // through two periodic boundaries) nobody knows which is which: they are never at rest.
   Contact find(int atom, tagint partner) const
   {
-    for (const Entry &entry : remembered_[atom])
-      if (entry.partner == partner) return entry.contact;
-    return {};
+    const Entry *found = nullptr;
+    for (const Entry &entry : remembered_[atom]) {
+      if (entry.partner != partner) continue;
+      if (found) return {found->contact.force, 0.0, NONE};
+      found = &entry;
+    }
+    return found ? found->contact : Contact{};
   }
 
   int number_of_partners(int atom) const { return static_cast<int>(remembered_[atom].size()); }

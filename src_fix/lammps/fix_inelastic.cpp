@@ -277,23 +277,23 @@ void FixInelastic::advance(int vflag, Kick kick)
   length_.restore();
   step_.kick = kick;
   check_.before_step();
-  finish(solve(kick));
+  finish(solve());
 }
 
 // Finds the velocities of the step, whose length may become shorter on the way.
-inelastic::ProjectionResult FixInelastic::solve(Kick kick)
+inelastic::ProjectionResult FixInelastic::solve()
 {
   length_.begin_step();
   unsolved_.begin_step();
   while (true) {
     unsolved_.begin_trial();
-    length_.fit_to_list(kick);
-    predict(kick);
+    length_.fit_to_list();
+    predict();
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
     const double target = result.target, change = result.change;
     constraints_.overlaps().share();
-    if (settings_.record_every > 0 && kick == Kick::WHOLE &&
+    if (settings_.record_every > 0 && step_.kick == Kick::WHOLE &&
         update->ntimestep % settings_.record_every == 0)
       record_.write(result);
     if (step_.bad_start)
@@ -312,21 +312,20 @@ inelastic::ProjectionResult FixInelastic::solve(Kick kick)
       unsolved_.report(result);
     }
     if (length_.accepts(unsolved_.named())) {
-      step_.target = target;
-      step_.change = change / step_.kicks;
+      step_.resolution = target / step_.problem.timestep;
+      step_.change = change / step_.kicks();
       return result;
     }
   }
 }
 
 // Every other fix and force has done its work: sets the velocities that the step would end with.
-void FixInelastic::predict(Kick kick)
+void FixInelastic::predict()
 {
   const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   const int nall = atom->nlocal + atom->nghost;
-  step_.kicks = kick == Kick::WHOLE ? 1.0 : 0.5;
   inelastic::ContactProblem &problem = step_.problem;
-  step_.impulse_per_force = step_.kicks * update->dt * force->ftm2v;
+  step_.impulse_per_force = step_.kicks() * update->dt * force->ftm2v;
   problem.timestep = update->dt;
   problem.resize(nall);
   for (int i = 0; i < nall; ++i)
@@ -343,9 +342,9 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
   // A push is no momentum.
   if (step_.phase == Phase::CONTACT) {
-    constexpr double LEAST = 0.5;    // of the last target: GapRules::contact_gap
+    constexpr double LEAST = 0.5;    // of the last resolution: GapRules::contact_gap
     limits.accuracy = settings_.accuracy;
-    limits.enough = LEAST * step_.target;
+    limits.least_target = LEAST * step_.resolution * step_.problem.timestep;
   }
   const inelastic::ProjectionResult result = inelastic::project(
       step_.problem, constraints_, *solver_, limits, MAX_ROUNDS, ranks_, step_.velocity);

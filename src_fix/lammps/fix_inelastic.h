@@ -104,8 +104,8 @@ class FixInelastic : public Fix {
   void check_volume();
   void begin_summary();
   void advance(int vflag, Kick kick);
-  inelastic::ProjectionResult solve(Kick kick);
-  void predict(Kick kick);
+  inelastic::ProjectionResult solve();
+  void predict();
   inelastic::ProjectionResult project(long max_iterations);
   void finish(const inelastic::ProjectionResult &result);
 };

@@ -16,10 +16,10 @@ class LAMMPS;
 enum class Inertia { POINT, SOLID };
 
 struct Settings {
-  // EPS, the largest overlap allowed [length]. Too small, it is below the round-off of positions; too
-  // large, slow contacts are not resolved.
+  // EPS, the largest overlap allowed [length]. Too small, it is below the round-off of positions.
+  // Velocities are bounded by the accuracy.
   double tolerance = 0.0;
-  // A, the part of what contacts change in a step to which the step is solved, where that is below EPS.
+  // A, the fraction of what contacts change in a step to which the step is solved, where that is below EPS.
   double accuracy = 1.0e-3;
   // The name that make_solver() of the core knows.
   std::string solver = "apgd";

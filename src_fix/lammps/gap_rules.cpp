@@ -14,13 +14,14 @@ constexpr double ELASTIC_RANGE = 0.5;
 }    // namespace
 
 // What an overlap gives back in a step stays in the velocities: it is no more than what velocities are
-// resolved to. A gap under a force that is so small is closed already. This asks for more than the
-// geometry does, which may have no room for it, but for less than the residual that is allowed: the
-// target of this step is at least half of the last one (FixInelastic::project).
+// resolved to. Where a force acted, a gap of a quarter of the target counts as closed. There the constraint
+// asks for more than the geometry does, which may have no room for it, but for less than the residual that
+// is allowed: velocities of this step are resolved to at least half of what they were in the last one
+// (FixInelastic::project).
 double GapRules::contact_gap(const Side &side) const
 {
   const double tolerance = step_.settings.tolerance;
-  const double target = std::min(step_.target, tolerance);
+  const double target = std::min(step_.resolution * step_.problem.timestep, tolerance);
   const double gap = side.gap_now;
   if (side.compliance > 0.0) return std::max(gap, -ELASTIC_RANGE * tolerance - target);
   if (gap < 0.0) return std::max(gap, -target);
@@ -29,11 +30,13 @@ double GapRules::contact_gap(const Side &side) const
                           : gap;
 }
 
-void GapRules::rest(Side &side, const ContactMemory::Contact &known, double diagonal) const
+void GapRules::rest(Side &side, const ContactMemory::Contact &known, int i, int j,
+                    const double *normal) const
 {
   // A softer contact costs fewer iterations, but its gap reaches the elastic range with a smaller change
-  // of its force. With twice this part of the tolerance springs slide all the time, and a bed of 1,000
-  // spheres does not come to rest; with half the elastic range it takes twice as long (measured).
+  // of its force. With a PER_TOLERANCE of 0.6 springs slide all the time, and a bed of 1,000 spheres does
+  // not come to rest; with half the elastic range it takes twice as long (measured). The other two bound
+  // what springs give back when their load goes: 3 % of the change of the impulse, less in a finer run.
   constexpr double MOST_COMPLIANCE = 0.03, PER_ACCURACY = 30.0, PER_TOLERANCE = 0.3;
   const double tolerance = step_.settings.tolerance;
   constexpr double AT_REST = 0.5;    // of the force is sustained
@@ -42,7 +45,7 @@ void GapRules::rest(Side &side, const ContactMemory::Contact &known, double diag
   const bool at_rest = known.force > 0.0 && known.sustained >= AT_REST * known.force;
   if (!at_rest || !(step_.change > 0.0) || overlaps_.is_bad(side.gap_now)) return;
   // The same force is half of the impulse in half a kick.
-  side.compliance = diagonal / step_.kicks *
+  side.compliance = step_.problem.mobility_of_pair(i, j, normal) / step_.kicks() *
       std::min({MOST_COMPLIANCE, PER_ACCURACY * step_.settings.accuracy,
                 PER_TOLERANCE * tolerance / step_.change});
   const double length_per_force = side.compliance * step_.impulse_per_force;
@@ -70,9 +73,10 @@ double GapRules::effective_gap(const Side &side) const
 
 double GapRules::wanted_gap(const Side &side) const
 {
+  constexpr double MOST_LEFT = 0.5;    // tolerances
   const double wanted = side.gap_now - effective_gap(side);
   return overlaps_.is_bad(side.gap_now) ? wanted
-                                        : std::max(wanted, -0.5 * step_.settings.tolerance);
+                                        : std::max(wanted, -MOST_LEFT * step_.settings.tolerance);
 }
 
 bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
@@ -92,15 +96,13 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   inelastic::ContactSet &contacts = step_.problem.contacts;
   const double h = step_.problem.timestep;
   const double tolerance = step_.settings.tolerance;
-  constexpr double MOST_GROWTH = 2.0;    // of a spring's force in a step
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const Side &side = step_.sides[c];
+    Side &side = step_.sides[c];
     // Gaps that were set by the end of the step are kept there by follow().
     const double linear_gap = side.gap_now - side.wall_motion;
-    const bool as_at_start = contacts.gap[c] == asked_gap(side);
     const bool asks_for_all = contacts.gap[c] == linear_gap && contacts.compliance[c] == 0.0;
-    if (!as_at_start || asks_for_all || overlaps_.is_bad(side.gap_now)) continue;
+    if (!side.as_at_start || asks_for_all || overlaps_.is_bad(side.gap_now)) continue;
     const int i = contacts.first[c], j = contacts.second[c];
     const bool is_wall = side.wall != 0;
     if (step_.is_member(i) || (!is_wall && step_.is_member(j))) continue;
@@ -111,19 +113,24 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     const double at_end = linear_gap + h * opening;
     if (at_end >= -tolerance && (at_end <= tolerance || contacts.impulse[c] == 0.0)) continue;
     contacts.gap[c] = linear_gap;
-    contacts.compliance[c] = 0.0;
+    contacts.compliance[c] = side.compliance = 0.0;
+    side.as_at_start = false;
     ++changed;
   }
-  // In an impact on a bed springs give way one after the other: all that have to carry much more than
-  // before become rigid at once.
-  for (std::size_t c = 0; changed > 0 && c < contacts.size(); ++c) {
+  return changed;
+}
+
+void GapRules::make_overloaded_rigid()
+{
+  constexpr double MOST_GROWTH = 2.0;    // of a spring's force in a step
+  inelastic::ContactSet &contacts = step_.problem.contacts;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
     Side &side = step_.sides[c];
     const double before = step_.impulse_per_force * side.force;
     if (contacts.compliance[c] == 0.0 || contacts.impulse[c] <= MOST_GROWTH * before) continue;
     contacts.compliance[c] = side.compliance = 0.0;
     contacts.gap[c] = asked_gap(side);
   }
-  return changed;
 }
 
 long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
@@ -141,6 +148,7 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
   }
   contacts.gap[c] = gap;
   contacts.compliance[c] = side.compliance = 0.0;
+  side.as_at_start = false;
   side.followed = step_.is_member(contacts.first[c]) ||
       (side.wall == 0 && step_.is_member(contacts.second[c]));
   return 1;

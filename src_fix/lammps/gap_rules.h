@@ -20,18 +20,21 @@ class GapRules {
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Side &side) const;
 
-  // Takes what is known of a contact, and makes it a spring if it is at rest. `diagonal` is the length by
-  // which a unit impulse opens its gap [time / mass]. A bed of rigid contacts is held by just as many as
+  // Takes what is known of a contact of particles i and j, and makes it a spring if it is at rest, of the
+  // compliance A_cc min(0.03, 30 accuracy, 0.3 tolerance / change of the last step). A_cc is the length by
+  // which a unit impulse along the unit normal opens the gap [time / mass]. A bed of rigid contacts is held by just as many as
   // it needs: none can take over from another, a small error of any force lets some of them open, and
   // the bed hums. A spring changes its force by little where its gap changes by little. Its gap is zero
   // at the preload, the force when the contact came to rest, which slides where the force has changed
   // so much that the gap would leave the elastic range.
-  void rest(Side &side, const ContactMemory::Contact &known, double diagonal) const;
+  void rest(Side &side, const ContactMemory::Contact &known, int i, int j,
+            const double *normal) const;
 
   // The gap [length] of the constraint, the wall's motion and the preload in it (contact_set.h).
   double asked_gap(const Side &side) const;
 
-  // The gap [length] at the end of the step for which the constraint is just met.
+  // The gap [length] at the end of the step for which the constraint is just met: negative where an overlap
+  // need not be given back in one step, of which at most half a tolerance may be left.
   double wanted_gap(const Side &side) const;
 
   // Tells whether the end of the step is so deep that the constraint must change. The excess is noted as well:
@@ -46,8 +49,14 @@ class GapRules {
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
   // Lets constraints of free spheres that these velocities leave beyond the tolerance ask for their
-  // present gap. (The step's target is known only now.) Returns how many.
+  // present gap, as rigid contacts: what they asked for at the start went by what velocities of the last
+  // step were resolved to, and those of this step may be known less well. Returns how many.
   long keep_within_tolerance(const std::vector<double> &velocity);
+
+  // Makes all springs rigid, those of bodies, too, whose force has grown to more than twice that of the last
+  // step. To be called on all ranks where a constraint of any rank was not kept within the tolerance: in an
+  // impact on a bed springs would give way one after the other.
+  void make_overloaded_rigid();
 
   OverlapWatch &overlaps() { return overlaps_; }
 

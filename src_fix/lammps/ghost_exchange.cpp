@@ -123,11 +123,12 @@ int GhostExchange::pack_reverse(int n, int first, double *buffer)
 {
   if (n == 0) return 0;
   switch (exchanging_) {
-    case Exchange::MEMORY:
+    case Exchange::MEMORY: {
+      int m = 0;
       for (int k = 0; k < n; ++k)
-        exchanged_memory_->pack(first + k, buffer + k * REVERSE_SIZE,
-                                ContactMemory::SHARED_PARTNERS);
-      return n * REVERSE_SIZE;
+        m += exchanged_memory_->pack(first + k, buffer + m, ContactMemory::SHARED_PARTNERS);
+      return m;
+    }
     case Exchange::CHOICE:
       return chosen_ghosts_.pack_choice(n, first, buffer);
     case Exchange::CHOSEN:
@@ -146,7 +147,7 @@ void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
   if (n == 0) return;
   switch (exchanging_) {
     case Exchange::MEMORY:
-      for (int k = 0; k < n; ++k) exchanged_memory_->unpack(list[k], buffer + k * REVERSE_SIZE);
+      for (int k = 0, m = 0; k < n; ++k) m += exchanged_memory_->unpack(list[k], buffer + m);
       return;
     case Exchange::CHOICE:
       chosen_ghosts_.unpack_choice(n, list, buffer);

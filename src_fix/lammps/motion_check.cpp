@@ -75,11 +75,11 @@ void MotionCheck::after_step(double largest_change)
 // Names a force or velocity of this rank that is no number; empty if there is none.
 std::string MotionCheck::not_finite() const
 {
-  const double kicks = step_.kick == Kick::WHOLE ? 1.0 : 0.5;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!step_.in_group(atom, i)) continue;
-    const double kick =
-        step_.is_mobile(atom, i) ? kicks * update->dt * force->ftm2v / mass_of(atom, i) : 0.0;
+    const double kick = step_.is_mobile(atom, i)
+        ? step_.kicks() * update->dt * force->ftm2v / mass_of(atom, i)
+        : 0.0;
     const double *const v = atom->v[i];
     const double *const f = atom->f[i];
     const double after[3] = {v[0] + kick * f[0], v[1] + kick * f[1], v[2] + kick * f[2]};

@@ -124,7 +124,7 @@ void PairConstraints::take(std::size_t slot, int i, int j)
     return;
   }
   Side side = {0, gap, size, 0.0};
-  rules_.rest(side, memory_.find(i, atom->tag[j]), problem.mobility_of_pair(i, j, normal));
+  rules_.rest(side, memory_.find(i, atom->tag[j]), i, j, normal);
   problem.contacts.add(i, j, normal, rules_.asked_gap(side), step_.impulse_per_force * side.force,
                        side.compliance);
   step_.sides.push_back(side);

@@ -57,6 +57,10 @@ void RunSummary::log(long shortened_steps, long unexpected_steps) const
 
 void RunSummary::log_overlaps(long unexpected_steps) const
 {
+  if (pushed_at_start_ > 0)
+    utils::logmesg(
+        lmp, "  before that, {} steps pushed the overlaps of the start, up to {:.6g}, apart\n",
+        pushed_at_start_, overlap_of_start_);
   if (largest_excess_ > 0.0)
     utils::logmesg(
         lmp,
@@ -64,10 +68,6 @@ void RunSummary::log_overlaps(long unexpected_steps) const
         "yes, avoids them\n",
         step_.has_bodies ? "turning bodies, or the curvature of walls," : "the curvature of walls",
         largest_excess_);
-  if (pushed_at_start_ > 0)
-    utils::logmesg(
-        lmp, "  before that, {} steps pushed the overlaps of the start, up to {:.6g}, apart\n",
-        pushed_at_start_, overlap_of_start_);
   if (pushed_later_ > 0)
     utils::logmesg(
         lmp,

@@ -44,9 +44,10 @@ struct Side {
   double sustained = 0.0;    // [force] see contact_memory.h
   // Of a contact at rest, which is a spring (gap_rules.h):
   double compliance = 0.0;    // [time / mass] 0 = rigid
-  double preload =
-      0.0;    // [force] at which its gap is zero; negative: it overlaps without a force
-  bool followed = false;    // the gap was set by where an earlier solution of the step ends
+  // [force] at which its gap is zero; negative: it overlaps without a force
+  double preload = 0.0;
+  bool as_at_start = true;    // the constraint asks for what it asked for at the start of the step
+  bool followed = false;      // the gap was set by where an earlier solution of the step ends
 };
 
 struct Step {
@@ -59,8 +60,6 @@ struct Step {
   // compared with what moved.
   bool continues = false;
   Kick kick = Kick::WHOLE;
-  double kicks =
-      1.0;    // how much of a whole kick the forces act for: a half at the start of a run
   // The time for which forces act before the next move, in units that turn a force into a momentum.
   double impulse_per_force = 0.0;
   double regular_timestep = 0.0;    // [time] as the deck sets it; problem.timestep may be shorter
@@ -73,9 +72,9 @@ struct Step {
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
 
-  // [length] The residual to which the last step was solved (core/solver.h). Before the first one, at
-  // which nothing is known, overlaps give nothing back.
-  double target = 0.0;
+  // [length / time] To this the velocities of the last step are resolved: its target (core/solver.h) over
+  // its length. Before the first step, at which nothing is known, overlaps give nothing back.
+  double resolution = 0.0;
 
   // [length] What contacts changed in the last step (core/solver.h).
   double change = 0.0;
@@ -87,6 +86,9 @@ struct Step {
   double excess = 0.0;             // [length] the overlap at the end beyond the regular ones
   int relinearisations = 0;        // rounds that have looked at the end of the step
   std::string problem_found;    // what went wrong on this rank while collecting; empty if nothing
+
+  // The part of a whole kick for which the forces act.
+  double kicks() const { return kick == Kick::WHOLE ? 1.0 : 0.5; }
 
   bool in_group(const Atom *atom, int i) const { return atom->mask[i] & settings.group_bit; }
   bool is_mobile(const Atom *atom, int i) const

@@ -215,10 +215,10 @@ bool StepLength::needs_new_list()
 void StepLength::begin_step()
 { spread_at_start_ = spread_since_build(nullptr); }
 
-void StepLength::fit_to_list(Kick kick)
+void StepLength::fit_to_list()
 {
   if (!step_.settings.shorten || spread_at_start_ >= list_reach_) return;
-  const double motion = unhindered_spread(kick == Kick::WHOLE ? 1.0 : 0.5);
+  const double motion = unhindered_spread(step_.kicks());
   if (spread_at_start_ + update->dt * motion > list_reach_)
     shorten(room_in_list(unhindered_spread(0.0), motion), "");
 }

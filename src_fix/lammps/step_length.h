@@ -33,7 +33,7 @@ class StepLength : protected Pointers {
 
   // Shortens the step where the list cannot reach as far as atoms would move without contacts: there is
   // no use in solving first. Collective.
-  void fit_to_list(Kick kick);
+  void fit_to_list();
 
   // Tells whether the step, solved, may be made. Otherwise it is shorter now, or there is an error. `named`
   // tells of the constraint that is farthest from being met, if any. Collective.

@@ -145,8 +145,7 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
   const double motion = view.distance_now - view.distance;
   constraint_[key(i, view.wall)] = problem.contacts.size();
   Side side = {view.wall, gap_now, size, motion};
-  rules_.rest(side, memory_.find(i, -view.wall),
-              problem.mobility_of_pair(i, problem.particles, view.normal));
+  rules_.rest(side, memory_.find(i, -view.wall), i, problem.particles, view.normal);
   problem.contacts.add(i, problem.particles, view.normal, rules_.asked_gap(side),
                        step_.impulse_per_force * side.force, side.compliance);
   step_.sides.push_back(side);
@@ -197,6 +196,7 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   const double to_plane = gap_here + wall_motion;
   Side side = {view.wall, view.convex ? std::max(0.0, to_plane) : to_plane, atom->radius[i],
                wall_motion};
+  side.as_at_start = false;
   side.followed = step_.is_member(i);
   if (known) side.gap_now = step_.sides[existing->second].gap_now;
   if (known) side.force = step_.sides[existing->second].force;

@@ -372,7 +372,8 @@ def test_same_bits_twice(given: Problem, solver: str) -> None:
 
 @pytest.mark.parametrize("name", ["dense crystal", "crystal in a box"])
 def test_acceleration_saves_iterations(name: str) -> None:
-    # Measured: 82 and 11 times fewer. Without restarts or with a wrong momentum apgd converges too.
+    # Measured: 82 and 11 times fewer with all constraints in every iteration. Without restarts or
+    # with a wrong momentum apgd converges too.
     accelerated = PROBLEMS[name].project(TOLERANCE)
     plain = PROBLEMS[name].project(TOLERANCE, solver="uzawa")
     # Twenty iterations may pass before contacts that were far from closed are looked at.

@@ -79,11 +79,13 @@ def motions(record: Record, inertia: str) -> FloatArray:
 
 
 def followed_gaps(record: Record) -> dict[tuple[int, int], float]:
-    """Return the constraints that have another gap than the positions, by the spheres' ids.
+    """Return the constraints that follow a turn with their gaps, by the spheres' ids.
 
     The gap of two spheres of turning bodies is not that of straight motion: where a step would end
-    in an overlap, the fix sets the constraint's gap to what makes it exact for the step's end. A
-    contact at rest is a spring: with its impulse, which adds to the gap, it is like a rigid one.
+    in an overlap, the fix sets the constraint's gap to what makes it exact for the step's end. What
+    differs by less than two tolerances is taken from the positions: that are the gap rules, and
+    contacts at rest, which are springs (with its impulse, which adds to the gap, a spring is like a
+    rigid contact).
     """
     springs = record["compliance"] * record["impulse"]
     return {
@@ -91,7 +93,7 @@ def followed_gaps(record: Record) -> dict[tuple[int, int], float]:
         for first, second, gap, now in zip(
             record["id1"], record["id2"], record["gap"] + springs, record["gap_now"], strict=True
         )
-        if gap != now
+        if abs(gap - now) > 2 * record["tolerance"]
     }
 
 

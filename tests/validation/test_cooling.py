@@ -39,7 +39,7 @@ def cooling(folder: Path, seed: int, tolerance: float, steps: int) -> FloatArray
         thermo="step ke",
     )
     every = steps // SAMPLES
-    # Every ten steps for the bound, which the curve has, too.
+    # Every ten steps, for the bound; the samples of the curve are among them.
     result = run_lmp(folder, deck + f"thermo 10\nrun {steps}\n", timeout=300)
     energy = result.thermo["KinEng"]
     start = 0.5 * float(mass(RADIUS)) * float((velocities**2).sum())

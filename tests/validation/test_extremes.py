@@ -96,12 +96,18 @@ def residuals(path: Path, box: object) -> tuple[float, float, float]:
     relative = v[one] - np.where(p["id2"][:, None] > 0, v[two], 0.0)
     under_force = p["impulse"] > 0
     # A contact at rest is a spring: its gap without impulses and what its impulse leaves of it.
-    gap = p["gap"] + p["compliance"] * p["impulse"]
-    w = (gap + h * np.sum(p["normal"] * relative, axis=1))[under_force]
+    asked = p["gap"] + p["compliance"] * p["impulse"]
+    w = (asked + h * np.sum(p["normal"] * relative, axis=1))[under_force]
     energy = [0.5 * float(p["mass"] @ (u**2).sum(axis=1)) for u in (p["predicted_velocity"], v)]
-    # What constraints give back of overlaps, and what gap is left where a force acts.
+    # What constraints may give back: of rigid spheres the present overlap, of springs and of
+    # turning bodies, whose surfaces do not move along straight lines, what they ask for. Then what
+    # gap is left where a force acts.
+    rigid = p["compliance"] == 0
+    if "molecule" in p:
+        rigid &= (p["molecule"][one] == 0) & ((p["id2"] <= 0) | (p["molecule"][two] == 0))
+    given = np.where(rigid, p["wall_motion"] - p["gap_now"], -asked)
     left = max([0.0, *w])
-    explained = float(p["impulse"] @ (np.maximum(0.0, -gap) + left)) / h
+    explained = float(p["impulse"] @ (np.maximum(0.0, given) + left)) / h
     gained = (energy[1] - energy[0] - explained) / max(energy[0], 1e-300)
     return max(lacking) / eps, left / eps, max(0.0, gained)
 
@@ -833,8 +839,8 @@ def test_long_rest(tmp_path: Path) -> None:
         f"(in the dump), {said:g} (of all steps)"
     )
     assert max(drift) <= 1
-    # 1 and 3 were measured.
-    assert loose.sum() <= 9
+    # 1 to 3 were measured.
+    assert loose.sum() <= 4
     # 0.2 was measured.
     assert speed <= 0.4 * EPS / STEP
     assert max(depth / EPS, said) <= SLACK

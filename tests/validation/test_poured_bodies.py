@@ -18,7 +18,7 @@ pytestmark = pytest.mark.validation
 DIAMETER = 0.085
 DIMERS: dict[str, object] = {"particles": 2000, "diameter": DIAMETER, "dump_every": 100000}
 SEEDS = (1, 2)
-# Orientations scatter over seeds by 1.2 times the error that one packing tells.
+# So that the scatter of orientations over seeds is known.
 MORE_SEEDS = (1, 2, 3, 4, 5, 6)
 # The paper, for every aspect ratio above 1; within what it states
 PAPER_Z, PAPER_Z_TOLERANCE = 10.0, 0.2

@@ -21,6 +21,7 @@ from lammps_inelastic.analysis import AnalysisError, ParticleDump, open_run, rea
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.measure import measure_case
 from lammps_inelastic.workflow.study import Outputs, read_study
+from tests.pouring import NO_STEPS
 from tests.workflow.few_spheres import TINY
 from tests.workflow.study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same
 
@@ -445,10 +446,7 @@ def lmp(folder: Path, deck: str, **variables: object) -> Path:
 def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the start of a packing, `start`, which took no steps."""
     folder = tmp_path_factory.mktemp("start")
-    none = dict.fromkeys(
-        [f"steps_{n}" for n in ("agitated", "settling", "resting", "tightening")], 0
-    )
-    lmp(folder, "spheres", particles=30, diameter=0.2, steps_measuring=0, out="start", **none)
+    lmp(folder, "spheres", particles=30, diameter=0.2, out="start", **NO_STEPS)
     return folder
 
 

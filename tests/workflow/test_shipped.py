@@ -106,14 +106,35 @@ RANGE = re.compile(r"\bfrom (-?[\d.e-]+)(?: \([^)]*\))? to (below )?([\d.e]+)")
 MOST = re.compile(r"\bup to ([\d.e]+)(?![\d.e]*\w)")
 
 
-@pytest.mark.parametrize("name", DECKS)
-def test_the_tables_of_the_documentation_are_those_of_the_deck(name: str) -> None:
-    """Names, defaults, words and the ends of ranges in inputs/README.md."""
+# A deck's table names what is not as in the table of another one.
+TABLE_OF = {"dimers": "spheres", "clusters": "dimers", "response": "spheres"}
+
+
+def documented(name: str) -> list[tuple[str, str, str]]:
+    """Return the rows of a deck's tables in inputs/README.md: variable, default and meaning."""
     document = (ROOT / "inputs" / "README.md").read_text()
     (section,) = re.findall(rf"^## {name}\.in\n(.*?)(?=^## |\Z)", document, re.M | re.S)
     tables = re.findall(r"^\| name \|.*?(?=\n\n|\Z)", section, re.M | re.S)
+    return [row for table in tables for row in ROW.findall(table)]
+
+
+@pytest.mark.parametrize("name", DECKS)
+def test_the_documentation_has_every_variable(name: str) -> None:
+    """With the deck's default, in its own table or in that of the deck that it refers to."""
+    defaults: dict[str, str] = {}
+    table: str | None = name
+    while table is not None:
+        defaults = {variable: default for variable, default, _ in documented(table)} | defaults
+        table = TABLE_OF.get(table)
+    for variable, default in find_deck(name, Path()).variables.items():
+        assert as_value(defaults[variable]) == default, variable
+
+
+@pytest.mark.parametrize("name", DECKS)
+def test_the_tables_of_the_documentation_are_those_of_the_deck(name: str) -> None:
+    """Names, defaults, words and the ends of ranges in inputs/README.md."""
     deck = find_deck(name, Path())
-    rows = [row for table in tables for row in ROW.findall(table)]
+    rows = documented(name)
     assert len(rows) >= 4
     for variable, default, meaning in rows:
         assert variable in deck.variables

@@ -106,9 +106,7 @@ def _moments(result: Result, stated: Mapping[str, Any]) -> list[tuple[str, float
         ("paper: constant", float(stated["plateau_step"])),
     ]
     off = result.setting("steps_agitated")
-    # Runs of version 0.1 had no phase of rest.
-    rest = result.setting("steps_resting")
-    counted = off + result.setting("steps_settling") + (0.0 if math.isnan(rest) else rest)
+    counted = off + result.setting("steps_settling") + result.setting("steps_resting")
     ours = [("random force off", off), ("smaller ε, count", counted)]
     return [*moments, *((what, step) for what, step in ours if not math.isnan(step))]
 
