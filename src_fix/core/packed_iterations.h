@@ -105,6 +105,7 @@ template <typename Real> class PackedIterations {
   double step_before_ = 0.0;          // 1 / L of the last iteration
   double inverse_diagonals_ = 0.0;    // their sum over all constraints
   std::vector<Vector> looked_;        // gaps of the idle ones, four in each
+  int looks_ = 0;                     // since the start of the search
   Real idle_gap_ = 0;                 // above it a constraint without an impulse is idle
   std::vector<Real> inverse_mass_;    // per particle; 1 for particles in bodies
   std::vector<Vector> sum_, velocity_;

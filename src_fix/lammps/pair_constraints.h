@@ -59,8 +59,8 @@ class PairConstraints : protected Pointers {
   const RigidMotion *bodies_;
   NeighList *list_ = nullptr;
   std::vector<char> taken_;    // per pair of the neighbour list: whether it is in the problem
-  // After the first scan of all pairs in a step only those that were near each other need another look,
-  // as long as no velocity has changed much since.
+  // After a scan of all pairs in a step only those that were near each other need another look, as long as
+  // no velocity has changed much since. The first scan is with the predicted velocities, of free spheres.
   bool scanned_ = false;
   std::vector<NearPair> near_pairs_;
   std::vector<double> velocity_at_scan_, motion_at_scan_;
