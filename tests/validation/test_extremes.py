@@ -834,8 +834,8 @@ def test_long_rest(tmp_path: Path) -> None:
     print(
         f"100,000 steps of rest: centre of mass moves by {drift[0]:.1f}, {drift[1]:.1f}, "
         f"{drift[2]:.1f} eps, half of the spheres by less than {np.median(moved):.1e} r, and none "
-        f"by more than {moved.max():.1e} r; mean speed up to {speed * STEP / EPS:.1f} eps a step, overlap {depth / EPS:.6f} eps "
-        f"(in the dump), {said:g} (of all steps)"
+        f"by more than {moved.max():.1e} r; mean speed up to {speed * STEP / EPS:.1f} eps a step, "
+        f"overlap {depth / EPS:.6f} eps (in the dump), {said:g} (of all steps)"
     )
     assert max(drift) <= 1
     assert moved.max() <= 0.01
