@@ -10,10 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import (
     CoordinationNumber,
@@ -120,73 +118,6 @@ def measure(folder: Path, contact_dump: str = "contacts.lammpsdump") -> Packing:
     assert found.coordination is not None
     assert found.neighbours is not None
     return Packing(found.packing_fraction, found.coordination, found.neighbours, found.orientation)
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """A contact problem that `fix inelastic ... record` wrote, with indices instead of IDs."""
-
-    arrays: Mapping[str, NDArray[np.float64]]
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]  # -1 for a wall
-
-    @property
-    def timestep(self) -> float:
-        return float(self.arrays["timestep"])
-
-    @property
-    def tolerance(self) -> float:
-        return float(self.arrays["tolerance"])
-
-    @property
-    def spheres(self) -> list[Any]:
-        """The arguments of `core.project` for the spheres as if all were free."""
-        a = self.arrays
-        return [
-            a["predicted_velocity"],
-            a["inverse_mass"],
-            self.first,
-            self.second,
-            a["normal"],
-            a["gap"],
-        ]
-
-    @property
-    def springs(self) -> dict[str, Any]:
-        """The argument of `core.project` for contacts at rest."""
-        return {"compliance": self.arrays["compliance"]}
-
-    @property
-    def bodies(self) -> dict[str, Any]:
-        """The arguments of `core.project` for the bodies; none in a scene of free spheres."""
-        a = self.arrays
-        if "molecule" not in a:
-            return {}
-        order = np.argsort(a["body_molecule"])
-        place = np.searchsorted(a["body_molecule"][order], a["molecule"])
-        xx, yy, zz, xy, xz, yz = a["body_inverse_inertia"][order].T
-        rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
-        return {
-            "body": np.where(a["molecule"] > 0, place, -1).astype(np.int64),
-            "arm": a["arm"],
-            "body_inverse_mass": a["body_inverse_mass"][order],
-            "body_inverse_inertia": np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0)),
-        }
-
-
-def read_record(path: Path) -> Recorded:
-    """Read one recorded problem."""
-    with np.load(path) as file:
-        arrays = dict(file)
-    identifiers = arrays["id"]
-    first = np.asarray(np.searchsorted(identifiers, arrays["id1"]))
-    second = np.where(arrays["id2"] > 0, np.searchsorted(identifiers, arrays["id2"]), -1)
-    return Recorded(arrays, first.astype(np.int64), second.astype(np.int64))
-
-
-def records(folder: Path) -> list[Path]:
-    """Return the recorded problems of a folder in the order of their steps."""
-    return sorted(folder.glob("problem.*.npz"), key=lambda path: int(path.name.split(".")[1]))
 
 
 def recording(text: str, every: int) -> str:

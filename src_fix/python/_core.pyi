@@ -56,6 +56,7 @@ def project(
     *,
     timestep: float,
     tolerance: float,
+    accuracy: float = 0.0,
     solver: str = "apgd",
     max_iterations: int = 100000,
     impulse: NDArray[np.float64] | None = None,
@@ -68,10 +69,11 @@ def project(
     """Project ``predicted_velocity`` (n, 3) onto the velocities that keep every contact apart.
 
     The solver stops when both residuals, or with "uzawa" the feasibility alone, are within
-    ``tolerance`` [length]. It gives up after ``max_iterations``, or earlier if the tolerance is out
-    of reach; ``converged`` is then False. ``impulse`` (m,) is a first guess for "apgd".
-    ``compliance`` (m,) [time / mass], not negative, makes contacts springs; without it all are
-    rigid.
+    ``tolerance`` [length] and within what the ``accuracy`` A, a fraction, asks for: A max(m/10, r),
+    with m and r as on the page of fix inelastic (what each tolerance bounds); 0 asks for nothing.
+    It gives up after ``max_iterations``, or earlier if the tolerance is out of reach; ``converged``
+    is then False. ``impulse`` (m,) is a first guess for "apgd". ``compliance`` (m,) [time / mass],
+    not negative, makes contacts springs; without it all are rigid.
     """
 
 def residual(

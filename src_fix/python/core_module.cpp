@@ -250,7 +250,7 @@ inelastic::Residual residual_of(const inelastic::ContactProblem &problem)
 
 Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mass,
                    const Indices &first, const Indices &second, const Vectors &normal,
-                   const Scalars &gap, double timestep, double tolerance,
+                   const Scalars &gap, double timestep, double tolerance, double accuracy,
                    const std::string &solver_name, long max_iterations,
                    const std::optional<Scalars> &impulse, const std::optional<Scalars> &compliance,
                    const std::optional<Indices> &body, const std::optional<Vectors> &arm,
@@ -259,6 +259,8 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
 {
   if (!(tolerance > 0.0) || std::isinf(tolerance))
     throw nb::value_error("tolerance must be finite and greater than 0");
+  if (!(accuracy >= 0.0 && accuracy < 1.0))
+    throw nb::value_error("accuracy must be at least 0 and below 1");
   if (max_iterations < 0) throw nb::value_error("max_iterations must not be negative");
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
@@ -267,7 +269,9 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
       {body, arm, body_inverse_mass, body_inverse_inertia});
   inelastic::SerialHost host;
   Projection projection;
-  const inelastic::SolverResult result = solver->solve(problem, {tolerance, max_iterations}, host);
+  inelastic::SolverLimits limits = {tolerance, max_iterations};
+  limits.accuracy = accuracy;
+  const inelastic::SolverResult result = solver->solve(problem, limits, host);
   projection.iterations = result.iterations;
   projection.converged = result.status == inelastic::Status::CONVERGED;
   projection.residual = residual_of(problem);
@@ -307,10 +311,10 @@ NB_MODULE(_core, module)
       });
 
   module.def("project", &project, "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a,
-             "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "solver"_a = "apgd",
-             "max_iterations"_a = 100000, "impulse"_a = nb::none(), "compliance"_a = nb::none(),
-             "body"_a = nb::none(), "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
-             "body_inverse_inertia"_a = nb::none());
+             "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "accuracy"_a = 0.0,
+             "solver"_a = "apgd", "max_iterations"_a = 100000, "impulse"_a = nb::none(),
+             "compliance"_a = nb::none(), "body"_a = nb::none(), "arm"_a = nb::none(),
+             "body_inverse_mass"_a = nb::none(), "body_inverse_inertia"_a = nb::none());
 
   module.def(
       "residual",

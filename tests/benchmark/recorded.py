@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import read_run_log
+from lammps_inelastic.workflow.records import Recorded, read_record
 from tests.pouring import (
     NO_STEPS,
-    Recorded,
-    read_record,
     recording,
     records,
     run_deck,

@@ -14,10 +14,9 @@ from scipy.spatial import KDTree
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
+from lammps_inelastic.workflow.records import Recorded, read_record
 from tests.pouring import (
-    Recorded,
     measure,
-    read_record,
     recording,
     records,
     run_deck,

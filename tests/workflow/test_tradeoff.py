@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
 
+from lammps_inelastic import core
 from lammps_inelastic.analysis import (
     InputError,
     ParticleFrame,
@@ -29,6 +31,16 @@ from lammps_inelastic.workflow.thermo import read_thermo
 from lammps_inelastic.workflow.tradeoff.advice import recommendations
 from lammps_inelastic.workflow.tradeoff.comparison import compare, reference_of
 from lammps_inelastic.workflow.tradeoff.plan import Configuration, Plan, Run
+from lammps_inelastic.workflow.tradeoff.states import (
+    EXACT,
+    WAYS,
+    Solved,
+    curves_of,
+    errors,
+    problems_of,
+)
+from tests.core.contact_problems import Problem, no_bodies
+from tests.core.reference_solver import reference
 from tests.workflow.few_spheres import write_data
 from tests.workflow.study_run import killed_when, numbers_of, same
 
@@ -344,6 +356,10 @@ def test_what_a_comparison_writes(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     assert {path.name for path in out.iterdir()} == {
         "ranks-1",
+        "states",
+        "states.csv",
+        "states.png",
+        "states.svg",
         "tradeoff.csv",
         "tradeoff.h5",
         "tradeoff.md",
@@ -389,6 +405,79 @@ def test_numbers_of_a_comparison(finished: tuple[list[str], Path]) -> None:
         assert (row["network_error"] != "") == compared
 
 
+def test_recorded_states_show_the_accuracy(finished: tuple[list[str], Path]) -> None:
+    """Tighter is more accurate, in velocities, forces and contacts, and takes more iterations."""
+    _, out = finished
+    with (out / "states.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    # Two starts, three moments, and six values of each way.
+    assert len(rows) == 2 * 3 * 6 * len(WAYS)
+    for way in WAYS:
+        for start, moment in product(("1", "2"), ("impact", "settling", "rest")):
+            chosen = {"way": way.name, "start": start, "moment": moment}
+            mine = [row for row in rows if chosen.items() <= row.items()]
+            first, last = mine[0], mine[-1]
+            assert int(last["iterations"]) > int(first["iterations"])
+            # Errors are in proportion to the residual, which falls by five decades, to 5e-7 r. The
+            # forces of the last step are within 1e-2 from the start at rest.
+            for name in ("velocity_error", "force_error"):
+                assert 0 <= float(last[name]) <= max(1e-2 * float(first[name]), 1e-3), chosen
+            assert float(last["missed"]) + float(last["false"]) <= 0.01
+    assert "| apgd from the last forces | 0.0005 |" in (out / "tradeoff.md").read_text()
+
+
+def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str], Path]) -> None:
+    """Clarabel, an interior-point method, solves the recorded problems of free spheres."""
+    _, out = finished
+    (folder, *_) = (path.parent for path in out.glob("states/cases/*/problem.*.npz"))
+    for problem in problems_of(folder).values():
+        number = len(problem.arrays["inverse_mass"])
+        velocity, inverse_mass, first, second, normal, gap = problem.spheres
+        given = Problem(
+            velocity, inverse_mass, first, second, normal, gap, problem.timestep, no_bodies(number)
+        )
+        reference_velocity, impulse = reference(given, problem.arrays["compliance"])
+        exact = core.project(
+            *problem.spheres,
+            timestep=problem.timestep,
+            tolerance=EXACT * float(problem.arrays["radius"].min()),
+            **problem.springs,
+        )
+        found = errors(
+            exact.velocity,
+            exact.impulse,
+            reference_velocity,
+            np.where(impulse > 1e-6 * impulse.max(), impulse, 0.0),
+            problem.arrays["predicted_velocity"],
+        )
+        # Clarabel's objective, half of a square of velocities, is known to 1e-11: they to 4e-6. Forces
+        # are not told as well.
+        assert found["velocity_error"] <= 1e-5
+        assert found["force_error"] <= 1e-4
+
+
+def test_errors_of_a_solution() -> None:
+    exact, other = np.array([[1.0, 0, 0], [0, 0, 0]]), np.array([[1.0, 0.5, 0], [0, 0, 0]])
+    predicted = np.array([[1.0, 0, 1.0], [0, 0, 0]])
+    found = errors(other, np.array([1.0, 0, 2, 1]), exact, np.array([2.0, 1, 1, 0]), predicted)
+    assert found == {"velocity_error": 0.5, "force_error": 1.0, "missed": 1 / 3, "false": 1 / 3}
+    nothing = np.zeros(2)
+    found = errors(exact, nothing, exact, nothing, exact)
+    assert all(math.isnan(value) for value in found.values())
+
+
+def test_what_some_state_has_not_reached_is_left_out() -> None:
+    def solved(moment: str, value: float, seconds: float) -> Solved:
+        return Solved("1", moment, 5, WAYS[0].name, value, 10, seconds, 0.1, 0.1, 0.0, 0.0)
+
+    (curve,) = curves_of(
+        [solved("impact", 0.5, 1), solved("impact", 0.1, 4), solved("rest", 0.5, 3)]
+    )
+    assert curve.way == WAYS[0].name
+    assert curve.values.tolist() == [0.5]
+    assert curve.medians["seconds"].tolist() == [2.0]
+
+
 def test_all_runs_of_a_seed_have_the_same_start(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     (study,) = read_studies(out / "tradeoff.h5")
@@ -406,7 +495,10 @@ def test_nothing_is_left_to_do(
     arguments, out = finished
     before = numbers_of(out / "tradeoff.h5"), (out / "tradeoff.csv").read_text()
     assert main(arguments) == 0
-    assert "ranks-1: 6 there before" in capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert "ranks-1: 6 there before" in output
+    assert "states: 2 there before" in output
+    assert "solves" not in output
     assert same(before[0], numbers_of(out / "tradeoff.h5"))
     assert before[1] == (out / "tradeoff.csv").read_text()
 

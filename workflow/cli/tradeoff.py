@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +20,35 @@ from ..study import Outputs, Study
 from ..tradeoff.advice import recommendations
 from ..tradeoff.comparison import compare
 from ..tradeoff.options import read_plan
-from ..tradeoff.plan import Plan, Run, command_line, runs_of
-from ..tradeoff.table import TITLE, as_csv, as_markdown, never_at_rest, print_comparison
+from ..tradeoff.plan import Plan, Run, command_line, label_of, runs_of
+from ..tradeoff.states import (
+    Solved,
+    curves_of,
+    problems_of,
+    read_states,
+    recording_case,
+    solve_state,
+    write_states,
+)
+from ..tradeoff.table import (
+    TITLE,
+    as_csv,
+    as_markdown,
+    never_at_rest,
+    print_comparison,
+    print_states,
+    states_as_csv,
+    states_as_markdown,
+)
 from .arguments import add_out, seconds
 
 STORE, ROWS, PAGE, FIGURE = "tradeoff.h5", "tradeoff.csv", "tradeoff.md", "tradeoff"
+STATES = "states"
 # Only the result of a run is kept: the dumps of many would fill a disk. Random points are not
 # needed where the exact packing fraction is known.
 OUTPUTS = Outputs(points=10_000, structure=False, keep="results")
+# Recorded problems are files of the run.
+RECORDING = Outputs(points=10_000, structure=False, evolution=False, keep="everything")
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -36,9 +58,11 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="measure time against accuracy, hard contacts beside LAMMPS's soft ones",
         description="Let the same starts settle with several tolerances, hard contacts and soft "
         "ones, one run at a time; print a table of time and accuracy and what to take, and write "
-        f"it with a plot ({PAGE}, {ROWS}, {STORE}, {FIGURE}.png, {FIGURE}.svg). LIST is values "
-        "with commas between them. It can be interrupted at any moment: the next time does what "
-        "is left.",
+        f"it with a plot ({PAGE}, {ROWS}, {STORE}, {FIGURE}.png, {FIGURE}.svg). Then solve "
+        "recorded contact problems to several tolerances, compare them with their exact "
+        f"solutions, and write that ({PAGE}, {STATES}.csv, {STATES}.png, {STATES}.svg). LIST is "
+        "values with commas between them. It can be interrupted at any moment: the next time does "
+        "what is left.",
     )
 
     def add(name: str, default: str | None, metavar: str, what: str) -> None:
@@ -94,16 +118,62 @@ def run(options: argparse.Namespace) -> int:
     comparison = compare(results)
     lines = [*left_out, *never_at_rest(comparison), *recommendations(comparison)]
     print_comparison(comparison, lines)
+    states, lost = _solve_states(plan, options.out, options.timeout)
+    curves = curves_of(states)
+    for line in lost:
+        print(line)
+    if curves:
+        print_states(curves)
     write_text(options.out / ROWS, as_csv(comparison))
-    write_text(options.out / PAGE, as_markdown(plan, comparison, lines))
-    names = [STORE, ROWS, PAGE]
-    if comparison.rows:
-        # Drawing takes a while to import, for which the other subcommands need not wait.
-        from ..tradeoff.figure import draw_tradeoff
+    write_text(options.out / f"{STATES}.csv", states_as_csv(states))
+    page = as_markdown(plan, comparison, lines) + states_as_markdown(states, lost)
+    write_text(options.out / PAGE, page)
+    names = [STORE, ROWS, f"{STATES}.csv", PAGE]
+    # Drawing takes a while to import, for which the other subcommands need not wait.
+    from ..tradeoff.figure import draw_states, draw_tradeoff
 
+    if comparison.rows:
         names += [path.name for path in draw_tradeoff(comparison, options.out / FIGURE)]
+    if curves:
+        names += [path.name for path in draw_states(curves, options.out / STATES)]
     print(f"written: {', '.join(names)} in {options.out}")
-    return 1 if failed else 0
+    return 1 if failed or lost else 0
+
+
+def _solve_states(plan: Plan, out: Path, timeout: float | None) -> tuple[list[Solved], list[str]]:
+    """Record problems of each start and solve them, unless that was done before.
+
+    Returns the solutions, and one line for each start without any.
+    """
+    folder = Folder(out / STATES)
+    cases = tuple(recording_case(plan, start) for start in plan.starts)
+    study = Study(STATES, TITLE, command_line(plan), cases, RECORDING)
+    with Display(len(cases)) as display:
+        outcome = run_study(study, cases, folder, Options(timeout=timeout), display)
+    print_outcome(study, outcome)
+    states: list[Solved] = []
+    lost = [f"left out: {name}: {reason}" for name, reason in outcome.failed.items()]
+    lost += [f"left out: {name}: somebody else runs it" for name in outcome.elsewhere]
+    with Display(None) as display:
+        for start, case in zip(plan.starts, cases, strict=True):
+            if not folder.is_measured(study, case):
+                continue
+            try:
+                problems = problems_of(folder.case(case))
+            except (OSError, ValueError) as error:
+                lost.append(f"left out: {case.name}: {error}")
+                continue
+            for moment, problem in problems.items():
+                done = folder.case(case) / f"solved-{moment}.json"
+                with suppress(OSError, ValueError, TypeError):
+                    states += read_states(done)
+                    continue
+                label = label_of(start)
+                display.say(f"solves {case.name}, {moment}")
+                solved = list(solve_state(label, moment, problem))
+                write_states(done, solved)
+                states += solved
+    return states, lost
 
 
 def _run_all(

@@ -17,9 +17,11 @@ from lammps_inelastic.analysis.plots import plot_bounds, plot_points, style_of
 from ..files import whole
 from ..report.figures import DPI, RC
 from .comparison import Comparison, Row
+from .states import Curve
 
 # The figure is about as wide as a page [inches].
 SIZE = (7.4, 4.3)
+STATES_SIZE = (7.4, 3.2)
 FORMATS = ("png", "svg")
 SCATTER = "scatter between starts"
 # Below this ratio of largest to smallest y, powers of ten alone would be too few ticks.
@@ -34,7 +36,6 @@ def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
     comparison : comparison with at least one row
     path : path of the files, without `.png` and `.svg`
     """
-    files = [path.with_name(f"{path.name}.{kind}") for kind in FORMATS]
     with matplotlib.rc_context(RC):
         figure = Figure(figsize=SIZE, layout="constrained")
         grid = figure.add_gridspec(2, 2, width_ratios=(1.2, 1))
@@ -53,13 +54,41 @@ def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
             for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
         }
         figure.legend(known.values(), known, loc="outside lower center", ncols=min(len(known), 3))
-        for file in files:
-            # The file has no date, so that the same numbers give the same file.
-            metadata = {"Date": None} if file.suffix == ".svg" else {}
-            form = file.suffix.removeprefix(".")
-            with whole(file) as temporary:
-                figure.savefig(temporary, format=form, dpi=DPI, metadata=metadata)
-    return files
+        return _write(figure, path)
+
+
+def draw_states(curves: Sequence[Curve], path: Path) -> list[Path]:
+    """Draw the errors of recorded states against time, and write it as PNG and as SVG.
+
+    Parameters
+    ----------
+    curves : at least one curve
+    path : path of the files, without `.png` and `.svg`
+    """
+    with matplotlib.rc_context(RC):
+        figure = Figure(figsize=STATES_SIZE, layout="constrained")
+        axes = figure.subplots(1, 3, sharex=True)
+        quantities = {
+            "error of velocities": ("velocity_error",),
+            "error of forces": ("force_error",),
+            "contacts missed or false": ("missed", "false"),
+        }
+        for ax, (label, names) in zip(axes, quantities.items(), strict=True):
+            for number, curve in enumerate(curves):
+                error = sum((curve.medians[name] for name in names), np.zeros(len(curve.values)))
+                points = _positive(
+                    np.column_stack([1e3 * curve.medians["seconds"], error]).tolist()
+                )
+                if len(points):
+                    plot_points(ax, *points.T, label=curve.way, number=number)
+            ax.set_ylabel(label)
+            ax.set_xlabel("time of a solution [ms]")
+            if ax.has_data():
+                ax.set_xscale("log")
+                ax.set_yscale("log")
+        known = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))
+        figure.legend(known.values(), known, loc="outside lower center", ncols=2)
+        return _write(figure, path)
 
 
 def plot_cost(ax: Axes, comparison: Comparison) -> Axes:
@@ -98,6 +127,18 @@ def plot_errors(ax: Axes, comparison: Comparison, name: str) -> Axes:
         ax.set_ylim(bottom, max(top, 1.5 * scatter))
     _label_heights(ax)
     return ax
+
+
+def _write(figure: Figure, path: Path) -> list[Path]:
+    """Write a figure in all formats; return the files."""
+    files = [path.with_name(f"{path.name}.{kind}") for kind in FORMATS]
+    for file in files:
+        # The file has no date, so that the same numbers give the same file.
+        metadata = {"Date": None} if file.suffix == ".svg" else {}
+        form = file.suffix.removeprefix(".")
+        with whole(file) as temporary:
+            figure.savefig(temporary, format=form, dpi=DPI, metadata=metadata)
+    return files
 
 
 def _plot(

@@ -120,16 +120,9 @@ def runs_of(plan: Plan) -> list[Run]:
     """
     folder = Path()
     first, second = find_deck(plan.particle, folder), find_deck(SETTLING, folder)
-    files = {start: Input.of(start) for start in plan.starts if isinstance(start, Path)}
+    inputs = {start: input_of(start) for start in plan.starts}
     runs = []
     for start, configuration in product(plan.starts, plan.configurations):
-        own: dict[str, Value] = {**NO_STEPS, **plan.values}
-        inputs: dict[str, Input] = {}
-        if isinstance(start, Path):
-            own["start"] = f"{INPUTS}/{start.name}"
-            inputs[start.name] = files[start]
-        else:
-            own["seed"] = start
         settling: dict[str, Value] = {
             **plan.values,
             "particle": plan.particle,
@@ -138,10 +131,28 @@ def runs_of(plan: Plan) -> list[Run]:
         }
         if configuration.solver is not None and configuration.dt is not None:
             settling |= {"solver": configuration.solver, "dt": configuration.dt}
-        case = Case((stage_of(first, own), stage_of(second, settling)), inputs)
-        label = start.name if isinstance(start, Path) else str(start)
-        runs.append(Run(configuration, label, case))
+        own = start_values(plan, start)
+        case = Case((stage_of(first, own), stage_of(second, settling)), inputs[start])
+        runs.append(Run(configuration, label_of(start), case))
     return runs
+
+
+def start_values(plan: Plan, start: int | Path) -> dict[str, Value]:
+    """Return the variables of the deck that makes a start."""
+    own: dict[str, Value] = {**NO_STEPS, **plan.values}
+    return own | (
+        {"start": f"{INPUTS}/{start.name}"} if isinstance(start, Path) else {"seed": start}
+    )
+
+
+def input_of(start: int | Path) -> dict[str, Input]:
+    """Return the data file of a start by its name; nothing for a seed."""
+    return {start.name: Input.of(start)} if isinstance(start, Path) else {}
+
+
+def label_of(start: int | Path) -> str:
+    """Return the seed of a start, or the name of its data file."""
+    return start.name if isinstance(start, Path) else str(start)
 
 
 def command_line(plan: Plan) -> str:

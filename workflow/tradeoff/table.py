@@ -6,6 +6,8 @@ import csv
 import io
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -15,6 +17,7 @@ from ..wide_table import print_wide
 from .advice import described, ratio_text
 from .comparison import COMPARED, MEASURED, Comparison, Row
 from .plan import Plan, command_line
+from .states import MEDIANS, Curve, Solved, curves_of
 
 TITLE = "Time and accuracy of hard and soft contacts"
 MISSING = "-"
@@ -143,4 +146,73 @@ def as_csv(comparison: Comparison) -> str:
                 *("" if math.isnan(value) else repr(value) for value in numbers),
             ]
         )
+    return text.getvalue()
+
+
+STATES_TITLE = "Recorded states: solutions against the exact one"
+STATES_LEGEND = (
+    "Contact problems of a few steps, solved outside of LAMMPS; medians over the states. "
+    "Tolerances are in radii, accuracies fractions. Errors: of velocities, root mean square over "
+    "that of what contacts change; of forces, summed, over the sum of the forces; missed and "
+    "false: parts of the contacts."
+)
+_STATES_HEADINGS = (
+    "way",
+    "value",
+    "iterations",
+    "ms",
+    "error of velocities",
+    "of forces",
+    "missed",
+    "false",
+)
+
+
+def _states_cells(curves: Sequence[Curve]) -> list[list[str]]:
+    """Return the cells of a row for each value of each way."""
+    rows = []
+    for curve in curves:
+        for k, value in enumerate(curve.values):
+            iterations, seconds, *errors = (float(curve.medians[name][k]) for name in MEDIANS)
+            cells = [curve.way, f"{value:g}", f"{iterations:.0f}", f"{1e3 * seconds:.3g}"]
+            rows.append([*cells, *(MISSING if math.isnan(e) else f"{e:.1e}" for e in errors)])
+    return rows
+
+
+def print_states(curves: Sequence[Curve]) -> None:
+    """Print the medians over the states."""
+    console = Console(highlight=False)
+    table = Table(box=None, pad_edge=False)
+    for heading in _STATES_HEADINGS:
+        justify: Literal["left", "right"] = "left" if heading == "way" else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
+    for cells in _states_cells(curves):
+        table.add_row(*(Text(cell) for cell in cells))
+    console.print(f"{STATES_TITLE}.", markup=False)
+    print_wide(table)
+    console.print(STATES_LEGEND, markup=False, soft_wrap=not console.is_terminal)
+
+
+def states_as_markdown(states: Sequence[Solved], lines: Sequence[str]) -> str:
+    """Return the medians over the states as a section of Markdown."""
+    curves = curves_of(states)
+    if not curves and not lines:
+        return ""
+    number = len({(one.start, one.moment) for one in states})
+    text = [f"\n## {STATES_TITLE}\n", f"{number} states. {STATES_LEGEND}\n"]
+    if curves:
+        text.append(f"| {' | '.join(_STATES_HEADINGS)} |")
+        text.append("|" + "---|" * len(_STATES_HEADINGS))
+        text += [f"| {' | '.join(cells)} |" for cells in _states_cells(curves)]
+    text += [f"\n{line}" for line in lines]
+    return "\n".join(text) + "\n"
+
+
+def states_as_csv(states: Sequence[Solved]) -> str:
+    """Return all numbers of all solutions as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = [field.name for field in fields(Solved)]
+    writer.writerow(names)
+    writer.writerows([getattr(one, name) for name in names] for one in states)
     return text.getvalue()

@@ -1,0 +1,279 @@
+"""Recorded states: the contact problems of a few moments, each solved to several tolerances.
+
+What comes out of a run is chaotic: two runs that differ in their tolerance end in two packings.
+What comes out of one step is not. Here the problems of a few steps, recorded while a
+start settles, are solved outside of LAMMPS, and compared with their exact solution: velocities,
+forces and contacts, against the time that a solution takes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lammps_inelastic import core
+from lammps_inelastic.analysis import read_run_log
+
+from ..decks import Value, find_deck
+from ..files import write_text
+from ..records import Recorded, read_record
+from ..shipped import SETTLING
+from ..study import Case, Input, stage_of
+from .plan import Plan, input_of, start_values
+
+FloatArray = NDArray[np.float64]
+
+# When problems are taken, unless the run ends before [time].
+MOMENTS: Mapping[str, float] = {"impact": 0.5, "settling": 1.0, "rest": 2.0}
+RECORD_EVERY = 5  # steps
+TOLERANCE = 0.0005  # of the runs that are recorded [radii]
+# Of the exact solution [radii]: a thousandth of the tightest tolerance that is compared, or less.
+EXACT = 1e-12
+TOLERANCES = (0.05, 0.005, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
+ACCURACIES = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+# Uzawa takes some hundred times as many; what it does not reach is left out.
+MOST_ITERATIONS = {"apgd": 1_000_000, "uzawa": 100_000}
+REPEATS = 3
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to solve a problem.
+
+    Attributes
+    ----------
+    solver : apgd or uzawa
+    guess : whether it starts from the forces of the step before; otherwise from zero
+    by : tolerance or accuracy: what ends the iterations
+    """
+
+    solver: str
+    guess: bool
+    by: str
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        start = "from the last forces" if self.guess else "from zero"
+        by = ", by accuracy" if self.by == "accuracy" else ""
+        return f"{self.solver} {start}{by}"
+
+
+WAYS = (
+    Way("apgd", True, "tolerance"),
+    Way("apgd", False, "tolerance"),
+    Way("uzawa", False, "tolerance"),
+    Way("apgd", True, "accuracy"),
+)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One solution, compared with the exact one.
+
+    Attributes
+    ----------
+    start : of the run, as in the plan
+    moment : of MOMENTS
+    contacts : number in the exact solution
+    way : name of the way
+    value : tolerance, radii, or accuracy
+    iterations : that it took
+    seconds : that it took, median of REPEATS
+    velocity_error : root mean square, over the spheres, of the difference of velocities, over that
+        of what contacts change
+    force_error : sum of the differences of the forces over the sum of the forces
+    missed : part of the contacts of the exact solution that have no force
+    false : part of the contacts that have no force in the exact solution
+    """
+
+    start: str
+    moment: str
+    contacts: int
+    way: str
+    value: float
+    iterations: int
+    seconds: float
+    velocity_error: float
+    force_error: float
+    missed: float
+    false: float
+
+
+def recording_case(plan: Plan, start: int | Path) -> Case:
+    """Return the case that lets a start settle and records its problems."""
+    folder = Path()
+    inputs: dict[str, Input] = input_of(start)
+    settling: dict[str, Value] = {
+        **plan.values,
+        "particle": plan.particle,
+        "tolerance": TOLERANCE,
+        "dt": plan.dts[0],
+        "record_every": RECORD_EVERY,
+    }
+    first = stage_of(find_deck(plan.particle, folder), start_values(plan, start))
+    return Case((first, stage_of(find_deck(SETTLING, folder), settling)), inputs)
+
+
+def problems_of(folder: Path) -> dict[str, Recorded]:
+    """Return the recorded problems of a run that are nearest to the moments, by their names.
+
+    Moments after the end of the run are left out. Raises OSError or ValueError if a file is broken.
+    """
+    # The deck's last run, of no steps, only completes the dump.
+    thermo = read_run_log(folder / "log.lammps").runs[-2].thermo
+    times = dict(zip(thermo["Step"], thermo["Time"], strict=True))
+    paths = {int(path.name.split(".")[1]): path for path in folder.glob("problem.*.npz")}
+    last = max(times.values())
+    return {
+        moment: read_record(paths[min(paths, key=lambda step: abs(times[step] - when))])
+        for moment, when in MOMENTS.items()
+        if paths and when <= last
+    }
+
+
+def solve_state(start: str, moment: str, problem: Recorded) -> Iterator[Solved]:
+    """Solve a problem in all ways, each from the loosest to the tightest; skip what fails."""
+    radius = float(problem.arrays["radius"].min())
+    exact = _project(problem, tolerance=EXACT * radius, max_iterations=10_000_000)
+    predicted = problem.arrays["predicted_velocity"]
+    for way in WAYS:
+        options: dict[str, Any] = {
+            "solver": way.solver,
+            "max_iterations": MOST_ITERATIONS[way.solver],
+        }
+        if way.guess:
+            options["impulse"] = problem.arrays["impulse_guess"]
+        by_tolerance = way.by == "tolerance"
+        for value in TOLERANCES if by_tolerance else ACCURACIES:
+            if by_tolerance:
+                options["tolerance"] = value * radius
+            else:
+                # The residual that is asked for is then below any tolerance of use.
+                options |= {"tolerance": TOLERANCES[0] * radius, "accuracy": value}
+            result, seconds = _timed(partial(_project, problem, **options))
+            if not result.converged:
+                break
+            yield Solved(
+                start,
+                moment,
+                int((exact.impulse > 0).sum()),
+                way.name,
+                value,
+                result.iterations,
+                seconds,
+                **errors(result.velocity, result.impulse, exact.velocity, exact.impulse, predicted),
+            )
+
+
+def errors(
+    velocity: FloatArray,
+    impulse: FloatArray,
+    exact_velocity: FloatArray,
+    exact_impulse: FloatArray,
+    predicted: FloatArray,
+) -> dict[str, float]:
+    """Compare a solution with the exact one.
+
+    Parameters
+    ----------
+    velocity, exact_velocity, predicted : velocities, length/time, (n, 3)
+    impulse, exact_impulse : impulses, mass length/time, (m,)
+
+    Returns
+    -------
+    The errors of Solved by their names; NaN where there is nothing to be compared with.
+    """
+
+    def over(part: float, whole: float) -> float:
+        return part / whole if whole > 0 else math.nan
+
+    there, exactly = impulse > 0, exact_impulse > 0
+    return {
+        "velocity_error": over(
+            float(np.linalg.norm(velocity - exact_velocity)),
+            float(np.linalg.norm(predicted - exact_velocity)),
+        ),
+        "force_error": over(
+            float(np.abs(impulse - exact_impulse).sum()), float(exact_impulse.sum())
+        ),
+        "missed": over(float((exactly & ~there).sum()), float(exactly.sum())),
+        "false": over(float((there & ~exactly).sum()), float(there.sum())),
+    }
+
+
+def _project(problem: Recorded, **options: Any) -> core.Projection:
+    return core.project(
+        *problem.spheres,
+        timestep=problem.timestep,
+        **(problem.springs | problem.bodies | options),
+    )
+
+
+def _timed(call: Callable[[], core.Projection]) -> tuple[core.Projection, float]:
+    """Return a result, and the median time of a few calls; of one call where it takes long."""
+    long = 1.0  # second
+    seconds: list[float] = []
+    while len(seconds) < REPEATS and sum(seconds) < long:
+        start = time.perf_counter()
+        result = call()
+        seconds.append(time.perf_counter() - start)
+    return result, statistics.median(seconds)
+
+
+def write_states(path: Path, states: Sequence[Solved]) -> None:
+    """Write solutions as JSON."""
+    write_text(path, json.dumps([asdict(one) for one in states], indent=1) + "\n")
+
+
+def read_states(path: Path) -> list[Solved]:
+    """Read what write_states has written. Raises ValueError or TypeError for anything else."""
+    return [Solved(**one) for one in json.loads(path.read_text())]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The medians over the states of a way, from the loosest value to the tightest, (k,) each.
+
+    Attributes
+    ----------
+    way : its name
+    values : tolerances, radii, or accuracies, which every state has reached
+    medians : iterations, seconds and errors by their names
+    """
+
+    way: str
+    values: FloatArray
+    medians: Mapping[str, FloatArray]
+
+
+MEDIANS = ("iterations", "seconds", "velocity_error", "force_error", "missed", "false")
+
+
+def curves_of(states: Sequence[Solved]) -> list[Curve]:
+    """Return a curve for each way. A value that some state has not reached is left out."""
+    number = len({(one.start, one.moment) for one in states})
+    curves = []
+    for way in WAYS:
+        mine: dict[float, list[Solved]] = {}
+        for one in states:
+            if one.way == way.name:
+                mine.setdefault(one.value, []).append(one)
+        values = [value for value in sorted(mine, reverse=True) if len(mine[value]) == number]
+        medians = {
+            name: np.array([np.nanmedian([getattr(s, name) for s in mine[v]]) for v in values])
+            for name in MEDIANS
+        }
+        if values:
+            curves.append(Curve(way.name, np.array(values), medians))
+    return curves
