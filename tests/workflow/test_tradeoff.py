@@ -450,8 +450,8 @@ def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str],
             np.where(impulse > 1e-6 * impulse.max(), impulse, 0.0),
             problem.arrays["predicted_velocity"],
         )
-        # Clarabel's objective, half of a square of velocities, is known to 1e-11: they to 4e-6. Forces
-        # are not told as well.
+        # Clarabel's objective, half of a square of velocities, is known to 1e-11: they to 4e-6.
+        # Forces are not told as well.
         assert found["velocity_error"] <= 1e-5
         assert found["force_error"] <= 1e-4
 
