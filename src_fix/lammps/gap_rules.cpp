@@ -1,6 +1,7 @@
 #include "gap_rules.h"
 
 #include <algorithm>
+#include <cmath>
 
 using namespace LAMMPS_NS;
 
@@ -94,7 +95,6 @@ bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
-  const double h = step_.problem.timestep;
   const double tolerance = step_.settings.tolerance;
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
@@ -103,14 +103,9 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     const double linear_gap = side.gap_now - side.wall_motion;
     const bool asks_for_all = contacts.gap[c] == linear_gap && contacts.compliance[c] == 0.0;
     if (!side.as_at_start || asks_for_all || overlaps_.is_bad(side.gap_now)) continue;
-    const int i = contacts.first[c], j = contacts.second[c];
-    const bool is_wall = side.wall != 0;
-    if (step_.is_member(i) || (!is_wall && step_.is_member(j))) continue;
-    double opening = 0.0;
-    for (int d = 0; d < 3; ++d)
-      opening += contacts.normal[3 * c + d] *
-          (velocity[3 * i + d] - (is_wall ? 0.0 : velocity[3 * j + d]));
-    const double at_end = linear_gap + h * opening;
+    if (step_.is_member(contacts.first[c])) continue;
+    if (side.wall == 0 && step_.is_member(contacts.second[c])) continue;
+    const double at_end = gap_at_end(c, velocity);
     if (at_end >= -tolerance && (at_end <= tolerance || contacts.impulse[c] == 0.0)) continue;
     contacts.gap[c] = linear_gap;
     contacts.compliance[c] = side.compliance = 0.0;
@@ -120,14 +115,30 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   return changed;
 }
 
-void GapRules::make_overloaded_rigid()
+double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const Side &side = step_.sides[c];
+  const int i = contacts.first[c], j = contacts.second[c];
+  double opening = 0.0;
+  for (int d = 0; d < 3; ++d)
+    opening += contacts.normal[3 * c + d] *
+        (velocity[3 * i + d] - (side.wall != 0 ? 0.0 : velocity[3 * j + d]));
+  return side.gap_now - side.wall_motion + step_.problem.timestep * opening;
+}
+
+void GapRules::make_overloaded_rigid(const std::vector<double> &velocity)
 {
   constexpr double MOST_GROWTH = 2.0;    // of a spring's force in a step
   inelastic::ContactSet &contacts = step_.problem.contacts;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     Side &side = step_.sides[c];
+    if (contacts.compliance[c] == 0.0) continue;
     const double before = step_.impulse_per_force * side.force;
-    if (contacts.compliance[c] == 0.0 || contacts.impulse[c] <= MOST_GROWTH * before) continue;
+    const bool carries_more = contacts.impulse[c] > MOST_GROWTH * before;
+    if (!carries_more &&
+        std::abs(gap_at_end(c, velocity)) <= ELASTIC_RANGE * step_.settings.tolerance)
+      continue;
     contacts.compliance[c] = side.compliance = 0.0;
     contacts.gap[c] = asked_gap(side);
   }

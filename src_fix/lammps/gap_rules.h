@@ -54,14 +54,17 @@ class GapRules {
   long keep_within_tolerance(const std::vector<double> &velocity);
 
   // Makes all springs rigid, those of bodies, too, whose force has grown to more than twice that of the last
-  // step. To be called on all ranks where a constraint of any rank was not kept within the tolerance: in an
-  // impact on a bed springs would give way one after the other.
-  void make_overloaded_rigid();
+  // step, or whose gap would leave the elastic range. To be called on all ranks where a constraint of any
+  // rank was not kept within the tolerance: in an impact on a bed, and where it is shaken, springs would give
+  // way one after the other.
+  void make_overloaded_rigid(const std::vector<double> &velocity);
 
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
   double contact_gap(const Side &side) const;
+  // [length] of constraint c with these velocities, along a straight line.
+  double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 
   Step &step_;
   OverlapWatch &overlaps_;
