@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import read_run_log
-from lammps_inelastic.workflow.records import Recorded, read_record
+from lammps_inelastic.workflow.records import Recorded, read_record, records
 from tests.pouring import (
     NO_STEPS,
     recording,
-    records,
     run_deck,
     shipped_deck,
 )

@@ -14,11 +14,10 @@ from scipy.spatial import KDTree
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
-from lammps_inelastic.workflow.records import Recorded, read_record
+from lammps_inelastic.workflow.records import Recorded, read_record, records
 from tests.pouring import (
     measure,
     recording,
-    records,
     run_deck,
     shipped_deck,
 )

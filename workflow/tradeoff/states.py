@@ -26,7 +26,7 @@ from lammps_inelastic.analysis import read_run_log
 
 from ..decks import Value, find_deck
 from ..files import write_text
-from ..records import Recorded, read_record
+from ..records import Recorded, read_record, records
 from ..shipped import SETTLING
 from ..study import Case, Input, stage_of
 from .plan import Plan, input_of, start_values
@@ -133,7 +133,7 @@ def problems_of(folder: Path) -> dict[str, Recorded]:
     # The deck's last run, of no steps, only completes the dump.
     thermo = read_run_log(folder / "log.lammps").runs[-2].thermo
     times = dict(zip(thermo["Step"], thermo["Time"], strict=True))
-    paths = {int(path.name.split(".")[1]): path for path in folder.glob("problem.*.npz")}
+    paths = {int(path.name.split(".")[1]): path for path in records(folder)}
     last = max(times.values())
     return {
         moment: read_record(paths[min(paths, key=lambda step: abs(times[step] - when))])
