@@ -39,9 +39,13 @@ def shipped_deck(name: str) -> str:
 
 
 def run_deck(
-    folder: Path, deck: str, variables: Mapping[str, object], plugin: Path | None = None
+    folder: Path,
+    deck: str,
+    variables: Mapping[str, object],
+    plugin: Path | None = None,
+    ranks: int = 1,
 ) -> str:
-    """Run a deck on one core in `folder`, which becomes its `out`; return the log.
+    """Run a deck in `folder`, which becomes its `out`; return the log.
 
     The plugin is the installed one, or that in the folder `plugin`. Raises RuntimeError with the
     end of the output when lmp fails.
@@ -52,6 +56,9 @@ def run_deck(
     if plugin is not None:
         program, environment = without_launcher(plugin)
     command = [program, "-in", "deck.in", "-var", "out", "."]
+    if ranks > 1:
+        mpiexec = str(Path(sys.executable).parent / "mpiexec")
+        command = [mpiexec, "-bind-to", "core", "-n", str(ranks), *command]
     for name, value in variables.items():
         command += ["-var", name, str(value)]
     done = subprocess.run(

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.benchmark import earlier, machine, million, recorded, scenes_without, settling
+from tests.benchmark import earlier, machine, million, ranks, recorded, scenes_without, settling
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Size:
     seeds : random starts
     time : from the start to the end of these scenes
     growing : numbers of spheres, with which the iterations grow
-    ranks : number of spheres for two ranks against one
+    ranks : number of spheres for two ranks against one, and for the model of more
     million : whether a million spheres are tried
     """
 
@@ -49,7 +49,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="smaller scenes: 9 minutes")
     parser.add_argument("--out", type=Path, default=Path("benchmark"), help="folder for the runs")
     parser.add_argument(
-        "parts", nargs="*", help="of: machine settling recorded growth parts million earlier"
+        "parts", nargs="*", help="of: machine settling recorded growth ranks parts million earlier"
     )
     parser.add_argument(
         "--commit", help="with which the decks are compared, as `git` names it (part earlier)"
@@ -63,7 +63,8 @@ def main() -> int:
             out / "settling", size.particles, size.diameter, size.seeds, size.time
         ),
         "recorded": lambda: recorded.measure(size.particles, size.diameter),
-        "growth": lambda: settling.grow(out / "growth", size.growing, size.ranks),
+        "growth": lambda: settling.grow(out / "growth", size.growing),
+        "ranks": lambda: ranks.measure(size.ranks),
         "parts": lambda: scenes_without.measure(each=not options.quick),
         "million": lambda: million.measure(out / "million"),
         "earlier": lambda: earlier.measure(options.commit, size.particles, size.diameter),
@@ -80,7 +81,7 @@ def main() -> int:
     for name in options.parts or parts:
         try:
             parts[name]()
-        except ValueError as error:
+        except earlier.EarlierError as error:
             parser.error(str(error))
     return 0
 

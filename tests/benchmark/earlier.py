@@ -17,6 +17,10 @@ from tests.pouring import NO_STEPS, Projections, projections, run_deck, summed
 ROOT = Path(__file__).parents[2]
 
 
+class EarlierError(Exception):
+    """A commit that git does not know, or whose decks cannot be compared."""
+
+
 @dataclass(frozen=True)
 class Code:
     """A plugin, in this folder, and the decks that belong to it."""
@@ -28,14 +32,14 @@ class Code:
         """Run a deck in `folder`; return the sum of its runs, starts included."""
         text = (self.decks / f"{name}.in").read_text()
         if "\n  particles " not in text:
-            raise ValueError(f"{name}.in of this commit has no table of parameters")
+            raise EarlierError(f"{name}.in of this commit has no table of parameters")
         # An earlier deck may have fewer parameters, and refuses what it does not know.
         known = {key: value for key, value in variables.items() if f"\n  {key} " in text}
         return summed(projections(run_deck(folder, text, known, self.plugin)))
 
 
 def check_out(commit: str, folder: Path) -> None:
-    """Write the files of a commit into `folder`. Raises ValueError if git does not know it."""
+    """Write the files of a commit into `folder`. Raises EarlierError if git does not know it."""
     archive = subprocess.run(
         ["git", "archive", commit, "--", "CMakeLists.txt", "src_fix", "inputs"],
         cwd=ROOT,
@@ -43,7 +47,7 @@ def check_out(commit: str, folder: Path) -> None:
         check=False,
     )
     if archive.returncode != 0:
-        raise ValueError(f"{commit}: {archive.stderr.decode().strip()}")
+        raise EarlierError(f"{commit}: {archive.stderr.decode().strip()}")
     folder.mkdir()
     subprocess.run(["tar", "-x"], cwd=folder, input=archive.stdout, check=True)
 

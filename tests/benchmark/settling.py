@@ -1,4 +1,4 @@
-"""Starts that settle: hard contacts against soft ones, several sizes, one rank and two.
+"""Starts that settle: hard contacts against soft ones, and several sizes.
 
 All runs are those of `inelastic tradeoff`, whose rows of numbers are read here.
 """
@@ -40,6 +40,7 @@ def tradeoff(folder: Path, *arguments: str) -> list[Run]:
     """Run `inelastic tradeoff` in `folder`, where its log is; return its runs."""
     folder.mkdir(parents=True, exist_ok=True)
     command = [str(Path(sys.executable).parent / "inelastic"), "tradeoff", "--out", str(folder)]
+    command.append("--no-states")
     with (folder / "tradeoff.out").open("w") as log:
         subprocess.run([*command, *arguments], stdout=log, stderr=subprocess.STDOUT, check=True)
     with (folder / "tradeoff.csv").open() as file:
@@ -115,19 +116,17 @@ def _largest(runs: Sequence[Run]) -> str:
     return f"{max((one for one in known if math.isfinite(one)), default=math.nan):.2g} r"
 
 
-def grow(folder: Path, sizes: Sequence[int], parallel: int) -> None:
-    """Print how iterations grow with the bed, and what a second rank gives."""
+def grow(folder: Path, sizes: Sequence[int]) -> None:
+    """Print how iterations grow with the bed."""
     heights, per_step = [], []
     for particles in sizes:
         diameter = diameter_of(particles)
-        ranks = "1,2" if particles == parallel else "1"
-        runs = tradeoff(
+        (one,) = tradeoff(
             folder / str(particles),
             *("--particles", str(particles), "--diameter", repr(diameter), "--seeds", "1"),
             *("--tolerances", str(LOOSE), "--soft-tolerances", "none", "--time", str(TIME)),
-            *("--dts", f"{DT * math.sqrt(diameter / DIAMETER):.6g}", "--ranks", ranks),
+            *("--dts", f"{DT * math.sqrt(diameter / DIAMETER):.6g}"),
         )
-        one = next(run for run in runs if run.values["ranks"] == "1")
         whole = one.number("settling_seconds")
         steps = one.number("steps")
         # The bed is equally high for every number; what grows is its height in diameters.
@@ -140,14 +139,6 @@ def grow(folder: Path, sizes: Sequence[int], parallel: int) -> None:
             f"phi {one.number('packing_fraction'):.4f}, z {one.number('coordination_number'):.3f}",
             flush=True,
         )
-        for two in runs:
-            if two.values["ranks"] == "2":
-                seconds = two.number("settling_seconds")
-                print(
-                    f"{particles:,} spheres on 2 ranks: {seconds:.1f} s, {whole / seconds:.2f} "
-                    f"times as fast; {_plateau(two)}",
-                    flush=True,
-                )
     for (low, few), (high, many) in itertools.pairwise(zip(heights, per_step, strict=True)):
         exponent = math.log(many / few) / math.log(high / low)
         print(

@@ -108,6 +108,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     tradeoff.add_argument(
         "--timeout", type=seconds, help="give up a run after so many seconds (default: never)"
     )
+    tradeoff.add_argument(
+        "--no-states", action="store_true", help="leave out the recorded contact problems"
+    )
     tradeoff.set_defaults(run=run)
 
 
@@ -118,23 +121,27 @@ def run(options: argparse.Namespace) -> int:
     comparison = compare(results)
     lines = [*left_out, *never_at_rest(comparison), *recommendations(comparison)]
     print_comparison(comparison, lines)
-    states, lost = _solve_states(plan, options.out, options.timeout)
+    states: list[Solved] = []
+    lost: list[str] = []
+    if not options.no_states:
+        states, lost = _solve_states(plan, options.out, options.timeout)
     curves = curves_of(states)
     for line in lost:
         print(line)
     if curves:
         print_states(curves)
     write_text(options.out / ROWS, as_csv(comparison))
-    write_text(options.out / f"{STATES}.csv", states_as_csv(states))
     page = as_markdown(plan, comparison, lines) + states_as_markdown(states, lost)
     write_text(options.out / PAGE, page)
-    names = [STORE, ROWS, f"{STATES}.csv", PAGE]
+    names = [STORE, ROWS, PAGE]
     # Drawing takes a while to import, for which the other subcommands need not wait.
     from ..tradeoff.figure import draw_states, draw_tradeoff
 
     if comparison.rows:
         names += [path.name for path in draw_tradeoff(comparison, options.out / FIGURE)]
     if curves:
+        write_text(options.out / f"{STATES}.csv", states_as_csv(states))
+        names.append(f"{STATES}.csv")
         names += [path.name for path in draw_states(curves, options.out / STATES)]
     print(f"written: {', '.join(names)} in {options.out}")
     return 1 if failed or lost else 0
