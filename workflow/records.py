@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,12 +74,15 @@ class Recorded:
 
 
 def read_record(path: Path) -> Recorded:
-    """Read one recorded problem. Raises OSError or ValueError if the file is none."""
-    with np.load(path) as file:
-        arrays = dict(file)
-    identifiers = arrays["id"]
-    first = np.asarray(np.searchsorted(identifiers, arrays["id1"]))
-    second = np.where(arrays["id2"] > 0, np.searchsorted(identifiers, arrays["id2"]), -1)
+    """Read one recorded problem. Raises ValueError, with the name of the file, if it is none."""
+    try:
+        with np.load(path) as file:
+            arrays = dict(file)
+        identifiers = arrays["id"]
+        first = np.asarray(np.searchsorted(identifiers, arrays["id1"]))
+        second = np.where(arrays["id2"] > 0, np.searchsorted(identifiers, arrays["id2"]), -1)
+    except (OSError, ValueError, KeyError, EOFError, TypeError, BadZipFile) as error:
+        raise ValueError(f"{path}: no recorded contact problem, or a damaged one") from error
     return Recorded(arrays, first.astype(np.int64), second.astype(np.int64))
 
 

@@ -456,6 +456,28 @@ def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str],
         assert found["force_error"] <= 1e-4
 
 
+def test_damaged_records_are_named(
+    finished: tuple[list[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A damaged record costs its own start; the solutions of the other one are kept."""
+    arguments, out = finished
+    (one, *_) = out.glob("states/cases/*")
+    saved = {path: path.read_bytes() for path in one.glob("*.npz")}
+    for path, content in saved.items():
+        path.write_bytes(content[:100])
+    try:
+        assert main(arguments) == 1
+    finally:
+        for path, content in saved.items():
+            path.write_bytes(content)
+    output = capsys.readouterr().out
+    assert f"left out: {one.name}: " in output
+    assert "no recorded contact problem, or a damaged one" in output
+    with (out / "states.csv").open() as file:
+        assert len({row["start"] for row in csv.DictReader(file)}) == 1
+    assert main(arguments) == 0
+
+
 def test_errors_of_a_solution() -> None:
     exact, other = np.array([[1.0, 0, 0], [0, 0, 0]]), np.array([[1.0, 0.5, 0], [0, 0, 0]])
     predicted = np.array([[1.0, 0, 1.0], [0, 0, 0]])

@@ -166,20 +166,17 @@ def _solve_states(plan: Plan, out: Path, timeout: float | None) -> tuple[list[So
             if not folder.is_measured(study, case):
                 continue
             try:
-                problems = problems_of(folder.case(case))
-            except (OSError, ValueError) as error:
+                for moment, problem in problems_of(folder.case(case)).items():
+                    done = folder.case(case) / f"solved-{moment}.json"
+                    with suppress(OSError, ValueError, TypeError):
+                        states += read_states(done)
+                        continue
+                    display.say(f"solves {case.name}, {moment}")
+                    solved = list(solve_state(label_of(start), moment, problem))
+                    write_states(done, solved)
+                    states += solved
+            except ValueError as error:
                 lost.append(f"left out: {case.name}: {error}")
-                continue
-            for moment, problem in problems.items():
-                done = folder.case(case) / f"solved-{moment}.json"
-                with suppress(OSError, ValueError, TypeError):
-                    states += read_states(done)
-                    continue
-                label = label_of(start)
-                display.say(f"solves {case.name}, {moment}")
-                solved = list(solve_state(label, moment, problem))
-                write_states(done, solved)
-                states += solved
     return states, lost
 
 

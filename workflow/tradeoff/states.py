@@ -43,6 +43,7 @@ TOLERANCES = (0.05, 0.005, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
 ACCURACIES = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 # Uzawa takes some hundred times as many; what it does not reach is left out.
 MOST_ITERATIONS = {"apgd": 1_000_000, "uzawa": 100_000}
+MOST_OF_EXACT = 1_000_000
 REPEATS = 3
 
 
@@ -128,24 +129,33 @@ def recording_case(plan: Plan, start: int | Path) -> Case:
 def problems_of(folder: Path) -> dict[str, Recorded]:
     """Return the recorded problems of a run that are nearest to the moments, by their names.
 
-    Moments after the end of the run are left out. Raises OSError or ValueError if a file is broken.
+    Moments after the end of the run are left out. Raises ValueError if a record is damaged or
+    there is none, or if the log cannot be read.
     """
     # The deck's last run, of no steps, only completes the dump.
     thermo = read_run_log(folder / "log.lammps").runs[-2].thermo
     times = dict(zip(thermo["Step"], thermo["Time"], strict=True))
     paths = {int(path.name.split(".")[1]): path for path in records(folder)}
+    paths = {step: path for step, path in paths.items() if step in times}
+    if not paths:
+        raise ValueError(f"{folder}: no recorded contact problem is there")
     last = max(times.values())
     return {
         moment: read_record(paths[min(paths, key=lambda step: abs(times[step] - when))])
         for moment, when in MOMENTS.items()
-        if paths and when <= last
+        if when <= last
     }
 
 
 def solve_state(start: str, moment: str, problem: Recorded) -> Iterator[Solved]:
-    """Solve a problem in all ways, each from the loosest to the tightest; skip what fails."""
+    """Solve a problem in all ways, each from the loosest value until one is not reached.
+
+    Raises ValueError if the exact solution is not to be had.
+    """
     radius = float(problem.arrays["radius"].min())
-    exact = _project(problem, tolerance=EXACT * radius, max_iterations=10_000_000)
+    exact = _project(problem, tolerance=EXACT * radius, max_iterations=MOST_OF_EXACT)
+    if not exact.converged:
+        raise ValueError(f"{moment}: {EXACT:g} r is not reached in {MOST_OF_EXACT:,} iterations")
     predicted = problem.arrays["predicted_velocity"]
     for way in WAYS:
         options: dict[str, Any] = {
