@@ -12,19 +12,22 @@ from tests.statics import statics_of_run
 pytestmark = pytest.mark.validation
 
 # The most floppy modes per thousand degrees of freedom. 0.0 to 1.0 were measured of spheres, 0.0 to
-# 1.2 of dimers, made with time steps of 0.005 to 0.02 (python -m tests.tables network).
-SCENES: dict[str, tuple[str, dict[str, object], float]] = {
-    "spheres": ("spheres", {"particles": 2000, "diameter": 0.087}, 1.0),
-    "dimers, 1.01": ("dimers", {"aspect_ratio": 1.01}, 1.2),
-    "dimers, 1.3": ("dimers", {"aspect_ratio": 1.3}, 1.2),
-    "dimers, 1.8": ("dimers", {"aspect_ratio": 1.8}, 1.2),
+# 1.2 of dimers, made with time steps of 0.005 to 0.02 (python -m tests.tables network). Then the
+# most contacts per degree of freedom: gaps below the tolerance count as closed, and dimers of 1.01,
+# of which two touch at up to four places, have many: 1.012 to 1.026 in five beds; 1.009 at most of
+# the others.
+SCENES: dict[str, tuple[str, dict[str, object], float, float]] = {
+    "spheres": ("spheres", {"particles": 2000, "diameter": 0.087}, 1.0, 1.02),
+    "dimers, 1.01": ("dimers", {"aspect_ratio": 1.01}, 1.2, 1.04),
+    "dimers, 1.3": ("dimers", {"aspect_ratio": 1.3}, 1.2, 1.02),
+    "dimers, 1.8": ("dimers", {"aspect_ratio": 1.8}, 1.2, 1.02),
 }
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_floppy_modes(name: str, tmp_path: Path) -> None:
     """They are few, and there are hardly more contacts than degrees of freedom."""
-    deck, variables, most = SCENES[name]
+    deck, variables, floppy, contacts = SCENES[name]
     run_deck(tmp_path, shipped_deck(deck), {"dump_every": 100000, **variables})
     one = statics_of_run(tmp_path)
     print(
@@ -32,6 +35,5 @@ def test_floppy_modes(name: str, tmp_path: Path) -> None:
         f"floppy modes, {one.self_stress} states of self-stress, {one.bulk_stress:.1f} of "
         "their weight in the bulk"
     )
-    assert one.floppy <= most * one.degrees / 1000
-    # Gaps below the tolerance count as closed. 1.7 % of dimers of 1.01 were measured, 0.6 % else.
-    assert one.contacts <= 1.025 * one.degrees
+    assert one.floppy <= floppy * one.degrees / 1000
+    assert one.contacts <= contacts * one.degrees
