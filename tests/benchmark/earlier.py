@@ -31,7 +31,7 @@ class Code:
     def run(self, folder: Path, name: str, variables: dict[str, object]) -> Projections:
         """Run a deck in `folder`; return the sum of its runs, starts included."""
         text = (self.decks / f"{name}.in").read_text()
-        if "\n  particles " not in text:
+        if '\nparameters """' not in text:
             raise EarlierError(f"{name}.in of this commit has no table of parameters")
         # An earlier deck may have fewer parameters, and refuses what it does not know.
         known = {key: value for key, value in variables.items() if f"\n  {key} " in text}
