@@ -228,8 +228,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
     result.status = Status::CONVERGED;
   else if (!std::isfinite(result.residual.feasibility))
     result.status = Status::NOT_FINITE;
-  if (result.status == Status::OUT_OF_ITERATIONS && limits.max_iterations <= 0)
-    settle_for_tolerance(limits, result.residual.largest(), result);
+  if (limits.max_iterations <= 0) settle_for_tolerance(limits, result.residual.largest(), result);
   if (result.status != Status::OUT_OF_ITERATIONS || limits.max_iterations <= 0) return result;
 
   const double factor = scale(guess);

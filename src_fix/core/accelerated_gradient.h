@@ -1,8 +1,8 @@
 // This solver is the proximal optimized gradient method (Taylor, Hendrickx and Glineur, SIAM J. Optim.
 // 27 (2017) 1283), an accelerated projected gradient, with adaptive restart (Kim and Fessler, J. Optim.
 // Theory Appl. 178 (2018) 240) on the dual problem of contact_problem.h. It needs about 0.7 times as
-// many iterations as Nesterov's method with the same L. From the impulses lambda_k of m constraints [mass length /
-// time] iteration k makes
+// many iterations as Nesterov's method with the same L. From the impulses lambda_k of m constraints
+// [mass length / time] iteration k makes
 //
 //   down_k       = -w(lambda_k) / (L D)
 //   led_k        = lambda_k + down_k
@@ -17,8 +17,8 @@
 //   back_k   = (t_k - 1) / (t_k+1 g_k),   g_0 = 1,   g_k+1 = (2 t_k + t_k+1 - 1) / t_k+1
 //
 // (L as of iteration k; g is L times the length of the step that unbound_k made), and t is 1 again
-// where the dual function rises along the last change. L must not be below the largest eigenvalue of the scaled A, of the
-// constraints with impulses: the method then diverges, as Nesterov's does not for long. With u the last
+// where the dual function rises along the last change. L must not be below the largest eigenvalue of
+// the scaled A, of the constraints with impulses: the method then diverges, as Nesterov's does not for long. With u the last
 // change it is raised to |A u|^2 / u.A u over these constraints, where that is more, which costs no
 // product with A, and is remembered from one call to the next.
 //

@@ -22,8 +22,8 @@ class GapRules {
 
   // Takes what is known of a contact of particles i and j, and makes it a spring if it is at rest, of the
   // compliance A_cc min(0.03, 30 accuracy, 0.3 tolerance / change of the last step). A_cc is the length by
-  // which a unit impulse along the unit normal opens the gap [time / mass]. A bed of rigid contacts is held by just as many as
-  // it needs: none can take over from another, a small error of any force lets some of them open, and
+  // which a unit impulse along the unit normal opens the gap [time / mass]. A bed of rigid contacts is held by
+  // just as many as it needs: none can take over from another, a small error of any force lets some of them open, and
   // the bed hums. A spring changes its force by little where its gap changes by little. Its gap is zero
   // at the preload, the force when the contact came to rest, which slides where the force has changed
   // so much that the gap would leave the elastic range.

@@ -12,7 +12,6 @@ from __future__ import annotations
 import statistics
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,22 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lammps_inelastic import core
-from lammps_inelastic.analysis import read_run_log
-from lammps_inelastic.workflow.records import Recorded, read_record, records
-from tests.pouring import (
-    NO_STEPS,
-    recording,
-    run_deck,
-    shipped_deck,
+from lammps_inelastic.workflow.records import Recorded
+from lammps_inelastic.workflow.tradeoff.states import (
+    MOMENTS,
+    RECORD_EVERY,
+    TOLERANCE,
+    problems_of,
+    timed,
 )
+from tests.pouring import NO_STEPS, run_deck, shipped_deck
 
-TOLERANCE = 0.0005  # of the runs that are recorded [radii]
 TOLERANCES = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
 UZAWA_TOLERANCES = (5e-3, 5e-4)  # it takes about ten times as long for each digit
 MOST_ITERATIONS = 1_000_000
-MOMENTS = {"impact": 0.5, "settling": 1.0, "rest": 2.0}  # [time]
-RECORD_EVERY = 5  # steps
-REPEATS = 3
 
 
 @dataclass(frozen=True)
@@ -80,24 +76,17 @@ def record(scene: Scene, folder: Path) -> dict[str, Recorded]:
     run_deck(folder / "start", shipped_deck(scene.particle), values | NO_STEPS)
     run_deck(
         folder,
-        recording(shipped_deck("settling"), RECORD_EVERY),
+        shipped_deck("settling"),
         {
             "packing": "start/packing.restart",
             "particle": scene.particle,
             "diameter": scene.diameter,
             "tolerance": TOLERANCE,
+            "record_every": RECORD_EVERY,
             "time_settling": max(MOMENTS.values()),
         },
     )
-    # The deck's last run, of no steps, only completes the dump.
-    settling = read_run_log(folder / "log.lammps").runs[-2].thermo
-    times = dict(zip(settling["Step"], settling["Time"], strict=True))
-    paths = {int(path.name.split(".")[1]): path for path in records(folder)}
-    chosen = {
-        moment: min(paths, key=lambda step: abs(times[step] - when))
-        for moment, when in MOMENTS.items()
-    }
-    return {moment: read_record(paths[step]) for moment, step in chosen.items()}
+    return problems_of(folder)
 
 
 @dataclass(frozen=True)
@@ -118,17 +107,8 @@ def _solve(problem: Recorded, tolerance: float, **options: Any) -> Solved | None
             **(problem.springs | problem.bodies | options),
         )
 
-    result, seconds = _timed(once, 1 if options.get("solver") == "uzawa" else REPEATS)
+    result, seconds = timed(once)
     return Solved(result.iterations, seconds) if result.converged else None
-
-
-def _timed(call: Callable[[], core.Projection], repeats: int) -> tuple[core.Projection, float]:
-    seconds = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = call()
-        seconds.append(time.perf_counter() - start)
-    return result, statistics.median(seconds)
 
 
 def _power_iteration(problem: Recorded) -> float:

@@ -37,7 +37,7 @@ FloatArray = NDArray[np.float64]
 MOMENTS: Mapping[str, float] = {"impact": 0.5, "settling": 1.0, "rest": 2.0}
 RECORD_EVERY = 5  # steps
 TOLERANCE = 0.0005  # of the runs that are recorded [radii]
-# Of the exact solution [radii]: a thousandth of the tightest tolerance that is compared, or less.
+# Of the exact solution [radii]: far below all that is compared with it.
 EXACT = 1e-12
 TOLERANCES = (0.05, 0.005, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
 ACCURACIES = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -169,9 +169,9 @@ def solve_state(start: str, moment: str, problem: Recorded) -> Iterator[Solved]:
             if by_tolerance:
                 options["tolerance"] = value * radius
             else:
-                # The residual that is asked for is then below any tolerance of use.
+                # With the loosest tolerance it is the accuracy that decides.
                 options |= {"tolerance": TOLERANCES[0] * radius, "accuracy": value}
-            result, seconds = _timed(partial(_project, problem, **options))
+            result, seconds = timed(partial(_project, problem, **options))
             if not result.converged:
                 break
             yield Solved(
@@ -230,8 +230,8 @@ def _project(problem: Recorded, **options: Any) -> core.Projection:
     )
 
 
-def _timed(call: Callable[[], core.Projection]) -> tuple[core.Projection, float]:
-    """Return a result, and the median time of a few calls; of one call where it takes long."""
+def timed(call: Callable[[], core.Projection]) -> tuple[core.Projection, float]:
+    """Return a result, and the median time [s] of three calls; of fewer where they take long."""
     long = 1.0  # second
     seconds: list[float] = []
     while len(seconds) < REPEATS and sum(seconds) < long:
