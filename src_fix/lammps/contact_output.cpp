@@ -60,6 +60,7 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   vector_[SHORTENED_STEPS] = static_cast<double>(shortened_steps);
   vector_[EXCESS] = step_.excess;
   vector_[PUSHED_STEPS] += step_.bad_start ? 1.0 : 0.0;
+  vector_[AT_REST] = step_.at_rest ? 1.0 : 0.0;
 }
 
 void ContactOutput::clear_sums(bool virial_per_atom)

@@ -39,6 +39,7 @@ class ContactOutput : protected Pointers {
     SHORTENED_STEPS,
     EXCESS,
     PUSHED_STEPS,
+    AT_REST,
     VECTOR_SIZE
   };
 

@@ -36,7 +36,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     constraints_(lmp, step_, ranks_, clock_, state_.contact_memory(), bodies_.get()),
     solver_(inelastic::make_solver(settings_.solver)),
     push_apart_(step_, constraints_, bodies_.get()), length_(lmp, step_, ranks_),
-    check_(lmp, this, step_, ranks_, state_, bodies_.get()),
+    rest_(lmp, step_, ranks_), check_(lmp, this, step_, ranks_, state_, bodies_.get()),
     unsolved_(lmp, step_, constraints_, ranks_, bodies_.get()), output_(lmp, step_, ranks_),
     summary_(lmp, step_, clock_), record_(lmp, step_, ranks_, state_.contact_memory())
 {
@@ -277,7 +277,19 @@ void FixInelastic::advance(int vflag, Kick kick)
   length_.restore();
   step_.kick = kick;
   check_.before_step();
-  finish(solve());
+  const inelastic::ProjectionResult result = solve();
+  rest_.judge(result);
+  if (step_.at_rest) stop();
+  finish(result);
+}
+
+// The scene is at rest: nothing moves in this step.
+void FixInelastic::stop()
+{
+  if (bodies_) bodies_->stop(step_.problem, step_.velocity);
+  for (int i = 0; i < step_.problem.particles; ++i)
+    if (step_.problem.inverse_mass[i] > 0.0) std::fill_n(&step_.velocity[3 * i], 3, 0.0);
+  if (bodies_) bodies_->turn(step_.problem, step_.velocity, step_.motion_of_bodies);
 }
 
 // Finds the velocities of the step, whose length may become shorter on the way.
@@ -343,7 +355,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   // A push is no momentum.
   if (step_.phase == Phase::CONTACT) {
     constexpr double LEAST = 0.5;    // of the last resolution: GapRules::contact_gap
-    limits.accuracy = settings_.accuracy;
+    limits.accuracy = rest_.accuracy();
     limits.least_target = LEAST * step_.resolution * step_.problem.timestep;
   }
   const inelastic::ProjectionResult result = inelastic::project(

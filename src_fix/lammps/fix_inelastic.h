@@ -25,6 +25,7 @@ FixStyle(inelastic,FixInelastic);
 #include "phase_clock.h"
 #include "problem_record.h"
 #include "push_apart.h"
+#include "rest.h"
 #include "rigid_motion.h"
 #include "run_summary.h"
 #include "solver.h"
@@ -91,6 +92,7 @@ class FixInelastic : public Fix {
   std::unique_ptr<inelastic::Solver> solver_;
   PushApart push_apart_;
   StepLength length_;
+  Rest rest_;
   MotionCheck check_;
   UnsolvedStep unsolved_;
   ContactOutput output_;
@@ -107,6 +109,7 @@ class FixInelastic : public Fix {
   inelastic::ProjectionResult solve();
   void predict();
   inelastic::ProjectionResult project(long max_iterations);
+  void stop();
   void finish(const inelastic::ProjectionResult &result);
 };
 

@@ -44,7 +44,7 @@ void RigidMotion::predict()
   gather_momenta();
   for (std::size_t b = 0; b < bodies_.size(); ++b) predict_body(b);
   predicted_ = step_.problem.predicted_velocity;
-  pushing_ = false;
+  pushing_ = stopping_ = false;
 }
 
 // Sets each member's part of its body's momenta, ghosts included.
@@ -230,6 +230,15 @@ void RigidMotion::note_push(const inelastic::ContactProblem &problem,
         difference(problem.bodies, b, velocity.data(), problem.predicted_velocity.data());
 }
 
+void RigidMotion::stop(const inelastic::ContactProblem &problem,
+                       const std::vector<double> &velocity)
+{
+  stopping_ = true;
+  const std::vector<double> nothing(velocity.size(), 0.0);
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    bodies_[b].stop = difference(problem.bodies, b, nothing.data(), velocity.data());
+}
+
 void RigidMotion::apply(const double *contact_force)
 {
   const double h = step_.problem.timestep;
@@ -244,7 +253,8 @@ void RigidMotion::apply(const double *contact_force)
   }
 }
 
-// Adds to the force on an owned member what replaces the last step's push by this one's, which it returns.
+// Adds to the force on an owned member what replaces the last step's push by this one's, which it returns,
+// and what stops its body.
 Push RigidMotion::replace_push(int i, double *force)
 {
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
@@ -261,10 +271,11 @@ Push RigidMotion::replace_push(int i, double *force)
       push.angular_momentum[d] = -of_body.next.angular_momentum[d];
     }
   const Push &before = whole ? of_body.next : of_body.held;
+  const Push stop = stopping_ ? bodies_[b].stop : Push{};
   // Forces m (a + alpha x r) with the right sum and the right moment.
   double change[3], spin[3], around[3];
   for (int d = 0; d < 3; ++d)
-    change[d] = push.angular_momentum[d] - before.angular_momentum[d] -
+    change[d] = push.angular_momentum[d] - before.angular_momentum[d] + stop.angular_momentum[d] -
         (whole ? of_body.left_over[d] : 0.0);
   multiply(inertia.point_inverse, change, spin);
   of_body.left_over = {};
@@ -275,7 +286,8 @@ Push RigidMotion::replace_push(int i, double *force)
   }
   cross(spin, &bodies.arm[3 * bodies.place[i]], around);
   for (int d = 0; d < 3; ++d)
-    force[d] += mass_of(atom, i) * (push.velocity[d] - before.velocity[d] + around[d]) /
+    force[d] += mass_of(atom, i) *
+        (push.velocity[d] - before.velocity[d] + stop.velocity[d] + around[d]) /
         step_.impulse_per_force;
   return push;
 }

@@ -69,6 +69,9 @@ class RigidMotion final : public Mover, protected Pointers {
   // momentum.
   void note_push(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
 
+  // Takes the velocities that contacts have left to the members away, all of them.
+  void stop(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
+
  private:
   struct Body {
     double velocity[3];            // of the centre of mass, predicted
@@ -78,6 +81,7 @@ class RigidMotion final : public Mover, protected Pointers {
     double angular_momentum_end[3];
     double angular_velocity_end[3];    // as LAMMPS has it after the step
     Push push;
+    Push stop;    // beyond what contacts do; see stop()
   };
 
   void gather_momenta();
@@ -101,6 +105,7 @@ class RigidMotion final : public Mover, protected Pointers {
   std::vector<double> linear_, change_, carried_part_;
   std::vector<double> predicted_;    // 3 per particle
   bool pushing_ = false;
+  bool stopping_ = false;
 };
 
 }    // namespace LAMMPS_NS

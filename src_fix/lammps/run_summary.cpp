@@ -17,7 +17,7 @@ RunSummary::RunSummary(LAMMPS *lmp, const Step &step, PhaseClock &clock) :
 
 void RunSummary::begin(long shortened_steps)
 {
-  steps_ = unconverged_ = pushed_at_start_ = pushed_later_ = 0;
+  steps_ = at_rest_ = unconverged_ = pushed_at_start_ = pushed_later_ = 0;
   shortened_before_ = shortened_steps;
   iterations_ = constraint_iterations_ = 0.0;
   overlap_of_start_ = largest_overlap_ = largest_excess_ = 0.0;
@@ -33,6 +33,7 @@ void RunSummary::add_solve(long iterations)
 void RunSummary::add_step(const inelastic::ProjectionResult &result)
 {
   ++steps_;
+  if (step_.at_rest) ++at_rest_;
   iterations_ += static_cast<double>(result.iterations);
   largest_excess_ = std::max(largest_excess_, step_.excess);
   const bool of_start = step_.bad_start && pushed_at_start_ == steps_ - 1;
@@ -76,6 +77,8 @@ void RunSummary::log_overlaps(long unexpected_steps) const
   if (unexpected_steps > 0)
     utils::logmesg(lmp, "  in {} steps such an overlap had appeared that no step had left\n",
                    unexpected_steps);
+  if (at_rest_ > 0)
+    utils::logmesg(lmp, "  in {} steps the scene was at rest, and nothing moved\n", at_rest_);
   if (unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
                    unconverged_);

@@ -85,6 +85,7 @@ struct Step {
   double largest_overlap = 0.0;    // [length] at the start
   double excess = 0.0;             // [length] the overlap at the end beyond the regular ones
   int relinearisations = 0;        // rounds that have looked at the end of the step
+  bool at_rest = false;            // nothing moves in this step (rest.h)
   std::string problem_found;    // what went wrong on this rank while collecting; empty if nothing
 
   // The part of a whole kick for which the forces act.

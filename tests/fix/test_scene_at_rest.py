@@ -1,0 +1,249 @@
+"""A scene at rest does not move and costs no iteration; what disturbs it moves it at once.
+
+See "A scene at rest" in src_fix/doc/fix_inelastic.md.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.fix.bodies import INERTIAS, body_scene, dimer, random_bodies
+from tests.fix.lammps_run import Run, Runner
+from tests.fix.scenes import DUMP_PARTICLES, GRAVITY, mass, random_points, read_dump, scene
+
+RADIUS = 0.05
+STEP = 0.005
+EPS = 1e-3 * 2 * RADIUS
+DRAG = f"fix drag all viscous {4 * float(mass(RADIUS)):.17g}"
+# f_contact[13] tells whether the scene is at rest.
+THERMO = "step f_contact[1] f_contact[13] f_contact[5] f_contact[6]"
+# So many steps are quiet before a scene may come to rest.
+PATIENCE = 100
+# Of the velocity that gravity adds in a step, with the default accuracy: what is slower may be at rest,
+# and of a weight: what a sphere at rest does not notice.
+UNNOTICED = 5e-3
+
+BED_BOX = ((0, 0.5), (0, 1.2), (0, 0.5))
+
+
+def bed(folder: Path, **settings: object) -> str:
+    """100 spheres that fall, with a drag."""
+    inside = tuple((low + RADIUS, high - RADIUS) for low, high in BED_BOX)
+    points = random_points(100, inside, 2 * RADIUS, seed=2)
+    defaults: dict[str, object] = {
+        "tolerance": EPS,
+        "timestep": STEP,
+        "skin": 0.1,
+        "box": BED_BOX,
+        "fixes": DRAG,
+        "thermo": THERMO,
+    }
+    return scene(points, RADIUS, folder, **(defaults | settings))  # type: ignore[arg-type]
+
+
+def one_on_the_floor(folder: Path, **settings: object) -> str:
+    defaults: dict[str, object] = {
+        "tolerance": EPS,
+        "timestep": STEP,
+        "skin": 0.1,
+        "thermo": THERMO,
+    }
+    point = [[0.5, RADIUS, 0.5]]
+    return scene(point, RADIUS, folder, **(defaults | settings))  # type: ignore[arg-type]
+
+
+def until_rest(result: Run) -> int:
+    """The first step at rest of the first run; the scene stays there until that run ends."""
+    at_rest = result.runs[0]["f_contact[13]"]
+    first = int(np.argmax(at_rest))
+    assert at_rest[first:].all()
+    assert at_rest.any()
+    return first
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_bed_at_rest_costs_nothing(ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    result = lmp(
+        bed(tmp_path) + DUMP_PARTICLES + "variable floor equal f_contact[3][2]\n"
+        "thermo_style custom step ke f_contact[1] f_contact[13] v_floor\nrun 4000\n",
+        ranks=ranks,
+    )
+    first = until_rest(result)
+    print(f"at rest after {first} steps")
+    assert first < 3500
+    # Contacts adapt to the rest for some steps.
+    assert result.thermo["f_contact[1]"][first + 200 :].sum() == 0
+    frames = read_dump(tmp_path / "particles.dump")
+    # Round-off: positions do not change, velocities are that of what forces add in a step.
+    still = frames[first + 1].positions
+    assert max(np.abs(frame.positions - still).max() for frame in frames[first + 1 :]) <= 1e-13
+    fastest = max(np.abs(frame.velocities).max() for frame in frames[first + 2 :])
+    assert fastest <= 1e-12 * GRAVITY * STEP
+    # What is not noticed of each sphere's weight.
+    weight = 100 * float(mass(RADIUS)) * GRAVITY
+    floor = -result.thermo["v_floor"][first + 1 :]
+    assert floor == pytest.approx(weight, rel=UNNOTICED)
+    assert "the scene was at rest, and nothing moved" in result.screen
+
+
+@pytest.mark.parametrize("inertia", INERTIAS)
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_bed_of_dimers(inertia: str, ranks: int, tmp_path: Path, lmp: Runner) -> None:
+    inside = tuple((low + 1.5 * RADIUS, high - 1.5 * RADIUS) for low, high in BED_BOX)
+    bodies = random_bodies([dimer(1.5)] * 30, RADIUS, inside, seed=3)
+    deck = body_scene(
+        bodies,
+        RADIUS,
+        tmp_path,
+        inertia=inertia,
+        tolerance=EPS,
+        timestep=STEP,
+        box=BED_BOX,
+        fixes=DRAG,
+        thermo=THERMO,
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 4000\n", ranks=ranks)
+    first = int(np.argmax(result.thermo["f_contact[13]"]))
+    print(f"at rest after {first} steps")
+    assert result.thermo["f_contact[13]"][first:].all()
+    assert result.thermo["f_contact[1]"][first + 200 :].sum() == 0
+    frames = read_dump(tmp_path / "particles.dump")
+    still = frames[first + 1].positions
+    # Round-off of bodies, whose spheres are placed anew in every step.
+    assert max(np.abs(frame.positions - still).max() for frame in frames[first + 1 :]) <= 1e-11
+    assert (
+        max(np.abs(frame.velocities).max() for frame in frames[first + 2 :])
+        <= 1e-9 * GRAVITY * STEP
+    )
+
+
+def test_a_run_that_is_divided_stays_at_rest(tmp_path: Path, lmp: Runner) -> None:
+    result = lmp(one_on_the_floor(tmp_path) + "run 200\nrun 10\nrun 5 pre no\n")
+    assert until_rest(result) <= PATIENCE + 1
+    for later in result.runs[1:]:
+        assert later["f_contact[13]"].all()
+        assert later["f_contact[1]"].sum() == 0
+
+
+def test_a_restarted_run_comes_to_rest_again(tmp_path: Path, lmp: Runner) -> None:
+    deck = bed(tmp_path)
+    before = lmp(deck + "run 4000\nwrite_restart bed.restart\n")
+    until_rest(before)
+    head, tail = deck.split("read_data spheres.data")
+    units = head[: head.index("units")] + "units lj\natom_modify map array\n"
+    after = lmp(units + "read_restart bed.restart" + tail + "run 1000\n")
+    assert after.thermo["f_contact[13]"][-1] == 1
+    assert after.thermo["f_contact[1]"][-1] == 0
+
+
+@pytest.mark.parametrize(
+    ("slope", "settings", "moves"),
+    [(0.02, "", True), (0.002, "", False), (0.002, " accuracy 1e-4", True)],
+)
+def test_a_slope(slope: float, settings: str, moves: bool, tmp_path: Path, lmp: Runner) -> None:
+    """Gravity turns while a sphere rests: it slides as it would, or notices nothing."""
+    deck = one_on_the_floor(tmp_path, options="region container" + settings)
+    across = f"fix gravity all gravity {GRAVITY} vector {slope} -1 0\n"
+    result = lmp(deck + "run 200\n" + across + DUMP_PARTICLES + "run 60\n")
+    until_rest(result)
+    speed = read_dump(tmp_path / "particles.dump")[-1].velocities[0, 0]
+    down = GRAVITY * slope / np.hypot(1, slope)
+    # All 60 kicks count; of the half kick at the start of a run half of a velocity is shown.
+    expected = 60 * STEP * down if moves else 0.0
+    assert speed == pytest.approx(expected, abs=1.01 * STEP * down if moves else 1e-12)
+
+
+def test_a_slope_from_the_start(tmp_path: Path, lmp: Runner) -> None:
+    """Hundred steps are long: what gains less than the limit in one step does move."""
+    slope = 1e-3
+    gravity = f"fix gravity all gravity {GRAVITY} vector {slope} -1 0\n"
+    deck = one_on_the_floor(tmp_path, gravity=False, fixes=gravity)
+    result = lmp(deck + DUMP_PARTICLES + "run 400\n")
+    assert not result.thermo["f_contact[13]"].any()
+    speed = read_dump(tmp_path / "particles.dump")[-1].velocities[0, 0]
+    assert speed == pytest.approx(400 * STEP * GRAVITY * slope, rel=0.01)  # half a step of 400
+
+
+def test_a_sphere_that_slides_goes_on(tmp_path: Path, lmp: Runner) -> None:
+    """At four times what may be at rest."""
+    speed = 4 * UNNOTICED * GRAVITY * STEP
+    deck = one_on_the_floor(tmp_path, velocities=[[speed, 0, 0]])
+    result = lmp(deck + DUMP_PARTICLES + "run 1000\n")
+    assert not result.thermo["f_contact[13]"].any()
+    frames = read_dump(tmp_path / "particles.dump")
+    # Nothing acts along the floor.
+    assert frames[-1].velocities[0, 0] == pytest.approx(speed, rel=1e-9)
+
+
+def test_a_force_on_one_sphere_wakes(tmp_path: Path, lmp: Runner) -> None:
+    weight = float(mass(RADIUS)) * GRAVITY
+    push = "variable push equal 0.0\nfix push all addforce v_push 0 0\n"
+    deck = one_on_the_floor(tmp_path, fixes=push)
+    pushed = f"variable push equal {0.05 * weight:.17g}\nrun 50\nvariable push equal 0.0\nrun 50\n"
+    result = lmp(deck + "run 200\n" + DUMP_PARTICLES + pushed)
+    until_rest(result)
+    speed = read_dump(tmp_path / "particles.dump")[-1].velocities[0, 0]
+    # One kick of fifty: a run starts with half of one.
+    assert speed == pytest.approx(50 * STEP * 0.05 * GRAVITY, rel=0.02)
+
+
+def test_an_impact_wakes(tmp_path: Path, lmp: Runner) -> None:
+    """A sphere falls beside two that touch, one of which it pushes away."""
+    points = [[0.45, RADIUS, 0.5], [0.55, RADIUS, 0.5], [0.53, 3.0, 0.5]]
+    weight = float(mass(RADIUS)) * GRAVITY
+    hold = (
+        f"group high id 3\nvariable hold equal {weight:.17g}\nfix hold high addforce 0 v_hold 0\n"
+    )
+    deck = scene(
+        points, RADIUS, tmp_path, tolerance=EPS, timestep=STEP, skin=0.3, thermo=THERMO, fixes=hold
+    )
+    result = lmp(deck + "run 200\nvariable hold equal 0\n" + DUMP_PARTICLES + "run 300\n")
+    until_rest(result)
+    frames = read_dump(tmp_path / "particles.dump")
+    assert max(float(frame.velocities[1, 0]) for frame in frames) > 0.1
+
+
+@pytest.mark.parametrize("speed", [1e-3, 1e-2])
+def test_a_moving_floor_carries(speed: float, tmp_path: Path, lmp: Runner) -> None:
+    """However slowly it rises [g h]."""
+    velocity = speed * GRAVITY * STEP
+    deck = one_on_the_floor(
+        tmp_path,
+        options="region floor",
+        setup="",
+        fixes=f"variable rise equal {velocity:.17g}*{STEP}*step\n"
+        "region floor plane 0 0 0 0 1 0 move NULL v_rise NULL\n",
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 1000\n")
+    assert not result.thermo["f_contact[13]"].any()
+    frames = read_dump(tmp_path / "particles.dump")
+    risen = frames[-1].positions[0, 1] - frames[0].positions[0, 1]
+    assert risen == pytest.approx(1000 * STEP * velocity, abs=EPS)
+
+
+def test_momentum_without_support(tmp_path: Path, lmp: Runner) -> None:
+    """Two spheres that are pressed together in free space go on drifting, however slowly."""
+    points = [[0.45, 2.0, 0.5], [0.55, 2.0, 0.5]]
+    drift = 1e-6
+    press = float(mass(RADIUS)) * GRAVITY
+    deck = scene(
+        points,
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        timestep=STEP,
+        skin=0.1,
+        gravity=False,
+        velocities=[[0, drift, 0]] * 2,
+        thermo=THERMO,
+        options="",
+        fixes="group left id 1\ngroup right id 2\n"
+        f"fix l left addforce {press:.17g} 0 0\nfix r right addforce {-press:.17g} 0 0\n",
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 500\n")
+    assert not result.thermo["f_contact[13]"].any()
+    velocities = read_dump(tmp_path / "particles.dump")[-1].velocities
+    assert velocities[:, 1] == pytest.approx([drift, drift], rel=1e-9)  # round-off
