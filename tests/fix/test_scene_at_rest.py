@@ -22,8 +22,8 @@ DRAG = f"fix drag all viscous {4 * float(mass(RADIUS)):.17g}"
 THERMO = "step f_contact[1] f_contact[13] f_contact[5] f_contact[6]"
 # So many steps are quiet before a scene may come to rest.
 PATIENCE = 100
-# Of the velocity that gravity adds in a step, with the default accuracy: what is slower may be at rest,
-# and of a weight: what a sphere at rest does not notice.
+# Of the velocity that gravity adds in a step, with the default accuracy: what is slower may be at
+# rest. Of a weight: what a sphere at rest does not notice.
 UNNOTICED = 5e-3
 
 BED_BOX = ((0, 0.5), (0, 1.2), (0, 0.5))
