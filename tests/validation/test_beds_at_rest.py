@@ -1,7 +1,8 @@
-"""A bed at rest: hardly any motion is left, at every tolerance and time step, whatever the seed."""
+"""A bed comes to rest at every tolerance and time step, whatever the seed, and then costs nothing."""
 
 from __future__ import annotations
 
+import statistics
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ pytestmark = pytest.mark.validation
 @pytest.mark.parametrize("timestep", [0.01, 0.0025])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
 @pytest.mark.parametrize("bed", BEDS)
-def test_motion_that_is_left(bed: str, tolerance: float, timestep: float, tmp_path: Path) -> None:
+def test_it_comes_to_rest(bed: str, tolerance: float, timestep: float, tmp_path: Path) -> None:
     found = [at_rest(tmp_path, bed, tolerance, timestep, seed) for seed in (1, 2, 3)]
     speeds = " ".join(f"{one.speed:.4f}" for one in found)
     iterations = " ".join(f"{one.iterations:.0f}" for one in found)
@@ -24,6 +25,8 @@ def test_motion_that_is_left(bed: str, tolerance: float, timestep: float, tmp_pa
         f"{iterations} iterations a step, at rest after {times}"
     )
     assert max(one.rested for one in found) < 2.5 * ROUNDS
-    # In units of the speed that a step takes away from every particle. The page's table has at most
-    # 0.012 at these steps and tolerances.
+    # In units of the speed that a step takes away from every particle. A bed may still give way
+    # somewhere after it has been at rest; the page's table has 0 but for round-off.
     assert max(one.speed for one in found) <= 0.02
+    # Some steps find new forces for contacts that adapt; the page's table has 0.
+    assert statistics.median(one.iterations for one in found) <= 1.0
