@@ -1,4 +1,4 @@
-"""A bed comes to rest at every tolerance and time step, whatever the seed, and then costs nothing."""
+"""A bed comes to rest at every tolerance and step, whatever the seed, and then costs nothing."""
 
 from __future__ import annotations
 
