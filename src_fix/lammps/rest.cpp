@@ -5,16 +5,13 @@
 #include "atom.h"
 
 #include <algorithm>
-#include <cmath>
 
 using namespace LAMMPS_NS;
+using inelastic::norm;
 
 namespace {
 
-// All velocities are parts of the root mean square of the velocities that a step would end with if there
-// were no contacts.
-//
-// A step is quiet if nothing is faster than this. Beds that give way somewhere are not, for long.
+// A step is quiet if nothing is faster than this (Rest::Motion). Beds that give way somewhere are not, for long.
 constexpr double QUIET = 0.1;
 // So many quiet steps come first: an unstable bed doubles its velocities in two steps, and a force that
 // nothing balances would show.
@@ -29,6 +26,9 @@ constexpr double COARSEST_ACCURACY = 1.0e-3;
 constexpr double LEAST_PART = 1.0e-2;
 constexpr long FINER_STEPS = 120;
 constexpr double FINER_PART = 0.5;    // of the quiet steps, where these are more
+
+double part(double speed, double of)
+{ return speed > 0.0 ? speed / std::max(of, speed / EXTREME) : 0.0; }
 
 }    // namespace
 
@@ -50,8 +50,7 @@ void Rest::judge(const inelastic::ProjectionResult &result)
     return;
   }
   const Motion motion = measure();
-  const bool quiet =
-      motion.fastest <= QUIET * motion.predicted && motion.supported && !motion.driven;
+  const bool quiet = motion.fastest <= QUIET && motion.supported && !motion.driven;
   // In the half kick with which a run starts forces do half of what they do in a step.
   if (step_.kick == Kick::WHOLE && quiet)
     at_rest_ = find_out(motion);
@@ -64,7 +63,7 @@ bool Rest::find_out(const Motion &motion)
 {
   if (++quiet_steps_ < patience_) return false;
   const double limit = AT_REST * std::min(step_.settings.accuracy, COARSEST_ACCURACY);
-  if (motion.fastest <= limit * motion.predicted) return true;
+  if (motion.fastest <= limit) return true;
   part_of_accuracy_ = std::max(0.5 * part_of_accuracy_, LEAST_PART);
   const long finer_steps = std::max(FINER_STEPS, static_cast<long>(FINER_PART * patience_));
   if (!at_rest_ && ++finer_steps_ < finer_steps) return false;
@@ -82,27 +81,38 @@ void Rest::wake()
   part_of_accuracy_ = 1.0;
 }
 
+// The mean alone would not do where large forces act on a few particles, nor the other for particles on
+// which hardly any acts.
 Rest::Motion Rest::measure() const
 {
   const inelastic::ContactProblem &problem = step_.problem;
   const inelastic::ContactSet &contacts = problem.contacts;
-  double sums[2] = {}, maxima[3] = {};
+  enum { SPEED, PART_OF_OWN, SUPPORTED, DRIVEN, MAXIMA };
+  double sums[2] = {}, maxima[MAXIMA] = {};    // sums: of predicted speeds, and their number
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!step_.in_group(atom, i)) continue;
     const double *const v = &step_.velocity[3 * i];
-    const double *const without = &problem.predicted_velocity[3 * i];
-    maxima[0] = std::max(maxima[0], v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    if (problem.inverse_mass[i] == 0.0) continue;
-    sums[0] += without[0] * without[0] + without[1] * without[1] + without[2] * without[2];
+    const double *const predicted = &problem.predicted_velocity[3 * i];
+    const double speed = norm(v);
+    if (problem.inverse_mass[i] == 0.0) {
+      if (speed > 0.0) maxima[DRIVEN] = 1.0;
+      continue;
+    }
+    double taken[3];
+    for (int d = 0; d < 3; ++d) taken[d] = predicted[d] - v[d];
+    maxima[SPEED] = std::max(maxima[SPEED], speed);
+    maxima[PART_OF_OWN] = std::max(maxima[PART_OF_OWN], part(speed, norm(taken)));
+    sums[0] += norm(predicted);
     sums[1] += 1.0;
   }
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const bool fixed = step_.sides[c].wall != 0 || problem.inverse_mass[contacts.first[c]] == 0.0 ||
         problem.inverse_mass[contacts.second[c]] == 0.0;
-    if (fixed && contacts.impulse[c] > 0.0) maxima[1] = 1.0;
-    if (step_.sides[c].wall_motion != 0.0) maxima[2] = 1.0;
+    if (fixed && contacts.impulse[c] > 0.0) maxima[SUPPORTED] = 1.0;
+    if (step_.sides[c].wall_motion != 0.0) maxima[DRIVEN] = 1.0;
   }
-  ranks_.reduce(sums, 2, maxima, 3);
-  return {std::sqrt(maxima[0]), sums[1] > 0.0 ? std::sqrt(sums[0] / sums[1]) : 0.0, maxima[1] > 0.0,
-          maxima[2] > 0.0};
+  ranks_.reduce(sums, 2, maxima, MAXIMA);
+  const double mean = sums[1] > 0.0 ? sums[0] / sums[1] : 0.0;
+  return {std::max(maxima[PART_OF_OWN], part(maxima[SPEED], mean)), maxima[SUPPORTED] > 0.0,
+          maxima[DRIVEN] > 0.0};
 }

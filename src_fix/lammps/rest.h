@@ -28,10 +28,11 @@ class Rest : protected Pointers {
  private:
   // What is left of the motion, on all ranks.
   struct Motion {
-    double fastest = 0.0;      // [velocity]
-    double predicted = 0.0;    // [velocity] root mean square without contacts
+    // The largest velocity of a particle, as a part of the mean that particles would have without
+    // contacts, or of what contacts have taken away from it, whichever is more.
+    double fastest = 0.0;
     bool supported = false;    // some contact is with a wall or a frozen particle
-    bool driven = false;       // some wall moves
+    bool driven = false;       // some wall or frozen particle moves
   };
 
   Motion measure() const;

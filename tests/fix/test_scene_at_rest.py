@@ -178,6 +178,50 @@ def test_a_sphere_that_slides_goes_on(tmp_path: Path, lmp: Runner) -> None:
     assert frames[-1].velocities[0, 0] == pytest.approx(speed, rel=1e-9)
 
 
+def test_a_heavy_load_elsewhere_hides_nothing(tmp_path: Path, lmp: Runner) -> None:
+    """One of two spheres carries ten thousand weights; the other slides."""
+    speed = 4 * UNNOTICED * GRAVITY * STEP
+    load = 1e4 * float(mass(RADIUS)) * GRAVITY
+    deck = scene(
+        [[0.2, RADIUS, 0.5], [0.5, RADIUS, 0.5]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        timestep=STEP,
+        velocities=np.array([[0.0, 0, 0], [speed, 0, 0]]),
+        skin=0.1,
+        thermo=THERMO,
+        fixes=f"group loaded id 1\nfix load loaded addforce 0 {-load:.17g} 0\n",
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 1000\n")
+    assert not result.thermo["f_contact[13]"].any()
+    frames = read_dump(tmp_path / "particles.dump")
+    # Nothing acts along the floor.
+    assert frames[-1].velocities[1, 0] == pytest.approx(speed, rel=1e-9)
+
+
+def test_a_frozen_plate_that_moves_is_followed(tmp_path: Path, lmp: Runner) -> None:
+    """A sphere on a frozen one that rises by less than anybody notices."""
+    velocity = 0.1 * UNNOTICED * GRAVITY * STEP
+    deck = scene(
+        [[0.5, 1.0, 0.5], [0.5, 1.0 + 2 * RADIUS, 0.5]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        timestep=STEP,
+        skin=0.1,
+        thermo=THERMO,
+        options="frozen plate",
+        motion="group plate id 1\ngroup free id 2\nfix motion free nve\n"
+        f"fix rise plate move linear 0 {velocity:.17g} 0\n",
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 1000\n")
+    assert not result.thermo["f_contact[13]"].any()
+    frames = read_dump(tmp_path / "particles.dump")
+    risen = frames[-1].positions[1, 1] - frames[0].positions[1, 1]
+    assert risen == pytest.approx(1000 * STEP * velocity, abs=EPS)
+
+
 def test_a_force_on_one_sphere_wakes(tmp_path: Path, lmp: Runner) -> None:
     weight = float(mass(RADIUS)) * GRAVITY
     push = "variable push equal 0.0\nfix push all addforce v_push 0 0\n"
