@@ -12,7 +12,7 @@ using inelastic::norm;
 namespace {
 
 // A step is quiet if nothing is faster than this (Rest::Motion). Beds that give way somewhere are not, for long.
-constexpr double QUIET = 0.1;
+constexpr double QUIET = 0.3;
 // So many quiet steps come first: an unstable bed doubles its velocities in two steps, and a force that
 // nothing balances would show.
 constexpr long PATIENCE = 100;
