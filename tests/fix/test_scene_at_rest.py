@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from tests.fix.bodies import INERTIAS, body_scene, dimer, random_bodies
 from tests.fix.lammps_run import Run, Runner
@@ -29,35 +30,31 @@ UNNOTICED = 5e-3
 BED_BOX = ((0, 0.5), (0, 1.2), (0, 0.5))
 
 
-def bed(folder: Path, **settings: object) -> str:
-    """100 spheres that fall, with a drag."""
-    inside = tuple((low + RADIUS, high - RADIUS) for low, high in BED_BOX)
-    points = random_points(100, inside, 2 * RADIUS, seed=2)
+def spheres(points: ArrayLike, folder: Path, **settings: object) -> str:
+    """The deck of a scene of these spheres, (n, 3) centres."""
     defaults: dict[str, object] = {
         "tolerance": EPS,
         "timestep": STEP,
         "skin": 0.1,
-        "box": BED_BOX,
-        "fixes": DRAG,
         "thermo": THERMO,
     }
     return scene(points, RADIUS, folder, **(defaults | settings))  # type: ignore[arg-type]
 
 
+def bed(folder: Path) -> str:
+    """100 spheres that fall, with a drag."""
+    inside = tuple((low + RADIUS, high - RADIUS) for low, high in BED_BOX)
+    points = random_points(100, inside, 2 * RADIUS, seed=2)
+    return spheres(points, folder, box=BED_BOX, fixes=DRAG)
+
+
 def one_on_the_floor(folder: Path, **settings: object) -> str:
-    defaults: dict[str, object] = {
-        "tolerance": EPS,
-        "timestep": STEP,
-        "skin": 0.1,
-        "thermo": THERMO,
-    }
-    point = [[0.5, RADIUS, 0.5]]
-    return scene(point, RADIUS, folder, **(defaults | settings))  # type: ignore[arg-type]
+    return spheres([[0.5, RADIUS, 0.5]], folder, **settings)
 
 
-def until_rest(result: Run) -> int:
-    """The first step at rest of the first run; the scene stays there until that run ends."""
-    at_rest = result.runs[0]["f_contact[13]"]
+def until_rest(result: Run, run: int = 0) -> int:
+    """The first step at rest of one of the runs; the scene stays there until that run ends."""
+    at_rest = result.runs[run]["f_contact[13]"]
     first = int(np.argmax(at_rest))
     assert at_rest[first:].all()
     assert at_rest.any()
@@ -106,9 +103,8 @@ def test_a_bed_of_dimers(inertia: str, ranks: int, tmp_path: Path, lmp: Runner) 
         thermo=THERMO,
     )
     result = lmp(deck + DUMP_PARTICLES + "run 4000\n", ranks=ranks)
-    first = int(np.argmax(result.thermo["f_contact[13]"]))
+    first = until_rest(result, -1)
     print(f"at rest after {first} steps")
-    assert result.thermo["f_contact[13]"][first:].all()
     assert result.thermo["f_contact[1]"][first + 200 :].sum() == 0
     frames = read_dump(tmp_path / "particles.dump")
     still = frames[first + 1].positions
@@ -182,15 +178,10 @@ def test_a_heavy_load_elsewhere_hides_nothing(tmp_path: Path, lmp: Runner) -> No
     """One of two spheres carries ten thousand weights; the other slides."""
     speed = 4 * UNNOTICED * GRAVITY * STEP
     load = 1e4 * float(mass(RADIUS)) * GRAVITY
-    deck = scene(
+    deck = spheres(
         [[0.2, RADIUS, 0.5], [0.5, RADIUS, 0.5]],
-        RADIUS,
         tmp_path,
-        tolerance=EPS,
-        timestep=STEP,
         velocities=np.array([[0.0, 0, 0], [speed, 0, 0]]),
-        skin=0.1,
-        thermo=THERMO,
         fixes=f"group loaded id 1\nfix load loaded addforce 0 {-load:.17g} 0\n",
     )
     result = lmp(deck + DUMP_PARTICLES + "run 1000\n")
@@ -203,14 +194,9 @@ def test_a_heavy_load_elsewhere_hides_nothing(tmp_path: Path, lmp: Runner) -> No
 def test_a_frozen_plate_that_moves_is_followed(tmp_path: Path, lmp: Runner) -> None:
     """A sphere on a frozen one that rises by less than anybody notices."""
     velocity = 0.1 * UNNOTICED * GRAVITY * STEP
-    deck = scene(
+    deck = spheres(
         [[0.5, 1.0, 0.5], [0.5, 1.0 + 2 * RADIUS, 0.5]],
-        RADIUS,
         tmp_path,
-        tolerance=EPS,
-        timestep=STEP,
-        skin=0.1,
-        thermo=THERMO,
         options="frozen plate",
         motion="group plate id 1\ngroup free id 2\nfix motion free nve\n"
         f"fix rise plate move linear 0 {velocity:.17g} 0\n",
@@ -241,9 +227,7 @@ def test_an_impact_wakes(tmp_path: Path, lmp: Runner) -> None:
     hold = (
         f"group high id 3\nvariable hold equal {weight:.17g}\nfix hold high addforce 0 v_hold 0\n"
     )
-    deck = scene(
-        points, RADIUS, tmp_path, tolerance=EPS, timestep=STEP, skin=0.3, thermo=THERMO, fixes=hold
-    )
+    deck = spheres(points, tmp_path, skin=0.3, fixes=hold)
     result = lmp(deck + "run 200\nvariable hold equal 0\n" + DUMP_PARTICLES + "run 300\n")
     until_rest(result)
     frames = read_dump(tmp_path / "particles.dump")
@@ -257,7 +241,6 @@ def test_a_moving_floor_carries(speed: float, tmp_path: Path, lmp: Runner) -> No
     deck = one_on_the_floor(
         tmp_path,
         options="region floor",
-        setup="",
         fixes=f"variable rise equal {velocity:.17g}*{STEP}*step\n"
         "region floor plane 0 0 0 0 1 0 move NULL v_rise NULL\n",
     )
@@ -273,16 +256,11 @@ def test_momentum_without_support(tmp_path: Path, lmp: Runner) -> None:
     points = [[0.45, 2.0, 0.5], [0.55, 2.0, 0.5]]
     drift = 1e-6
     press = float(mass(RADIUS)) * GRAVITY
-    deck = scene(
+    deck = spheres(
         points,
-        RADIUS,
         tmp_path,
-        tolerance=EPS,
-        timestep=STEP,
-        skin=0.1,
         gravity=False,
         velocities=[[0, drift, 0]] * 2,
-        thermo=THERMO,
         options="",
         fixes="group left id 1\ngroup right id 2\n"
         f"fix l left addforce {press:.17g} 0 0\nfix r right addforce {-press:.17g} 0 0\n",
