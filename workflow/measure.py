@@ -352,8 +352,9 @@ def _resolution(stage: Mapping[str, Any], radius: float) -> float | None:
     gravity = gravity_of(stage["text"])
     variables = stage["variables"]
     tolerance, step = variables.get("tolerance_measuring"), variables.get("dt")
-    # The decks measure with the time step of a bed at rest, those of version 0.1 had one step.
-    step = variables.get("dt_resting", step)
+    # Decks before those of today measured with the time step of the rest, those of version 0.1 had
+    # one step.
+    step = variables.get("dt_measuring", variables.get("dt_resting", step))
     if gravity is None or not isinstance(tolerance, int | float):
         return None
     if not isinstance(step, int | float):

@@ -4,36 +4,55 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 
 from tests.pouring import run_deck, shipped_deck
-from tests.statics import statics_of_run
+from tests.statics import floppy_modes, statics_of_run
+from tests.tables import shaken_alike
 
 pytestmark = pytest.mark.validation
 
-# The most floppy modes per thousand degrees of freedom. 0.0 to 1.0 were measured of spheres, 0.0 to
-# 1.2 of dimers, made with time steps of 0.005 to 0.02 (python -m tests.tables network). Then the
-# most contacts per degree of freedom: gaps below the tolerance count as closed, and dimers of 1.01,
-# of which two touch at up to four places, have many: 1.012 to 1.026 in five beds; 1.009 at most of
-# the others.
+# What is poured, with which random force, and the most contacts per degree of freedom: gaps below
+# the tolerance count as closed, and dimers of 1.01, of which two touch at up to four places, have
+# many: 1.012 to 1.027 in nine beds; 1.012 at most of the others.
 SCENES: dict[str, tuple[str, dict[str, object], float, float]] = {
-    "spheres": ("spheres", {"particles": 2000, "diameter": 0.087}, 1.0, 1.02),
-    "dimers, 1.01": ("dimers", {"aspect_ratio": 1.01}, 1.2, 1.04),
-    "dimers, 1.3": ("dimers", {"aspect_ratio": 1.3}, 1.2, 1.02),
-    "dimers, 1.8": ("dimers", {"aspect_ratio": 1.8}, 1.2, 1.02),
+    "spheres": ("spheres", {"particles": 2000, "diameter": 0.087}, 30, 1.02),
+    "dimers, 1.01": ("dimers", {"aspect_ratio": 1.01}, 200, 1.04),
+    "dimers, 1.3": ("dimers", {"aspect_ratio": 1.3}, 200, 1.02),
+    "dimers, 1.8": ("dimers", {"aspect_ratio": 1.8}, 200, 1.02),
 }
 
 
+@pytest.mark.parametrize("missing", [0, 1, 7])
+def test_count_of_floppy_modes(missing: int) -> None:
+    """It is the number that a singular value decomposition finds."""
+    generator = np.random.default_rng(missing)
+    gaps = generator.normal(size=(80 - missing, 80)) * (generator.random((80 - missing, 80)) < 0.2)
+    twice = np.concatenate([gaps, gaps[:20]])
+    assert floppy_modes(csr_matrix(twice)) == 80 - np.linalg.matrix_rank(twice) == missing
+
+
+@pytest.mark.parametrize("timestep", [0.01, 0.02])
 @pytest.mark.parametrize("name", SCENES)
-def test_floppy_modes(name: str, tmp_path: Path) -> None:
-    """They are few, and there are hardly more contacts than degrees of freedom."""
-    deck, variables, floppy, contacts = SCENES[name]
-    run_deck(tmp_path, shipped_deck(deck), {"dump_every": 100000, **variables})
-    one = statics_of_run(tmp_path)
-    print(
-        f"{name}: {one.degrees} degrees of freedom, {one.contacts} contacts, {one.floppy} "
-        f"floppy modes, {one.self_stress} states of self-stress, {one.bulk_stress:.1f} of "
-        "their weight in the bulk"
-    )
-    assert one.floppy <= floppy * one.degrees / 1000
-    assert one.contacts <= contacts * one.degrees
+def test_floppy_modes(name: str, timestep: float, tmp_path: Path) -> None:
+    """At most one per thousand degrees of freedom, and hardly more contacts than those."""
+    deck, variables, force, most = SCENES[name]
+    floppy, degrees = 0, 0
+    for seed in (1, 2):
+        alike = shaken_alike(force, 4, 2, timestep)
+        folder = tmp_path / str(seed)
+        run_deck(
+            folder, shipped_deck(deck), {"dump_every": 100000, "seed": seed, **variables, **alike}
+        )
+        frames = statics_of_run(folder)
+        for frame in frames:
+            print(
+                f"{name}, h = {timestep:g}, seed {seed}: {frame.degrees} degrees of freedom, "
+                f"{frame.contacts} contacts, {frame.floppy} floppy modes"
+            )
+            assert frame.contacts <= most * frame.degrees
+            floppy, degrees = floppy + frame.floppy, degrees + frame.degrees
+    # Over the frames of two packings: a single frame may be of a moment in which the bed gives way.
+    assert floppy <= degrees / 1000

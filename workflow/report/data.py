@@ -86,14 +86,18 @@ def _completed(result: Result) -> Result:
     """Return a result that has all variables of today's decks, so that it groups with newer ones.
 
     A deck had no such choice before it had the variable: it did what the default does, but for the
-    phase of rest, which version 0.1 had not.
+    phase of rest, which version 0.1 had not, and the longer step of the last phase, which came
+    later.
     """
     stages = []
     for stage in result.record["stages"]:
         known = stage["variables"]
         defaults = dict(deck_defaults(stage["deck"]))
-        if "steps_resting" in defaults:
-            defaults |= {"steps_resting": 0, "dt_resting": known.get("dt", defaults["dt"])}
+        if "dt_resting" in defaults:
+            dt = known.get("dt", defaults["dt"])
+            if "steps_resting" not in known:
+                defaults |= {"steps_resting": 0, "dt_resting": dt}
+            defaults["dt_measuring"] = known.get("dt_resting", dt)
         stages.append({**stage, "variables": {**defaults, **known}})
     return replace(result, record={**result.record, "stages": stages})
 
