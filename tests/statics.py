@@ -47,11 +47,22 @@ FEWEST = 3
 
 @dataclass(frozen=True)
 class Statics:
-    """Of one frame; `degrees` are those of the backbone."""
+    """Of one frame.
+
+    Attributes
+    ----------
+    degrees : of freedom, of the backbone
+    contacts : in it
+    floppy : floppy modes
+    swings : those of one dimer alone, which turns about one of its spheres, because the other one
+        has one contact or none: it lies on the floor, leans on a wall or hangs. No contact is
+        missing there.
+    """
 
     degrees: int
     contacts: int
     floppy: int
+    swings: int
 
     @property
     def self_stress(self) -> int:
@@ -66,10 +77,12 @@ class Backbone:
     ----------
     gaps : (m, degrees of freedom) H; turning is in units of velocity / diameter
     points : (m, 3) where the contacts are
+    swings : in how many directions single dimers turn about one of their spheres
     """
 
     gaps: csr_matrix
     points: FloatArray
+    swings: int
 
 
 def backbone(particles: ParticleFrame, contacts: ContactFrame) -> Backbone:
@@ -81,11 +94,8 @@ def backbone(particles: ParticleFrame, contacts: ContactFrame) -> Backbone:
     diameter = 2 * float(particles.radii[0])
 
     # (m, 2); a wall is -1.
-    pairs = (
-        np.where(contacts.ids > 0, bodies[np.searchsorted(ids, contacts.ids)], -1)
-        if len(contacts.ids)
-        else np.empty((0, 2), dtype=int)
-    )
+    spheres_of = np.where(contacts.ids > 0, np.searchsorted(ids, contacts.ids), -1)
+    pairs = np.where(spheres_of < 0, -1, bodies[spheres_of])
     keep = np.ones(len(pairs), dtype=bool)
     while True:
         ends = pairs[keep].ravel()
@@ -119,7 +129,11 @@ def backbone(particles: ParticleFrame, contacts: ContactFrame) -> Backbone:
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(places))),
         shape=(len(pairs), degrees * int(held.sum())),
     )
-    return Backbone(gaps, points)
+    touched = spheres_of[keep].ravel()
+    counts = np.bincount(touched[touched >= 0], minlength=len(ids))
+    # A sphere's two directions at right angles to its dimer's axis, less those that contacts hold
+    free = np.maximum(2 - counts[held[bodies] & (sizes[bodies] == 2)], 0)
+    return Backbone(gaps, points, int(free.sum()))
 
 
 def _turns(positions: FloatArray, bodies: IntArray, centres: FloatArray) -> FloatArray:
@@ -157,8 +171,8 @@ def floppy_modes(gaps: csr_matrix) -> int:
 
 def statics(particles: ParticleFrame, contacts: ContactFrame) -> Statics:
     """Analyse one frame."""
-    gaps = backbone(particles, contacts).gaps
-    return Statics(gaps.shape[1], gaps.shape[0], floppy_modes(gaps))
+    held = backbone(particles, contacts)
+    return Statics(held.gaps.shape[1], held.gaps.shape[0], floppy_modes(held.gaps), held.swings)
 
 
 def statics_of_run(folder: Path) -> list[Statics]:

@@ -39,20 +39,22 @@ def test_count_of_floppy_modes(missing: int) -> None:
 def test_floppy_modes(name: str, timestep: float, tmp_path: Path) -> None:
     """At most one per thousand degrees of freedom, and hardly more contacts than those."""
     deck, variables, force, most = SCENES[name]
-    floppy, degrees = 0, 0
+    missing, degrees = 0, 0
     for seed in (1, 2):
         alike = shaken_alike(force, 4, 2, timestep)
         folder = tmp_path / str(seed)
         run_deck(
             folder, shipped_deck(deck), {"dump_every": 100000, "seed": seed, **variables, **alike}
         )
-        frames = statics_of_run(folder)
-        for frame in frames:
+        for frame in statics_of_run(folder):
             print(
                 f"{name}, h = {timestep:g}, seed {seed}: {frame.degrees} degrees of freedom, "
-                f"{frame.contacts} contacts, {frame.floppy} floppy modes"
+                f"{frame.contacts} contacts, {frame.floppy} floppy modes, {frame.swings} of them "
+                "of dimers that turn about one sphere"
             )
             assert frame.contacts <= most * frame.degrees
-            floppy, degrees = floppy + frame.floppy, degrees + frame.degrees
-    # Over the frames of two packings: a single frame may be of a moment in which the bed gives way.
-    assert floppy <= degrees / 1000
+            # Of a moment in which the bed gives way: 1.5 in one frame of the 108 of 18 packings
+            # of spheres, 1.3 at most in the others.
+            assert frame.floppy - frame.swings <= 2 * frame.degrees / 1000
+            missing, degrees = missing + frame.floppy - frame.swings, degrees + frame.degrees
+    assert missing <= degrees / 1000

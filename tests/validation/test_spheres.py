@@ -174,7 +174,8 @@ def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
     problems = []
     for steps in STAGES:
         folder = tmp_path_factory.mktemp("tight")
-        # The first of the tight steps still undoes the overlaps of the looser tolerance.
+        # Of three steps of tightening one is tight, and the two of measuring are. The first of them
+        # still undoes the overlaps of the looser tolerance.
         run_deck(
             folder,
             recording(deck, 1),
@@ -184,9 +185,9 @@ def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
                 "steps_agitated": steps,
                 "steps_settling": 0,
                 "steps_resting": 0,
-                "dt_resting": 0.01,
+                "dt_measuring": 0.01,
                 "steps_tightening": 3,
-                "steps_measuring": 0,
+                "steps_measuring": 2,
             },
         )
         problems.append(read_record(records(folder)[-1]))
