@@ -139,8 +139,10 @@ def measuring_at(deck: str, tolerances: Sequence[float]) -> str:
 
     The contact dumps are contacts.0.lammpsdump and so on.
     """
-    before, _, measuring = deck.partition("# Measure\n")
-    counting, _, end = measuring.partition("undump          particles\n")
+    before, longer, measuring = deck.partition("timestep        ${dt_measuring}\n")
+    counting, last, end = measuring.partition("undump          particles\n")
+    if not (longer and last):
+        raise ValueError("the deck has no phase in which it counts contacts")
     counts = [
         f"variable eps_now equal {tolerance:.17g}*v_radius\n"
         + counting.replace("${eps_last}", "${eps_now}").replace(
@@ -149,4 +151,4 @@ def measuring_at(deck: str, tolerances: Sequence[float]) -> str:
         + "undump          contacts\n"
         for number, tolerance in enumerate(tolerances)
     ]
-    return before + "".join(counts) + "undump          particles\n" + end
+    return before + longer + "".join(counts) + last + end

@@ -106,8 +106,9 @@ def _moments(result: Result, stated: Mapping[str, Any]) -> list[tuple[str, float
         ("paper: constant", float(stated["plateau_step"])),
     ]
     off = result.setting("steps_agitated")
-    counted = off + result.setting("steps_settling") + result.setting("steps_resting")
-    ours = [("random force off", off), ("smaller ε, count", counted)]
+    before = ("steps_settling", "steps_resting", "steps_tightening")
+    counted = off + sum(result.setting(name) for name in before)
+    ours = [("random force off", off), ("contacts are counted", counted)]
     return [*moments, *((what, step) for what, step in ours if not math.isnan(step))]
 
 

@@ -22,6 +22,9 @@ NOT_STATED = (
     ("drag", "drag per mass, after the random force", "1/time"),
     ("steps_agitated", "steps with random force", "steps"),
     ("steps_settling", "steps with drag", "steps"),
+    ("dt_resting", "time step at rest, with drag", "time"),
+    ("steps_resting", "steps at rest", "steps"),
+    ("dt_measuring", "time step while contacts are counted", "time"),
     ("tolerance_measuring", "ε / r while contacts are counted", "1"),
 )
 
