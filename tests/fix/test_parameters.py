@@ -574,6 +574,6 @@ def test_a_start_of_molecules_that_are_no_dimers(
 
 def test_drag_counts_with_the_lightest_sphere(packings: Path, refused: Callable[..., str]) -> None:
     """A sphere of half the diameter has an eighth of the mass and feels the same drag."""
-    variables = {**FEW, "start": packings / "two.data", "diameter": 0.1, "drag": 15}
+    variables = {**FEW, "start": packings / "two.data", "diameter": 0.1, "drag": 9}
     message = refused(deck("spheres"), variables=variables)
     assert "drag times dt must be below 1 with the smallest one" in message

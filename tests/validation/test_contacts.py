@@ -37,9 +37,8 @@ def test_count_of_floppy_modes(missing: int) -> None:
 @pytest.mark.parametrize("timestep", [0.01, 0.02])
 @pytest.mark.parametrize("name", SCENES)
 def test_floppy_modes(name: str, timestep: float, tmp_path: Path) -> None:
-    """At most one per thousand degrees of freedom, and hardly more contacts than those."""
+    """At most one per thousand degrees of freedom in every frame; hardly more contacts."""
     deck, variables, force, most = SCENES[name]
-    missing, degrees = 0, 0
     for seed in (1, 2):
         alike = shaken_alike(force, 4, 2, timestep)
         folder = tmp_path / str(seed)
@@ -53,8 +52,4 @@ def test_floppy_modes(name: str, timestep: float, tmp_path: Path) -> None:
                 "of dimers that turn about one sphere"
             )
             assert frame.contacts <= most * frame.degrees
-            # Of a moment in which the bed gives way: 1.5 in one frame of the 108 of 18 packings
-            # of spheres, 1.3 at most in the others.
-            assert frame.floppy - frame.swings <= 2 * frame.degrees / 1000
-            missing, degrees = missing + frame.floppy - frame.swings, degrees + frame.degrees
-    assert missing <= degrees / 1000
+            assert frame.floppy - frame.swings <= frame.degrees / 1000

@@ -104,7 +104,7 @@ def mistakes_of(path: Path) -> list[str]:
             HEAD + "[outputs]\npictures = ['0']",
             "must be a whole number from 0 to 92233720368547758",
         ),
-        (HEAD + "[outputs]\npictures = [831]", "it must be a step from 0 to 830, where the long"),
+        (HEAD + "[outputs]\npictures = [825]", "it must be a step from 0 to 824, where the long"),
         (
             HEAD + "[outputs]\npictures = [0, 0]",
             "they must be at most 100 steps, each of them once",
