@@ -81,7 +81,7 @@ namespace {
     add_up(terms, *gap);
   }
 
-  // The part of advance_impulses between its gathers and its scatters: makes the next changes of a block,
+  // The part of advance_impulses between its gathers and its scatters makes the next changes of a block,
   // `next`, from the gaps that the present ones leave, and adds to what is passed.
   template <typename Real>
   inline __attribute__((always_inline)) void step_block(const Pass<Real> &pass, std::size_t begin,
@@ -133,6 +133,21 @@ namespace {
     passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
     passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
     passed.farthest = std::max(passed.farthest, static_cast<double>(farthest));
+  }
+
+  template <typename Real>
+  inline __attribute__((always_inline)) Passed advance(const Pass<Real> &pass)
+  {
+    Passed passed;
+    Vector<Real> gaps[(BLOCK + 3) / 4];
+    Real next[BLOCK];
+    for (std::size_t begin = 0; begin < pass.count; begin += BLOCK) {
+      const std::size_t end = std::min(begin + BLOCK, pass.count);
+      gather(pass, begin, end, gaps);
+      step_block(pass, begin, end - begin, reinterpret_cast<const Real *>(gaps), next, passed);
+      scatter(pass, begin, end, next);
+    }
+    return passed;
   }
 
   template <typename Real> inline __attribute__((always_inline)) void move(const Move<Real> &m)
@@ -202,36 +217,6 @@ namespace {
         sum[members[k].particle].lanes = next;
       }
     }
-  }
-
-}    // namespace
-
-// The stages of a block are compiled apart: the wider instructions that x86-64-v4 has halve the time of
-// step_blocks, and would cost the gathers and scatters of four numbers some (measured).
-namespace {
-
-  INELASTIC_WIDE_CLONES void step_blocks(const Pass<float> &pass, std::size_t begin,
-                                         std::size_t size, const float *gap, float *next,
-                                         Passed &passed)
-  { step_block(pass, begin, size, gap, next, passed); }
-  INELASTIC_WIDE_CLONES void step_blocks(const Pass<double> &pass, std::size_t begin,
-                                         std::size_t size, const double *gap, double *next,
-                                         Passed &passed)
-  { step_block(pass, begin, size, gap, next, passed); }
-
-  template <typename Real>
-  inline __attribute__((always_inline)) Passed advance(const Pass<Real> &pass)
-  {
-    Passed passed;
-    Vector<Real> gaps[(BLOCK + 3) / 4];
-    Real next[BLOCK];
-    for (std::size_t begin = 0; begin < pass.count; begin += BLOCK) {
-      const std::size_t end = std::min(begin + BLOCK, pass.count);
-      gather(pass, begin, end, gaps);
-      step_blocks(pass, begin, end - begin, reinterpret_cast<const Real *>(gaps), next, passed);
-      scatter(pass, begin, end, next);
-    }
-    return passed;
   }
 
 }    // namespace

@@ -1,16 +1,13 @@
 // Hot loops are compiled for several instruction sets, and the version that fits the processor is
 // chosen when the library is loaded: one binary is fast on a laptop and on every node of a mixed
-// cluster. The macros stand before the definition of a function. Those that the wide one marks gain by
-// vectors of 512 bits.
+// cluster. The macro stands before the definition of a function.
 
 #pragma once
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define INELASTIC_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
-#define INELASTIC_WIDE_CLONES \
+#define INELASTIC_CLONES \
   __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 #else
 #define INELASTIC_CLONES
-#define INELASTIC_WIDE_CLONES
 #endif
