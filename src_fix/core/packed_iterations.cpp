@@ -10,10 +10,6 @@ namespace inelastic {
 
 namespace {
 
-  // Within a block constraints are worked on in so many streams in turn: neighbours in the list
-  // have a particle in common, and a sum that was just written is slow to read again.
-  constexpr std::size_t STREAMS = 8;
-
   // Working constraints that could be idle become so when they are more than one in so many: each look would
   // otherwise move them all to save little.
   constexpr std::size_t FEW = 10;
@@ -24,21 +20,6 @@ namespace {
 
   // A gap is known to a few units of round-off of the largest change.
   constexpr double ROUND_OFFS = 2.0;
-
-  // Orders constraints, given by their places, so that neighbours in the list come into different
-  // streams.
-  std::vector<std::size_t> in_streams(const std::vector<std::size_t> &places)
-  {
-    std::vector<std::size_t> ordered;
-    ordered.reserve(places.size());
-    for (std::size_t begin = 0; begin < places.size(); begin += packed::BLOCK) {
-      const std::size_t size = std::min(packed::BLOCK, places.size() - begin);
-      const std::size_t length = (size + STREAMS - 1) / STREAMS;
-      for (std::size_t k = 0; k < length; ++k)
-        for (std::size_t j = k; j < size; j += length) ordered.push_back(places[begin + j]);
-    }
-    return ordered;
-  }
 
   struct RodShape {
     double axis[3];    // unit vector
@@ -106,7 +87,7 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   for (std::size_t c = 0; c < gap.size(); ++c)
     (start_[c] > 0.0 || !(gap[c] > idle_gap) ? near : far).push_back(c);
   inverse_diagonals_ = 0.0;
-  pack(problem.contacts, in_streams(near), diagonal, gap, scales, working_);
+  pack(problem.contacts, near, diagonal, gap, scales, working_);
   pack(problem.contacts, far, diagonal, gap, scales, idle_);
   for (std::vector<Real> *const state : states()) state->assign(near.size(), 0);
 
@@ -182,7 +163,7 @@ void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Re
   const std::size_t count = to + near.size();
   working_.resize(count);
   for (std::vector<Real> *const state : states()) state->resize(count, 0);
-  for (const std::size_t k : in_streams(near)) {
+  for (const std::size_t k : near) {
     working_.copy(idle_, k, to);
     gap_before_[to++] = gap[k];
   }
