@@ -436,7 +436,7 @@ def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str],
         given = Problem(
             velocity, inverse_mass, first, second, normal, gap, problem.timestep, no_bodies(number)
         )
-        reference_velocity, impulse = reference(given, problem.arrays["compliance"])
+        reference_velocity, impulse = reference(given, problem.arrays["compliance"], 1e-12)
         exact = core.project(
             *problem.spheres,
             timestep=problem.timestep,
@@ -450,8 +450,9 @@ def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str],
             np.where(impulse > 1e-6 * impulse.max(), impulse, 0.0),
             problem.arrays["predicted_velocity"],
         )
-        # Clarabel's objective, half of a square of velocities, is known to 1e-11: they to 4e-6.
-        # Forces are not told as well.
+        # Clarabel's objective, half of a square of velocities, is known to 1e-12: they to 4e-6 of
+        # what contacts change, which is the less of them (with 1e-11 to 1.8e-5; solved a thousand
+        # times further ours change by 6e-10). Forces are not told as well.
         assert found["velocity_error"] <= 1e-5
         assert found["force_error"] <= 1e-4
 

@@ -270,6 +270,12 @@ class Curve:
 MEDIANS = ("iterations", "seconds", "velocity_error", "force_error", "missed", "false")
 
 
+def _median(values: Sequence[float]) -> float:
+    """Return the median of those that are numbers; NaN if none is."""
+    numbers = [value for value in values if not math.isnan(value)]
+    return statistics.median(numbers) if numbers else math.nan
+
+
 def curves_of(states: Sequence[Solved]) -> list[Curve]:
     """Return a curve for each way. A value that some state has not reached is left out."""
     number = len({(one.start, one.moment) for one in states})
@@ -281,7 +287,7 @@ def curves_of(states: Sequence[Solved]) -> list[Curve]:
                 mine.setdefault(one.value, []).append(one)
         values = [value for value in sorted(mine, reverse=True) if len(mine[value]) == number]
         medians = {
-            name: np.array([np.nanmedian([getattr(s, name) for s in mine[v]]) for v in values])
+            name: np.array([_median([getattr(s, name) for s in mine[v]]) for v in values])
             for name in MEDIANS
         }
         if values:
