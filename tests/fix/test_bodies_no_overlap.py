@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -160,21 +161,25 @@ def test_fall_impact_and_rest(
 
 @pytest.mark.slow
 def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
-    """Steps that are far too long, and may not be shortened."""
+    """Steps that are too long, and may not be shortened.
+
+    (With a time step of 0.05 bodies spin by ten radians in a step, and in one scene of ten the gaps
+    at its end are not to be had together, which is an error.)
+    """
     largest = 0.0
-    for mixture in ("dimers-1.5", "dimers-2", "rods", "mixture"):
-        folder = tmp_path / mixture
+    for seed, mixture in itertools.product((11, 12), ("dimers-1.5", "dimers-2", "rods", "mixture")):
+        folder = tmp_path / f"{mixture}-{seed}"
         deck = pour(
             mixture,
             "block",
             "solid",
-            10,
+            seed,
             folder,
             fixes="fix drag all viscous 0.004",
             skin=8,
-            timestep=0.05,
+            timestep=0.03,
         )
-        result = lmp(deck + DUMP_BODY_SPHERES + "run 40\n", into=mixture)
+        result = lmp(deck + DUMP_BODY_SPHERES + "run 40\n", into=folder.name)
         overlap = np.maximum(*overlaps(folder, "block"))
         assert result.thermo["f_contact[4]"] == pytest.approx(overlap, abs=1e-6 * EPS)
         regular = overlap[:-1] <= 2 * EPS * SLACK
@@ -190,7 +195,7 @@ def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
         # while they are deep in one another: what is between these waits.
         deeper = overlap[1:] - np.maximum(overlap[:-1], 2 * EPS * SLACK)
         assert mixture == "rods" or deeper[~regular].max(initial=0) <= 0, mixture
-    assert largest > 0
+    assert largest > EPS
 
 
 @pytest.mark.parametrize("inertia", INERTIAS)
