@@ -1,9 +1,9 @@
 """A million spheres: poured from random points until they are at rest, on two ranks.
 
-The shipped `spheres.in` runs with other parameters, and no change: the tolerance is 0.005 radii,
-nothing shakes the spheres, and the phases are shorter. Packing fraction and coordination number are
-those of the box of the paper, as for every other packing; the pictures are of the start, the fall
-and the end.
+The shipped decks run with other parameters, and no change: `spheres.in` makes the start,
+`settling.in` lets it fall until it is at rest, and `response.in`, whose gravity is not tilted here,
+measures it. The tolerance is 0.005 radii. Packing fraction and coordination number are those of the
+box of the paper, as for every other packing; the pictures are of the first frames and the last.
 """
 
 from __future__ import annotations
@@ -13,22 +13,23 @@ import time
 from pathlib import Path
 
 from lammps_inelastic.analysis import ParticleDump, draw_packing
+from tests.pouring import NO_STEPS, projections, run_deck, shipped_deck, summed
 from tests.pouring import measure as measure_packing
-from tests.pouring import projections, run_deck, shipped_deck, summed
 
 PARTICLES = 1_000_000
 RANKS = 2
 CONTAINER = [[0, 1], [0, 5], [0, 1]]
-# While spheres fall a step is as short as the neighbour list needs: the fall is nearly 300.
-VARIABLES: dict[str, object] = {
-    "tolerance": 0.005,
-    "tolerance_measuring": 0.0005,
-    "random_force": 0,
-    "steps_agitated": 300,
-    "steps_settling": 100,
-    "steps_resting": 60,
-    "steps_tightening": 10,
+COMMON: dict[str, object] = {"tolerance": 0.005}
+SETTLING: dict[str, object] = {"time_settling": 1.8, "time_between": 0.45}
+# A step of 0.05 finds the contacts of a bed at rest.
+MEASURING: dict[str, object] = {
+    "change": "tilt",
+    "angle": 0,
+    "dt": 0.05,
+    "steps_changing": 20,
+    "steps_tightening": 4,
     "steps_measuring": 2,
+    "tolerance_measuring": 0.0005,
     "dump_every": 100,
 }
 
@@ -38,32 +39,48 @@ def diameter_of(particles: int) -> float:
     return float(0.052 * (10_000 / particles) ** (1 / 3))
 
 
+def pour(folder: Path, particles: int) -> str:
+    """Run the decks in folders of their own; return what that took, in words."""
+    common = COMMON | {"diameter": repr(diameter_of(particles))}
+    stages: dict[str, tuple[str, dict[str, object]]] = {
+        "start": ("spheres", {"particles": particles, **NO_STEPS}),
+        "settling": ("settling", {"packing": folder / "start" / "packing.restart", **SETTLING}),
+        "measuring": (
+            "response",
+            {"packing": folder / "settling" / "packing.restart", **MEASURING},
+        ),
+    }
+    words = []
+    for name, (deck, variables) in stages.items():
+        start = time.monotonic()
+        log = run_deck(folder / name, shipped_deck(deck), common | variables, ranks=RANKS)
+        run = summed(projections(log))
+        minutes = (time.monotonic() - start) / 60
+        overlap = 2 * run.overlap / diameter_of(particles)
+        words.append(
+            f"{name}: {minutes:.1f} minutes, {run.projections} steps, {run.iterations:,} "
+            f"iterations, largest overlap {overlap:.6f} radii"
+        )
+    gigabytes = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
+    return "\n".join([*words, f"{RANKS} ranks, {gigabytes:.1f} GiB each"])
+
+
 def measure(folder: Path, particles: int = PARTICLES) -> None:
     """Pour them in `folder`, unless that was done before; print what came out, and draw it."""
     took = folder / "took.txt"
     if not took.exists():
-        start = time.monotonic()
-        variables = {"particles": particles, "diameter": repr(diameter_of(particles))}
-        run_deck(folder, shipped_deck("spheres"), VARIABLES | variables, ranks=RANKS)
-        minutes = (time.monotonic() - start) / 60
-        gigabytes = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
-        took.write_text(f"{minutes:.1f} minutes on {RANKS} ranks, {gigabytes:.1f} GiB a rank\n")
-    run = summed(projections((folder / "log.lammps").read_text()))
-    print(
-        f"{particles:,} spheres: {took.read_text().strip()}; {run.projections} steps, "
-        f"{run.iterations:,} iterations",
-        flush=True,
-    )
-    packing = measure_packing(folder)
+        took.write_text(pour(folder.absolute(), particles))
+    print(f"{particles:,} spheres\n{took.read_text()}", flush=True)
+    packing = measure_packing(folder / "measuring")
     assert packing.packing_fraction.value is not None
     print(
-        f"  packing fraction {100 * packing.packing_fraction.value:.2f} %, "
+        f"packing fraction {100 * packing.packing_fraction.value:.2f} %, "
         f"coordination number {packing.coordination_number.mean:.3f}",
         flush=True,
     )
-    dump = ParticleDump(folder / "particles.lammpsdump")
+    dump = ParticleDump(folder / "settling" / "particles.lammpsdump")
     for index in (0, 1, 2, len(dump) - 1):
         frame = dump[index]
         path = folder / f"step-{frame.step}.png"
         draw_packing(path, frame.positions, frame.radii, CONTAINER)
-        print(f"  {path}", flush=True)
+        print(path, flush=True)
