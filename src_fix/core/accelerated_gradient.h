@@ -7,7 +7,7 @@
 //   down_k       = -w(lambda_k) / (L D)
 //   led_k        = lambda_k + down_k
 //   unbound_k+1  = led_k + along_k (led_k - led_k-1) + beyond_k down_k + back_k (unbound_k - lambda_k)
-//   lambda_k+1   = max(0, unbound_k+1)
+//   lambda_k+1   = max(l, unbound_k+1),   l the least impulses
 //
 // D is the diagonal of A: in impulses scaled by its root A has a unit diagonal. The weights follow
 // from t_0 = 1 and t_k+1 = (1 + sqrt(1 + 4 t_k^2)) / 2:

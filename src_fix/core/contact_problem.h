@@ -3,13 +3,15 @@
 // The problem asks for the velocities V that are nearest to the predicted velocities V* in the norm
 // of the kinetic energy and keep every constraint of contact_set.h:
 //
-//   minimise over V:   1/2 (V - V*)^T M (V - V*)
+//   minimise over V:   1/2 (V - V*)^T M (V - V*)  -  (1/h) sum of l_c (gap_c + h G_c . V)
 //   subject to         gap_c + h G_c . V >= 0      for every rigid constraint c
 //
-// M is the mass matrix, h the time step, and G_c . V = n_c . (v_first - v_second). The dual problem
-// has one impulse lambda_c per constraint; the optimality conditions are
+// M is the mass matrix, h the time step, and G_c . V = n_c . (v_first - v_second). l_c <= 0 is the
+// least impulse of the constraint: where it is 0 the contact only pushes, elsewhere it takes that much
+// energy a length to open it. The dual problem has one impulse lambda_c per constraint; the optimality
+// conditions are
 //
-//   V = V* + M^-1 G^T lambda,   lambda >= 0,  w >= 0,  lambda . w = 0,
+//   V = V* + M^-1 G^T lambda,   lambda >= l,  w >= 0,  (lambda - l) . w = 0,
 //   w(lambda) = gap + h G V + C lambda
 //
 // C is diagonal and has the compliances. A rigid constraint has none; one with a compliance is a

@@ -10,10 +10,12 @@ void ContactSet::clear()
   gap.clear();
   impulse.clear();
   compliance.clear();
+  least.clear();
 }
 
 void ContactSet::add(int first_particle, int second_particle, const double *unit_normal,
-                     double gap_value, double impulse_guess, double compliance_value)
+                     double gap_value, double impulse_guess, double compliance_value,
+                     double least_impulse)
 {
   first.push_back(first_particle);
   second.push_back(second_particle);
@@ -21,6 +23,7 @@ void ContactSet::add(int first_particle, int second_particle, const double *unit
   gap.push_back(gap_value);
   impulse.push_back(impulse_guess);
   compliance.push_back(compliance_value);
+  least.push_back(least_impulse);
 }
 
 }    // namespace inelastic

@@ -13,8 +13,9 @@
 //   C_c    is the compliance of the contact, 0 for a rigid one: under its impulse the gap may be
 //          smaller by C_c lambda_c.
 //
-// Each constraint carries one impulse lambda_c >= 0 [mass length / time]: +lambda_c n_c acts on the
-// first particle and -lambda_c n_c on the second.
+// Each constraint carries one impulse lambda_c [mass length / time]: +lambda_c n_c acts on the first
+// particle and -lambda_c n_c on the second. It is at least l_c <= 0: where l_c is 0 a contact only
+// pushes; elsewhere it may also pull, by up to -l_c, and opens only where it pulls by as much.
 
 #pragma once
 
@@ -30,11 +31,12 @@ struct ContactSet {
   std::vector<double> gap;        // [length]
   std::vector<double> impulse;    // [mass length / time]
   std::vector<double> compliance;    // [time / mass]
+  std::vector<double> least;         // l [mass length / time], <= 0
 
   std::size_t size() const { return gap.size(); }
   void clear();
   void add(int first_particle, int second_particle, const double *unit_normal, double gap_value,
-           double impulse_guess, double compliance_value = 0.0);
+           double impulse_guess, double compliance_value = 0.0, double least_impulse = 0.0);
 };
 
 }    // namespace inelastic

@@ -83,9 +83,10 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   idle_gap_ = static_cast<Real>(idle_gap / scales.length);
   looks_ = 0;
   start_ = problem.contacts.impulse;
+  bound_ = problem.contacts.least;
   std::vector<std::size_t> near, far;
   for (std::size_t c = 0; c < gap.size(); ++c)
-    (start_[c] > 0.0 || !(gap[c] > idle_gap) ? near : far).push_back(c);
+    (start_[c] > bound_[c] || !(gap[c] > idle_gap) ? near : far).push_back(c);
   inverse_diagonals_ = 0.0;
   pack(problem.contacts, near, diagonal, gap, scales, working_);
   pack(problem.contacts, far, diagonal, gap, scales, idle_);
@@ -245,7 +246,7 @@ void PackedIterations<Real>::pack(const ContactSet &contacts,
     packed.diagonal[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
     inverse_diagonals_ += 1.0 / packed.diagonal[k];
     packed.compliance[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
-    packed.least[k] = static_cast<Real>(-contacts.impulse[c] / scales.impulse);
+    packed.least[k] = static_cast<Real>((contacts.least[c] - contacts.impulse[c]) / scales.impulse);
   }
 }
 
@@ -313,12 +314,12 @@ template <typename Real>
 void PackedIterations<Real>::unpack(const std::vector<Real> &change, const Scales &scales,
                                     std::vector<double> &impulse) const
 {
-  for (const std::size_t c : idle_.source) impulse[c] = 0.0;
+  for (const std::size_t c : idle_.source) impulse[c] = bound_[c];
   for (std::size_t k = 0; k < change.size(); ++k) {
     const std::size_t c = working_.source[k];
     impulse[c] = change[k] > working_.least[k]
-        ? std::max(0.0, start_[c] + scales.impulse * static_cast<double>(change[k]))
-        : 0.0;
+        ? std::max(bound_[c], start_[c] + scales.impulse * static_cast<double>(change[k]))
+        : bound_[c];
   }
 }
 

@@ -6,8 +6,8 @@
 // gaps are those at the start plus what the change makes of them. Round-off is then in proportion to
 // the change, and single precision can find what a heavy bed still lacks.
 //
-// Constraints without an impulse whose gaps are far from closed are idle: iterations leave them out
-// until they are looked at and found to be near. The others are working. Each rank chooses for
+// Constraints that have no more than their least impulse and whose gaps are far from closed are idle:
+// iterations leave them out until they are looked at and found to be near. The others are working. Each rank chooses for
 // itself; nothing is communicated for it.
 //
 // Constraints and n particles are packed as normals with gaps, diagonal entries, compliances and least
@@ -102,6 +102,7 @@ template <typename Real> class PackedIterations {
   // As in packed::Pass
   std::vector<Real> unbound_, change_before_, gap_before_;
   std::vector<double> start_;         // impulses, in the order of the problem
+  std::vector<double> bound_;         // the least ones
   double step_before_ = 0.0;          // 1 / L of the last iteration
   double inverse_diagonals_ = 0.0;    // their sum over all constraints
   std::vector<Vector> looked_;        // gaps of the idle ones, four in each

@@ -10,14 +10,15 @@ namespace {
 
   // Gaps under forces are looked at only where no overlap, on any rank, is beyond the tolerance.
   // (Without admissible velocities they tell nothing.)
-  void find_worst(const std::vector<double> &gap_at_end, const std::vector<double> &impulse,
+  void find_worst(const std::vector<double> &gap_at_end, const ContactSet &contacts,
                   std::size_t count, double tolerance, ProjectionResult &result)
   {
     const bool overlaps_only = result.status == Status::INFEASIBLE ||
         result.residual.feasibility > tolerance;
     double most = 0.0;
     for (std::size_t c = 0; c < count; ++c) {
-      const bool matters = gap_at_end[c] < 0.0 || (impulse[c] > 0.0 && !overlaps_only);
+      const bool matters = gap_at_end[c] < 0.0 ||
+          (contacts.impulse[c] > contacts.least[c] && !overlaps_only);
       if (!matters || !(std::abs(gap_at_end[c]) > most)) continue;
       most = std::abs(gap_at_end[c]);
       result.worst = c;
@@ -27,7 +28,7 @@ namespace {
 
   // Judges the impulses of a projection that failed by all constraints, those included that were
   // added after the last solve and will not be solved for. Those that were added with a first guess
-  // have pushed no particle: their impulses become 0.
+  // have moved no particle: their impulses become 0.
   void judge_failure(ContactProblem &problem, GapOperator &gap_operator, std::size_t solved_for,
                      double tolerance, Host &host, ProjectionResult &result)
   {
@@ -36,10 +37,10 @@ namespace {
     std::vector<double> gap_at_end(problem.contacts.size());
     gap_operator.prepare(problem);
     gap_operator.apply(problem, impulse.data(), gap_at_end.data(), host);
-    result.residual =
-        residual_over_ranks(gap_at_end.data(), impulse.data(), gap_at_end.size(), host);
+    result.residual = residual_over_ranks(gap_at_end.data(), problem.contacts, host);
     const bool solved = result.status == Status::OUT_OF_ROUNDS;
-    find_worst(gap_at_end, impulse, solved ? gap_at_end.size() : solved_for, tolerance, result);
+    find_worst(gap_at_end, problem.contacts, solved ? gap_at_end.size() : solved_for, tolerance,
+               result);
   }
 
 }    // namespace

@@ -4,22 +4,24 @@
 
 namespace inelastic {
 
-Residual residual(const double *gap_at_end, const double *impulse, std::size_t count)
+Residual residual(const double *gap_at_end, const ContactSet &contacts)
 {
   Residual worst;
-  for (std::size_t c = 0; c < count; ++c) {
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const double impulse = contacts.impulse[c], least = contacts.least[c];
     // A value that is no number satisfies no constraint.
-    if (!std::isfinite(gap_at_end[c]) || !std::isfinite(impulse[c])) return UNSOLVED;
+    if (!std::isfinite(gap_at_end[c]) || !std::isfinite(impulse)) return UNSOLVED;
     worst.feasibility = std::max(worst.feasibility, -gap_at_end[c]);
-    if (impulse[c] > 0.0) worst.complementarity = std::max(worst.complementarity, gap_at_end[c]);
+    if (!(impulse > least)) continue;
+    worst.complementarity = std::max(worst.complementarity, gap_at_end[c]);
+    if (least < 0.0) worst.feasibility = std::max(worst.feasibility, gap_at_end[c]);
   }
   return worst;
 }
 
-Residual residual_over_ranks(const double *gap_at_end, const double *impulse, std::size_t count,
-                             Host &host)
+Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contacts, Host &host)
 {
-  const Residual mine = residual(gap_at_end, impulse, count);
+  const Residual mine = residual(gap_at_end, contacts);
   double maxima[2] = {mine.feasibility, mine.complementarity};
   host.reduce(nullptr, 0, maxima, 2);
   return {maxima[0], maxima[1]};
@@ -41,35 +43,38 @@ double target_residual(const SolverLimits &limits, const Guess &guess)
 Guess Solver::judge_first_guess(ContactProblem &problem, Host &host)
 {
   std::vector<double> &impulse = problem.contacts.impulse;
+  const std::vector<double> &least = problem.contacts.least;
   const std::vector<double> &free_gap = gap_operator_.free_gap();
   const std::size_t count = impulse.size();
   gap_.resize(count);
   diagonal_.resize(count);
-  for (double &value : impulse) value = std::max(0.0, value);
+  for (std::size_t c = 0; c < count; ++c) impulse[c] = std::max(least[c], impulse[c]);
   gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
-  const Residual mine = residual(gap_.data(), impulse.data(), count);
+  const Residual mine = residual(gap_.data(), problem.contacts);
   Guess guess;
-  double changes = 0.0, changing = 0.0;
+  double changes = 0.0, changing = 0.0, pulling = 0.0;
   for (std::size_t c = 0; c < count; ++c) {
     diagonal_[c] = problem.diagonal(c);
-    const double change = impulse[c] * diagonal_[c];
+    const double change = std::abs(impulse[c]) * diagonal_[c];
     guess.along += impulse[c] * gap_[c];
     guess.along_free += impulse[c] * free_gap[c];
     guess.largest_length = std::max({guess.largest_length, std::abs(free_gap[c]), change});
     guess.largest_diagonal = std::max(guess.largest_diagonal, diagonal_[c]);
     changes += change;
-    if (impulse[c] > 0.0) changing += 1.0;
+    if (impulse[c] != 0.0) changing += 1.0;
+    if (least[c] < 0.0) pulling = 1.0;
   }
   double sums[4] = {guess.along, guess.along_free, changes, changing};
-  double maxima[4] = {mine.feasibility, mine.complementarity, guess.largest_length,
-                      guess.largest_diagonal};
-  host.reduce(sums, 4, maxima, 4);
+  double maxima[5] = {mine.feasibility, mine.complementarity, guess.largest_length,
+                      guess.largest_diagonal, pulling};
+  host.reduce(sums, 4, maxima, 5);
   guess.along = sums[0];
   guess.along_free = sums[1];
   if (sums[3] > 0.0) guess.mean_change = sums[2] / sums[3];
   guess.residual = {maxima[0], maxima[1]};
   guess.largest_length = maxima[2];
   guess.largest_diagonal = maxima[3];
+  guess.pulls = maxima[4] > 0.0;
   return guess;
 }
 

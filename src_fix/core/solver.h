@@ -1,14 +1,15 @@
 // The interface of all solvers of the projection problem (contact_problem.h).
 //
 // Solvers work on the dual problem: they look for the impulses lambda. All are judged by the same
-// two residuals, in units of length, with w the gaps at the end of the step:
+// two residuals, in units of length, with w the gaps at the end of the step and l the least impulses:
 //
-//   feasibility       the largest -w_c of all constraints: what is lacking of the gap that they ask for
-//   complementarity   the largest w_c of the constraints with impulse: the gap that is left where a
-//                     force acts
+//   feasibility       the largest -w_c of all constraints: what is lacking of the gap that they ask
+//                     for; where l_c < 0 and lambda_c > l_c also the largest w_c: the contact holds
+//   complementarity   the largest w_c of the constraints with lambda_c > l_c: the gap that is left
+//                     where a force acts
 //
-// A solver that warm-starts takes its first guess from ContactSet::impulse, where negative numbers
-// count as zero. Every solver leaves its result there.
+// A solver that warm-starts takes its first guess from ContactSet::impulse, where numbers below the
+// least count as the least. Every solver leaves its result there.
 
 #pragma once
 
@@ -33,12 +34,11 @@ struct Residual {
 constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
                                std::numeric_limits<double>::infinity()};
 
-// Returns the residual of this rank's constraints; UNSOLVED if a number is not finite.
-Residual residual(const double *gap_at_end, const double *impulse, std::size_t count);
+// Returns the residual of this rank's constraints with their impulses; UNSOLVED if a number is not finite.
+Residual residual(const double *gap_at_end, const ContactSet &contacts);
 
 // Returns the same over the constraints of all ranks. Collective.
-Residual residual_over_ranks(const double *gap_at_end, const double *impulse, std::size_t count,
-                             Host &host);
+Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contacts, Host &host);
 
 // How the search for the impulses of a step has ended.
 enum class Status {
@@ -108,6 +108,7 @@ struct Guess {
   // [length] What contacts change in the step: what the guess does, or what it lacks.
   double change() const { return std::max(mean_change, residual.largest()); }
 
+  bool pulls = false;    // some contact may pull
   // lambda . w(lambda) and lambda . w(0) [mass length^2 / time]
   double along = 0.0, along_free = 0.0;
 };

@@ -26,7 +26,7 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
   double step = 0.0;    // 1 / L; 0 = not yet known
   while (true) {
     gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
-    result.residual = residual_over_ranks(gap_.data(), contacts.impulse.data(), count, host);
+    result.residual = residual_over_ranks(gap_.data(), contacts, host);
     if (result.residual.feasibility <= result.target) return ended(Status::CONVERGED);
     if (!std::isfinite(result.residual.feasibility)) return ended(Status::NOT_FINITE);
     if (result.iterations >= limits.max_iterations) return ended(Status::OUT_OF_ITERATIONS);
@@ -36,7 +36,7 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
       return ended(Status::INFEASIBLE);
     if (step == 0.0) step = 1.0 / largest_eigenvalue(problem, host);
     for (std::size_t c = 0; c < count; ++c)
-      contacts.impulse[c] = std::max(0.0, contacts.impulse[c] - step * gap_[c]);
+      contacts.impulse[c] = std::max(contacts.least[c], contacts.impulse[c] - step * gap_[c]);
     ++result.iterations;
   }
 }

@@ -28,7 +28,7 @@ class Projection:
 
     @property
     def impulse(self) -> NDArray[np.float64]:
-        """The impulses (m,) [mass length / time]; none is negative."""
+        """The impulses (m,) [mass length / time]; none is below its least one."""
 
     @property
     def iterations(self) -> int:
@@ -61,6 +61,7 @@ def project(
     max_iterations: int = 100000,
     impulse: NDArray[np.float64] | None = None,
     compliance: NDArray[np.float64] | None = None,
+    least_impulse: NDArray[np.float64] | None = None,
     body: NDArray[np.int64] | None = None,
     arm: NDArray[np.float64] | None = None,
     body_inverse_mass: NDArray[np.float64] | None = None,
@@ -73,7 +74,8 @@ def project(
     with m and r as on the page of fix inelastic (what each tolerance bounds); 0 asks for nothing.
     It gives up after ``max_iterations``, or earlier if the tolerance is out of reach; ``converged``
     is then False. ``impulse`` (m,) is a first guess for "apgd". ``compliance`` (m,) [time / mass],
-    not negative, makes contacts springs; without it all are rigid.
+    not negative, makes contacts springs; without it all are rigid. ``least_impulse`` (m,)
+    [mass length / time], not positive, lets contacts pull by as much; without it all only push.
     """
 
 def residual(
@@ -87,6 +89,7 @@ def residual(
     *,
     timestep: float,
     compliance: NDArray[np.float64] | None = None,
+    least_impulse: NDArray[np.float64] | None = None,
     body: NDArray[np.int64] | None = None,
     arm: NDArray[np.float64] | None = None,
     body_inverse_mass: NDArray[np.float64] | None = None,

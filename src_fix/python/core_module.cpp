@@ -148,6 +148,7 @@ struct Contacts {
   Scalars gap;
   std::optional<Scalars> impulse;       // the first guess, or none
   std::optional<Scalars> compliance;    // or all are rigid
+  std::optional<Scalars> least;         // least impulses, or all are 0
 };
 
 void require_contacts(const Contacts &given)
@@ -158,6 +159,7 @@ void require_contacts(const Contacts &given)
   require_length(given.normal, count, "normal");
   if (given.impulse) require_length(*given.impulse, count, "impulse");
   if (given.compliance) require_length(*given.compliance, count, "compliance");
+  if (given.least) require_length(*given.least, count, "least_impulse");
 }
 
 // Refuses constraint c between particles i and j (-1 = a wall) if it makes no sense for the
@@ -193,7 +195,8 @@ void add_contacts(inelastic::ContactProblem &problem, const Contacts &given)
     require_contact(problem, c, i, j, n);
     problem.contacts.add(static_cast<int>(i), j < 0 ? problem.particles : static_cast<int>(j), n,
                          given.gap.data()[c], given.impulse ? given.impulse->data()[c] : 0.0,
-                         given.compliance ? given.compliance->data()[c] : 0.0);
+                         given.compliance ? given.compliance->data()[c] : 0.0,
+                         given.least ? given.least->data()[c] : 0.0);
   }
 }
 
@@ -215,6 +218,12 @@ inelastic::ContactProblem make_problem(const Vectors &predicted_velocity,
     for (std::size_t c = 0; c < contacts.compliance->size(); ++c)
       if (contacts.compliance->data()[c] < 0.0)
         throw nb::value_error("compliance must not be negative");
+  }
+  if (contacts.least) {
+    require_finite(*contacts.least, "least_impulse");
+    for (std::size_t c = 0; c < contacts.least->size(); ++c)
+      if (contacts.least->data()[c] > 0.0)
+        throw nb::value_error("least_impulse must not be positive");
   }
 
   inelastic::ContactProblem problem;
@@ -245,7 +254,7 @@ inelastic::Residual residual_of(const inelastic::ContactProblem &problem)
   std::vector<double> gap_at_end(problem.contacts.size());
   gap_operator.prepare(problem);
   gap_operator.apply(problem, problem.contacts.impulse.data(), gap_at_end.data(), host);
-  return inelastic::residual(gap_at_end.data(), problem.contacts.impulse.data(), gap_at_end.size());
+  return inelastic::residual(gap_at_end.data(), problem.contacts);
 }
 
 Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mass,
@@ -253,7 +262,8 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
                    const Scalars &gap, double timestep, double tolerance, double accuracy,
                    const std::string &solver_name, long max_iterations,
                    const std::optional<Scalars> &impulse, const std::optional<Scalars> &compliance,
-                   const std::optional<Indices> &body, const std::optional<Vectors> &arm,
+                   const std::optional<Scalars> &least_impulse, const std::optional<Indices> &body,
+                   const std::optional<Vectors> &arm,
                    const std::optional<Scalars> &body_inverse_mass,
                    const std::optional<Matrices> &body_inverse_inertia)
 {
@@ -264,9 +274,10 @@ Projection project(const Vectors &predicted_velocity, const Scalars &inverse_mas
   if (max_iterations < 0) throw nb::value_error("max_iterations must not be negative");
   auto solver = inelastic::make_solver(solver_name);
   if (!solver) throw nb::value_error(("solver must be apgd or uzawa, not " + solver_name).c_str());
-  inelastic::ContactProblem problem = make_problem(
-      predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance}, timestep,
-      {body, arm, body_inverse_mass, body_inverse_inertia});
+  inelastic::ContactProblem problem =
+      make_problem(predicted_velocity, inverse_mass,
+                   {first, second, normal, gap, impulse, compliance, least_impulse}, timestep,
+                   {body, arm, body_inverse_mass, body_inverse_inertia});
   inelastic::SerialHost host;
   Projection projection;
   inelastic::SolverLimits limits = {tolerance, max_iterations};
@@ -313,26 +324,28 @@ NB_MODULE(_core, module)
   module.def("project", &project, "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a,
              "normal"_a, "gap"_a, nb::kw_only(), "timestep"_a, "tolerance"_a, "accuracy"_a = 0.0,
              "solver"_a = "apgd", "max_iterations"_a = 100000, "impulse"_a = nb::none(),
-             "compliance"_a = nb::none(), "body"_a = nb::none(), "arm"_a = nb::none(),
-             "body_inverse_mass"_a = nb::none(), "body_inverse_inertia"_a = nb::none());
+             "compliance"_a = nb::none(), "least_impulse"_a = nb::none(), "body"_a = nb::none(),
+             "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
+             "body_inverse_inertia"_a = nb::none());
 
   module.def(
       "residual",
       [](const Vectors &predicted_velocity, const Scalars &inverse_mass, const Indices &first,
          const Indices &second, const Vectors &normal, const Scalars &gap, const Scalars &impulse,
          double timestep, const std::optional<Scalars> &compliance,
-         const std::optional<Indices> &body, const std::optional<Vectors> &arm,
-         const std::optional<Scalars> &body_inverse_mass,
+         const std::optional<Scalars> &least_impulse, const std::optional<Indices> &body,
+         const std::optional<Vectors> &arm, const std::optional<Scalars> &body_inverse_mass,
          const std::optional<Matrices> &body_inverse_inertia) {
-        const inelastic::Residual worst = residual_of(make_problem(
-            predicted_velocity, inverse_mass, {first, second, normal, gap, impulse, compliance},
-            timestep, {body, arm, body_inverse_mass, body_inverse_inertia}));
+        const inelastic::Residual worst = residual_of(
+            make_problem(predicted_velocity, inverse_mass,
+                         {first, second, normal, gap, impulse, compliance, least_impulse}, timestep,
+                         {body, arm, body_inverse_mass, body_inverse_inertia}));
         return nb::make_tuple(worst.feasibility, worst.complementarity);
       },
       "predicted_velocity"_a, "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, "gap"_a,
-      "impulse"_a, nb::kw_only(), "timestep"_a, "compliance"_a = nb::none(), "body"_a = nb::none(),
-      "arm"_a = nb::none(), "body_inverse_mass"_a = nb::none(),
-      "body_inverse_inertia"_a = nb::none());
+      "impulse"_a, nb::kw_only(), "timestep"_a, "compliance"_a = nb::none(),
+      "least_impulse"_a = nb::none(), "body"_a = nb::none(), "arm"_a = nb::none(),
+      "body_inverse_mass"_a = nb::none(), "body_inverse_inertia"_a = nb::none());
 
   module.def(
       "largest_eigenvalue",
@@ -348,8 +361,8 @@ NB_MODULE(_core, module)
         inelastic::SerialHost host;
         return inelastic::largest_eigenvalue(
             make_problem(velocity, inverse_mass,
-                         {first, second, normal, gap, std::nullopt, std::nullopt}, timestep,
-                         {body, arm, body_inverse_mass, body_inverse_inertia}),
+                         {first, second, normal, gap, std::nullopt, std::nullopt, std::nullopt},
+                         timestep, {body, arm, body_inverse_mass, body_inverse_inertia}),
             host);
       },
       "inverse_mass"_a, "first"_a, "second"_a, "normal"_a, nb::kw_only(), "timestep"_a,

@@ -330,7 +330,7 @@ void test_empty_problems()
       CHECK(velocity == given);
       CHECK_EQUAL(largest_eigenvalue(problem, host), 0.0);
     }
-  const Residual nothing = residual(nullptr, nullptr, 0);
+  const Residual nothing = residual(nullptr, ContactSet());
   CHECK_EQUAL(nothing.feasibility, 0.0);
   CHECK_EQUAL(nothing.complementarity, 0.0);
 }
@@ -368,13 +368,24 @@ void test_resize_keeps_the_dummy_particle_still()
 
 void test_residual()
 {
-  const double gaps[3] = {-0.1, 0.2, 0.3};
-  const double impulses[3] = {0.0, 0.0, 1.0};
-  const Residual worst = residual(gaps, impulses, 3);
-  CHECK_EQUAL(worst.feasibility, 0.1);
-  CHECK_EQUAL(worst.complementarity, 0.3);
-  const Residual without_last = residual(gaps, impulses, 2);
-  CHECK_EQUAL(without_last.complementarity, 0.0);
+  const double gaps[5] = {-0.1, 0.2, 0.3, 0.5, 0.4};
+  const double impulses[5] = {0.0, 0.0, 1.0, -2.0, -1.0}, least[5] = {0.0, 0.0, 0.0, -2.0, -2.0};
+  const double normal[3] = {0.0, 0.0, 1.0};
+  ContactSet contacts;
+  const auto add = [&](int c) {
+    contacts.add(0, 1, normal, 0.0, impulses[c], 0.0, least[c]);
+    return residual(gaps, contacts);
+  };
+  add(0);
+  CHECK_EQUAL(add(1).complementarity, 0.0);
+  const Residual pushing = add(2);
+  CHECK_EQUAL(pushing.feasibility, 0.1);
+  CHECK_EQUAL(pushing.complementarity, 0.3);
+  // A contact that pulls as much as it may has let go.
+  CHECK_EQUAL(add(3).complementarity, 0.3);
+  const Residual held = add(4);
+  CHECK_EQUAL(held.feasibility, 0.4);
+  CHECK_EQUAL(held.complementarity, 0.4);
 }
 
 void test_gap_operator()
@@ -523,7 +534,7 @@ void test_crystal(const ContactProblem &crystal)
     const SolverResult result = make_solver(name)->solve(problem, {TOLERANCE, 10000}, host);
     CHECK(result.status == Status::CONVERGED);
     const std::vector<double> gaps = gaps_of(problem, velocity_of(problem));
-    const Residual worst = residual(gaps.data(), problem.contacts.impulse.data(), gaps.size());
+    const Residual worst = residual(gaps.data(), problem.contacts);
     CHECK_AT_MOST(worst.feasibility, TOLERANCE + ROUNDING * TIMESTEP);
     CHECK_AT_MOST(worst.complementarity, TOLERANCE + ROUNDING * TIMESTEP);
     CHECK_NEAR(result.residual.feasibility, worst.feasibility, ROUNDING * TIMESTEP);

@@ -63,6 +63,21 @@ def test_sphere_on_a_spring(solver: str) -> None:
     assert projection.feasibility <= TOLERANCE
 
 
+@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+@pytest.mark.parametrize(
+    ("least", "impulse", "speed"),
+    [(0, 0, 3), (-4, -4, 1), (-6, -6, 0), (-60, -6, 0)],
+    ids=["pushes only", "lets go", "just holds", "holds"],
+)
+def test_sphere_held_by_the_floor(solver: str, least: float, impulse: float, speed: float) -> None:
+    # m V = 2 3 upwards, of which the floor takes at most -l.
+    given = problem([(0, 0, 3)], [2], [(0, WALL, UP, 0)], timestep=0.01)
+    projection = given.project(TOLERANCE, solver=solver, least_impulse=np.array([least], float))
+    assert projection.converged
+    assert_within(projection.velocity, [[0, 0, speed]], 2 * TOLERANCE / 0.01)
+    assert_within(projection.impulse, [impulse], 4 * TOLERANCE / 0.01)
+
+
 def test_sphere_falling_on_the_floor(solve: Solve) -> None:
     # It may use up the gap: V = -gap / h = -1, and m (-1 - (-3)) stops the rest.
     projection, accuracy = solve(problem([(0.5, 0, -3)], [2], [(0, WALL, UP, 0.01)]))

@@ -65,7 +65,9 @@ def test_these_arguments_are_fine() -> None:
         (project, "normal"),
         (project, "impulse"),
         (project, "compliance"),
+        (project, "least_impulse"),
         (residual, "compliance"),
+        (residual, "least_impulse"),
         (residual, "inverse_mass"),
         (residual, "impulse"),
         (largest_eigenvalue, "second"),
@@ -197,6 +199,12 @@ def test_negative_mass(function: Callable[..., object]) -> None:
 def test_negative_compliance(function: Callable[..., object]) -> None:
     with pytest.raises(ValueError, match="compliance must not be negative"):
         function(compliance=np.array([0.0, -1e-9]))
+
+
+@pytest.mark.parametrize("function", [project, residual])
+def test_positive_least_impulse(function: Callable[..., object]) -> None:
+    with pytest.raises(ValueError, match="least_impulse must not be positive"):
+        function(least_impulse=np.array([0.0, 1e-9]))
 
 
 @ALL

@@ -111,6 +111,35 @@ def test_springs(name: str, solver: str) -> None:
     assert np.abs(velocity - rigid).max() > 1e-4 * given.fastest
 
 
+@pytest.mark.parametrize(
+    ("name", "solver"),
+    [(name, "apgd") for name in PROBLEMS]
+    + [(name, "uzawa") for name in ("overlapping 0", "mixed, frozen 0")],
+)
+def test_contacts_that_pull(name: str, solver: str) -> None:
+    """Every other contact may pull, by more or less than it takes to hold it."""
+    given = PROBLEMS[name]
+    # What stops the two sides of a contact from the fastest velocity.
+    strength = given.fastest * given.timestep / np.diag(given.delassus())
+    parts = np.random.default_rng(6).choice([0.0, 0.05, 0.3, 3.0], given.gap.size)
+    least = -parts * strength
+    velocity, _ = reference(given, least=least)
+    projection = given.project(TOLERANCE, solver=solver, least_impulse=least)
+    assert projection.converged
+    assert projection.feasibility <= TOLERANCE
+    # The interior-point method's own error, as for contacts that only push.
+    assert_within(projection.velocity, velocity, 1e-6 * given.fastest)
+    assert (projection.impulse >= least).all()
+    holding = (least < 0) & (projection.impulse > least)
+    assert holding.any()
+    assert np.abs(given.gap_at_end(projection.velocity)[holding]).max() <= 2 * TOLERANCE
+    assert (projection.impulse < 0).any()
+    # With contacts that only push the velocities are others, unless nothing can move in a box.
+    pushed, _ = reference(given)
+    changed = np.abs(velocity - pushed).max() > 1e-4 * given.fastest
+    assert changed != ("in a box" in name)
+
+
 @pytest.mark.parametrize("name", ["overlapping 0", "mixed, frozen 0"])
 def test_uzawa_gives_the_same_velocities(name: str) -> None:
     given = PROBLEMS[name]
