@@ -29,7 +29,7 @@ void AtomState::remember_contacts(GhostExchange &ranks)
   const double force_per_impulse = 1.0 / step_.impulse_per_force;
   for (int i = 0; i < problem.particles; ++i) memory_.forget(i);
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
-    if (!(problem.contacts.impulse[c] > 0.0)) continue;
+    if (problem.contacts.impulse[c] == 0.0) continue;
     const int i = problem.contacts.first[c];
     const int j = problem.contacts.second[c];
     const Side &side = step_.sides[c];
@@ -47,18 +47,29 @@ void AtomState::remember_contacts(GhostExchange &ranks)
     memory_.remember(i, wall ? -wall : atom->tag[j], contact);
     if (!wall) memory_.remember(j, atom->tag[i], contact);
   }
-  ranks.gather_memory(memory_);
-  double most = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i)
-    most = std::max(most, static_cast<double>(memory_.number_of_partners(i)));
-  ranks.reduce(nullptr, 0, &most, 1);
-  most_partners_ = static_cast<int>(most);
+  ranks.gather(memory_);
+  double most[2] = {0.0, 0.0};
+  for (int i = 0; i < atom->nlocal; ++i) {
+    most[0] = std::max(most[0], static_cast<double>(memory_.number_of_partners(i)));
+    if (has_law())
+      most[1] = std::max(most[1], static_cast<double>(law_memory_.number_of_entries(i)));
+  }
+  ranks.reduce(nullptr, 0, most, 2);
+  most_partners_ = static_cast<int>(most[0]);
+  most_law_entries_ = static_cast<int>(most[1]);
+}
+
+int AtomState::exchange_size() const
+{
+  return carried_size() + ContactMemory::packed_size(most_partners_) +
+      (has_law() ? LawMemory::packed_size(most_law_entries_) : 0);
 }
 
 void AtomState::grow(int atoms)
 {
   memory->grow(state_, atoms, STATE_SIZE, "inelastic:state");
   memory_.resize(atoms);
+  if (has_law()) law_memory_.resize(atoms);
   if (step_.has_bodies) momenta_.resize(atoms);
 }
 
@@ -66,6 +77,7 @@ void AtomState::copy(int from, int to)
 {
   std::copy_n(state_[from], STATE_SIZE, state_[to]);
   memory_.copy(from, to);
+  if (has_law()) law_memory_.copy(from, to);
   if (step_.has_bodies) momenta_.copy(from, to);
 }
 
@@ -74,6 +86,7 @@ void AtomState::begin(int i)
 {
   std::fill_n(state_[i], STATE_SIZE, 0.0);
   memory_.forget(i);
+  if (has_law()) law_memory_.forget(i);
   if (step_.has_bodies) momenta_.forget(i);
   std::copy_n(atom->x[i], 3, expected_position(i));
   std::copy_n(atom->v[i], 3, expected_velocity(i));
@@ -85,6 +98,7 @@ int AtomState::pack_exchange(int i, double *buffer) const
   double *out = std::copy_n(state_[i], STATE_SIZE, buffer);
   if (step_.has_bodies) out += momenta_.pack(i, out);
   out += memory_.pack(i, out, memory_.number_of_partners(i));
+  if (has_law()) out += law_memory_.pack(i, out);
   return static_cast<int>(out - buffer);
 }
 
@@ -95,19 +109,33 @@ int AtomState::unpack_exchange(int i, const double *buffer)
   const double *in = buffer + STATE_SIZE;
   if (step_.has_bodies) in += momenta_.unpack(i, in);
   in += memory_.unpack(i, in);
+  if (has_law()) {
+    law_memory_.forget(i);
+    in += law_memory_.unpack(i, in);
+  }
   return static_cast<int>(in - buffer);
 }
 
+bool AtomState::is_pushed(int i) const
+{
+  const double *const held = state_[i] + PUSH_HELD;
+  return held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0 ||
+      (step_.has_bodies && momenta_.has_held(i));
+}
+
+// The layout is: this size; where it is more than 1, the number of contacts that the law remembers and what it
+// remembers of them; where there is more, the push.
 int AtomState::restart_size(int i, bool writes) const
 {
   if (!writes) return 0;
-  const double *const held = state_[i] + PUSH_HELD;
-  const bool pushed = held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0;
-  return pushed || (step_.has_bodies && momenta_.has_held(i)) ? largest_restart_size() : 1;
+  const int contacts = has_law() ? law_memory_.number_of_entries(i) : 0;
+  const bool pushed = is_pushed(i);
+  if (contacts == 0 && !pushed) return 1;
+  return 1 + LawMemory::packed_size(contacts) + (pushed ? push_size() : 0);
 }
 
 int AtomState::largest_restart_size() const
-{ return 7 + (step_.has_bodies ? CarriedMomenta::HELD_SIZE : 0); }
+{ return 1 + LawMemory::packed_size(most_law_entries_) + push_size(); }
 
 int AtomState::pack_restart(int i, double *buffer, bool writes) const
 {
@@ -116,22 +144,33 @@ int AtomState::pack_restart(int i, double *buffer, bool writes) const
   double *out = buffer;
   *out++ = size;
   if (size == 1) return size;
+  if (has_law())
+    out += law_memory_.pack(i, out);
+  else
+    *out++ = 0.0;
+  if (!is_pushed(i)) return size;
   out = std::copy_n(atom->v[i], 3, out);
   out = std::copy_n(state_[i] + PUSH_HELD, 3, out);
   if (step_.has_bodies) momenta_.pack_held(i, out);
   return size;
 }
 
-void AtomState::unpack_restart(int i, int nth)
+void AtomState::unpack_restart(int i, int nth, bool law)
 {
   const double *in = atom->extra[i];
   for (int k = 0; k < nth; ++k) in += static_cast<int>(*in);
-  const int size = static_cast<int>(*in++);
-  if (size == 1) return;
+  const double *const end = in + static_cast<int>(*in);
+  if (++in >= end) return;
+  if (law) {
+    law_memory_.forget(i);
+    in += law_memory_.unpack(i, in);
+  } else
+    in += LawMemory::packed_size(static_cast<int>(*in));
+  if (in == end) return;
   // A velocity that was set since is all momentum.
   if (!std::equal(in, in + 3, atom->v[i])) return;
   for (int d = 0; d < 3; ++d) atom->v[i][d] -= in[3 + d];
-  if (step_.has_bodies && size == largest_restart_size()) momenta_.unpack_held(i, in + 6);
+  if (step_.has_bodies && end - in == push_size()) momenta_.unpack_held(i, in + 6);
 }
 
 double AtomState::memory_usage() const

@@ -6,6 +6,7 @@
 
 #include "carried_momenta.h"
 #include "contact_memory.h"
+#include "law_memory.h"
 #include "step.h"
 
 #include "pointers.h"
@@ -36,6 +37,7 @@ class AtomState : protected Pointers {
   void take_out_pushes();
 
   ContactMemory &contact_memory() { return memory_; }
+  LawMemory &law_memory() { return law_memory_; }
   CarriedMomenta &momenta() { return momenta_; }
 
   // Both atoms of a contact remember it, those of other ranks included: the next neighbour list may show
@@ -49,15 +51,17 @@ class AtomState : protected Pointers {
   int pack_exchange(int i, double *buffer) const;
   int unpack_exchange(int i, const double *buffer);
   // The largest message of an atom that is handed to another rank [numbers].
-  int exchange_size() const { return carried_size() + ContactMemory::packed_size(most_partners_); }
+  int exchange_size() const;
 
-  // Restart files that are written during a run hold velocities with the push in them: it goes along,
-  // with the velocity that it belongs to. Most atoms have none. Where none has (`writes` false), the file
-  // holds nothing of this fix: LAMMPS would refuse change_box after it.
+  // Restart files hold what the contact law remembers. Those that are written during a run hold velocities
+  // with the push in them: it goes along, with the velocity that it belongs to. Most atoms have none. Where
+  // none has, and without a law (`writes` false), the file holds nothing of this fix: LAMMPS would refuse
+  // change_box after it.
   int restart_size(int i, bool writes) const;
   int largest_restart_size() const;
   int pack_restart(int i, double *buffer, bool writes) const;
-  void unpack_restart(int i, int nth);
+  // `law` tells whether what the file holds of contacts is that of the law of this run.
+  void unpack_restart(int i, int nth, bool law);
 
   double memory_usage() const;    // [numbers] per atom
 
@@ -73,11 +77,17 @@ class AtomState : protected Pointers {
   int carried_size() const
   { return STATE_SIZE + (step_.has_bodies ? CarriedMomenta::PACKED_SIZE : 0); }
 
+  bool has_law() const { return step_.settings.law != nullptr; }
+  bool is_pushed(int i) const;
+  int push_size() const { return 6 + (step_.has_bodies ? CarriedMomenta::HELD_SIZE : 0); }
+
   const Step &step_;
   double **state_ = nullptr;
   ContactMemory memory_;
+  LawMemory law_memory_;      // empty without a law
   CarriedMomenta momenta_;    // empty in a scene of free spheres
   int most_partners_ = 0;     // of an atom, on any rank
+  int most_law_entries_ = 0;
 };
 
 }    // namespace LAMMPS_NS

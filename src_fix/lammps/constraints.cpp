@@ -14,11 +14,11 @@ constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
 }    // namespace
 
 Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
-                         const ContactMemory &memory, RigidMotion *bodies) :
-    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), bodies_(bodies),
+                         const ContactMemory &memory, LawContacts &laws, RigidMotion *bodies) :
+    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), laws_(laws), bodies_(bodies),
     walls_(lmp, step.settings.regions), overlaps_(lmp, step, ranks), rules_(step, overlaps_),
-    entangled_(step), pairs_(lmp, step, rules_, entangled_, memory, bodies),
-    wall_constraints_(lmp, step, rules_, walls_, ranks, memory, bodies)
+    entangled_(step), pairs_(lmp, step, rules_, laws, entangled_, memory, bodies),
+    wall_constraints_(lmp, step, rules_, laws, walls_, ranks, memory, bodies)
 {
 }
 
@@ -33,6 +33,7 @@ void Constraints::collect()
   step_.phase = Phase::CONTACT;
   step_.problem.contacts.clear();
   step_.sides.clear();
+  laws_.begin_step();
   step_.problem_found.clear();
   step_.excess = 0.0;
   step_.relinearisations = 0;
@@ -55,9 +56,9 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   const long changed = step_.phase == Phase::CONTACT ? rules_.keep_within_tolerance(velocity) : 0;
   long relinearised = 0;
   step_.excess = 0.0;
-  if (bodies_ || wall_constraints_.need_relinearising()) {
+  if (bodies_ || laws_.has_law() || wall_constraints_.need_relinearising()) {
     ++step_.relinearisations;
-    if (bodies_) relinearised += pairs_.relinearise();
+    if (bodies_ || laws_.has_law()) relinearised += pairs_.relinearise();
     if (wall_constraints_.need_relinearising())
       relinearised += wall_constraints_.relinearise(margin_);
   }

@@ -6,6 +6,7 @@
 
 #include "entangled_bodies.h"
 #include "gap_rules.h"
+#include "law_contacts.h"
 #include "overlap_watch.h"
 #include "pair_constraints.h"
 #include "phase_clock.h"
@@ -23,7 +24,7 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
  public:
   // `bodies` is null in a scene of free spheres.
   Constraints(class LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
-              const ContactMemory &memory, RigidMotion *bodies);
+              const ContactMemory &memory, LawContacts &laws, RigidMotion *bodies);
 
   RegionWalls &walls() { return walls_; }
   OverlapWatch &overlaps() { return overlaps_; }
@@ -56,6 +57,7 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   Step &step_;
   GhostExchange &ranks_;
   PhaseClock &clock_;
+  LawContacts &laws_;
   RigidMotion *bodies_;
   RegionWalls walls_;
   OverlapWatch overlaps_;

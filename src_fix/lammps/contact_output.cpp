@@ -7,11 +7,13 @@
 #include "update.h"
 
 #include <algorithm>
+#include <cmath>
 
 using namespace LAMMPS_NS;
 
 ContactOutput::ContactOutput(LAMMPS *lmp, const Step &step, GhostExchange &ranks) :
-    Pointers(lmp), step_(step), ranks_(ranks)
+    Pointers(lmp), step_(step), ranks_(ranks),
+    remembered_(step.settings.law ? step.settings.law->remembers() : 0)
 {
 }
 
@@ -34,20 +36,20 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const double force_per_impulse = 1.0 / step_.impulse_per_force;
   clear_sums(virial.per_atom);
-  const auto active = static_cast<int>(
-      std::count_if(contacts.impulse.begin(), contacts.impulse.end(), [](double impulse) {
-        return impulse > 0.0;
-      }));
+  int active = 0;
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    if (is_contact(c)) ++active;
   if (active > local_room_) {
     local_room_ = active * 5 / 4 + 16;
-    memory->grow(local_, local_room_, LOCAL_COLUMNS, "inelastic:array_local");
+    memory->grow(local_, local_room_, local_columns(), "inelastic:array_local");
   }
   for (std::size_t c = 0; c < contacts.size(); ++c)
-    if (contacts.impulse[c] > 0.0) add_contact(c, contacts.impulse[c] * force_per_impulse, virial);
+    if (is_contact(c)) add_contact(c, contacts.impulse[c] * force_per_impulse, virial);
   share(virial);
 
-  double sums[3] = {counts_[0], counts_[1], static_cast<double>(contacts.size())};
-  ranks_.reduce(sums, 3, &largest_change_, 1);
+  double sums[5] = {counts_[0], counts_[1], static_cast<double>(contacts.size()), counts_[2],
+                    counts_[3]};
+  ranks_.reduce(sums, 5, &largest_change_, 1);
   vector_[PARTICLE_CONTACTS] = sums[0];
   vector_[WALL_CONTACTS] = sums[1];
   vector_[CONSTRAINTS] = sums[2];
@@ -61,6 +63,17 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   vector_[EXCESS] = step_.excess;
   vector_[PUSHED_STEPS] += step_.bad_start ? 1.0 : 0.0;
   vector_[AT_REST] = step_.at_rest ? 1.0 : 0.0;
+  vector_[PRESSED_CONTACTS] = sums[3];
+  vector_[HELD_CONTACTS] = sums[4];
+}
+
+// Contacts carry a force, or their law remembers something of them. Of several constraints that are one contact
+// only those with a force count.
+bool ContactOutput::is_contact(std::size_t c) const
+{
+  if (step_.problem.contacts.impulse[c] != 0.0) return true;
+  const LawContact *const contact = step_.law_contact(step_.sides[c]);
+  return contact && contact->kept && contact->impulse == 0.0;
 }
 
 void ContactOutput::clear_sums(bool virial_per_atom)
@@ -75,7 +88,7 @@ void ContactOutput::clear_sums(bool virial_per_atom)
   std::fill(wall_force_.begin(), wall_force_.end(), 0.0);
   wall_force_step_ = -1;
   local_rows_ = 0;
-  counts_[0] = counts_[1] = 0.0;
+  std::fill_n(counts_, 4, 0.0);
   largest_change_ = 0.0;
 }
 
@@ -89,9 +102,12 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   const Side &side = step_.sides[c];
   const bool is_wall = side.wall != 0;
   counts_[is_wall] += 1.0;
-  largest_change_ =
-      std::max(largest_change_,
-               problem.contacts.impulse[c] * (problem.inverse_mass[i] + problem.inverse_mass[j]));
+  if (strength > 0.0) counts_[2] += 1.0;
+  const LawContact *const law = step_.law_contact(side);
+  if (law && law->kept) counts_[3] += 1.0;
+  largest_change_ = std::max(largest_change_,
+                             std::abs(problem.contacts.impulse[c]) *
+                                 (problem.inverse_mass[i] + problem.inverse_mass[j]));
   contact_count_[3 * i + is_wall] += 1.0;
   for (int d = 0; d < 3; ++d) {
     contact_force_[3 * i + d] += strength * n[d];
@@ -122,6 +138,8 @@ void ContactOutput::list_contact(std::size_t c, double strength, double to_point
   }
   out[8] = side.gap_now;
   out[9] = strength;
+  if (remembered_ > 0)
+    std::copy_n(step_.law_contact(side)->remembered.begin(), remembered_, out + LOCAL_COLUMNS);
 }
 
 // `weight` is the distance over which the force acts, times the force. Half goes to each side; a wall's

@@ -25,7 +25,9 @@ class ContactOutput : protected Pointers {
 
   // The columns of the arrays, in the order in which the page of the fix lists them.
   static constexpr int PER_ATOM_COLUMNS = 5;
-  static constexpr int LOCAL_COLUMNS = 10;
+  static constexpr int LOCAL_COLUMNS =
+      10;    // and one for each value that the contact law remembers
+  int local_columns() const { return LOCAL_COLUMNS + remembered_; }
   enum Vector {
     ITERATIONS,
     FEASIBILITY,
@@ -40,6 +42,8 @@ class ContactOutput : protected Pointers {
     EXCESS,
     PUSHED_STEPS,
     AT_REST,
+    PRESSED_CONTACTS,
+    HELD_CONTACTS,
     VECTOR_SIZE
   };
 
@@ -78,6 +82,7 @@ class ContactOutput : protected Pointers {
   static constexpr double PER_CONTACT = 20.0 + LOCAL_COLUMNS;
 
  private:
+  bool is_contact(std::size_t c) const;
   void clear_sums(bool virial_per_atom);
   void add_contact(std::size_t c, double strength, const VirialTarget &virial);
   void list_contact(std::size_t c, double strength, double to_point);
@@ -86,12 +91,14 @@ class ContactOutput : protected Pointers {
 
   const Step &step_;
   GhostExchange &ranks_;
+  const int remembered_;    // values of each contact
   double vector_[VECTOR_SIZE] = {};
   double **per_atom_ = nullptr;
   double **local_ = nullptr;
   int local_rows_ = 0;
   int local_room_ = 0;
-  double counts_[2] = {0.0, 0.0};                        // contacts of spheres, with walls
+  // Contacts of spheres, with walls; of these: pressed ones, and those of which the law remembers something.
+  double counts_[4] = {};
   std::vector<double> contact_force_, contact_count_;    // 3 per particle, and for the dummy
   std::vector<double> virial_diagonal_, virial_off_diagonal_;
   std::vector<double> wall_force_;    // 3 per wall, this rank's share

@@ -25,15 +25,27 @@ namespace {
 
 constexpr int MAX_ROUNDS = 100;          // of adding constraints; a handful is usual
 constexpr double SIMILAR_RADII = 1.1;    // up to here one cutoff for all pairs wastes little
+std::string first_word(const std::string &words)
+{ return words.substr(0, words.find(' ')); }
+
+constexpr double LAYOUT = -2.0;    // of what restart files hold; earlier files begin with a time
+
+// What LAMMPS has read from a restart file for fixes that are not yet defined is hidden in its class.
+struct FromRestart : Modify {
+  static char *id_of(const Modify *modify, int k)
+  { return (modify->*(&FromRestart::id_restart_peratom))[k]; }
+  static char *style_of(const Modify *modify, int k)
+  { return (modify->*(&FromRestart::style_restart_peratom))[k]; }
+};
 
 }    // namespace
 
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), settings_(read_settings(lmp, narg, arg, groupbit)), step_(settings_),
-    ranks_(lmp, this, clock_), state_(lmp, step_),
+    ranks_(lmp, this, clock_), state_(lmp, step_), laws_(step_, state_.law_memory()),
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
     spheres_(lmp, step_, ranks_, state_), movers_{&spheres_},
-    constraints_(lmp, step_, ranks_, clock_, state_.contact_memory(), bodies_.get()),
+    constraints_(lmp, step_, ranks_, clock_, state_.contact_memory(), laws_, bodies_.get()),
     solver_(inelastic::make_solver(settings_.solver)),
     push_apart_(step_, constraints_, bodies_.get()), length_(lmp, step_, ranks_),
     rest_(lmp, step_, ranks_), check_(lmp, this, step_, ranks_, state_, bodies_.get()),
@@ -46,6 +58,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     error->all(FLERR, "Fix inelastic needs spheres with a radius: use atom_style sphere");
   if (!atom->tag_enable) error->all(FLERR, "Fix inelastic needs atom IDs: use atom_modify id yes");
   announce_to_lammps();
+  find_lost_memory();
   begin_summary();
 
   FixInelastic::grow_arrays(atom->nmax);
@@ -71,7 +84,7 @@ void FixInelastic::announce_to_lammps()
   size_peratom_cols = ContactOutput::PER_ATOM_COLUMNS;
   peratom_freq = 1;
   local_flag = 1;
-  size_local_cols = ContactOutput::LOCAL_COLUMNS;
+  size_local_cols = output_.local_columns();
   size_local_rows = 0;
   local_freq = 1;
   force_reneighbor = 1;
@@ -82,6 +95,22 @@ void FixInelastic::announce_to_lammps()
   maxexchange_dynamic = 1;
   maxexchange = state_.exchange_size();
   create_attribute = 1;
+  // Restart files hold what the law remembers.
+  restart_global = restart_peratom = laws_.has_law() ? 1 : 0;
+}
+
+// LAMMPS gives what a restart file holds to the fix with the same ID alone, and tells nobody before the end of
+// the first run. Without a law there is little to lose.
+void FixInelastic::find_lost_memory() const
+{
+  if (!laws_.has_law()) return;
+  for (int k = 0; k < modify->nfix_restart_peratom; ++k)
+    if (strcmp(FromRestart::style_of(modify, k), style) == 0 &&
+        strcmp(FromRestart::id_of(modify, k), id) != 0)
+      error->all(FLERR,
+                 "Fix inelastic: the restart file holds what contacts remember for fix {}: give "
+                 "this fix the same ID, in place of {}",
+                 FromRestart::id_of(modify, k), id);
 }
 
 FixInelastic::~FixInelastic()
@@ -340,6 +369,7 @@ void FixInelastic::predict()
   step_.impulse_per_force = step_.kicks() * update->dt * force->ftm2v;
   problem.timestep = update->dt;
   problem.resize(nall);
+  if (laws_.has_law()) step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
   for (int i = 0; i < nall; ++i)
     problem.inverse_mass[i] = step_.is_mobile(atom, i) ? 1.0 / mass_of(atom, i) : 0.0;
   for (Mover *mover : movers_) mover->predict();
@@ -372,6 +402,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   overlaps.warn_of_unexpected();
   {
     const PhaseClock::Within within(clock_, PhaseClock::APPLY);
+    laws_.take_impulses();
     output_.take(result, length_.shortened_steps(),
                  {vflag_global != 0, vflag_atom != 0, virial, vatom});
     array_local = output_.local();
@@ -382,10 +413,11 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   }
   const bool solved = result.status == inelastic::Status::CONVERGED;
   overlaps.end_step(solved && constraints_.entangled().empty());
-  restart_peratom = overlaps.pushes_in_velocity();
-  restart_global = length_.is_shortened();
+  restart_peratom = overlaps.pushes_in_velocity() || laws_.has_law();
+  restart_global = length_.is_shortened() || laws_.has_law();
   {
     const PhaseClock::Within within(clock_, PhaseClock::APPLY);
+    laws_.remember(atom, ranks_);
     state_.remember_contacts(ranks_);
   }
   maxexchange = state_.exchange_size();
@@ -398,9 +430,9 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
 // step has taken the push out, because fix rigid/small is out of reach here.)
 void FixInelastic::post_run()
 {
-  check_.end_run(restart_peratom != 0);
+  check_.end_run(constraints_.overlaps().pushes_in_velocity());
   state_.take_out_pushes();
-  restart_peratom = 0;
+  restart_peratom = laws_.has_law();
   summary_.log(length_.shortened_steps(), constraints_.overlaps().unexpected_steps());
   begin_summary();
 }
@@ -451,7 +483,10 @@ int FixInelastic::pack_restart(int i, double *buffer)
 { return state_.pack_restart(i, buffer, restart_peratom != 0); }
 
 void FixInelastic::unpack_restart(int i, int nth)
-{ state_.unpack_restart(i, nth); }
+{
+  const bool same_law = first_word(law_in_restart_) == first_word(settings_.law_words);
+  state_.unpack_restart(i, nth, laws_.has_law() && same_law);
+}
 
 int FixInelastic::size_restart(int i)
 { return state_.restart_size(i, restart_peratom != 0); }
@@ -459,23 +494,36 @@ int FixInelastic::size_restart(int i)
 int FixInelastic::maxsize_restart()
 { return state_.largest_restart_size(); }
 
-// A file that is written while a step is shortened holds its time step: the regular one goes along.
-// In other files there is nothing of this fix.
+// A file that is written while a step is shortened holds its time step: the regular one goes along. One of a run
+// with a law names the law, whose memory goes along with the atoms. In other files there is nothing of this fix.
 void FixInelastic::write_restart(FILE *file)
 {
   if (comm->me != 0) return;
-  const double timesteps[2] = {update->dt, step_.regular_timestep};
-  const int size = sizeof(timesteps);
+  const std::string law = laws_.has_law() ? settings_.law_words : "";
+  const double numbers[4] = {LAYOUT, update->dt, step_.regular_timestep,
+                             static_cast<double>(law.size())};
+  const int size = sizeof(numbers) + static_cast<int>(law.size());
   fwrite(&size, sizeof(size), 1, file);
-  fwrite(timesteps, sizeof(timesteps), 1, file);
+  fwrite(numbers, sizeof(numbers), 1, file);
+  fwrite(law.data(), 1, law.size(), file);
 }
 
-// A time step that was set since stays.
+// A time step that was set since stays. LAMMPS calls this before unpack_restart().
 void FixInelastic::restart(char *buffer)
 {
-  double timesteps[2];
-  std::memcpy(timesteps, buffer, sizeof(timesteps));
-  if (update->dt == timesteps[0]) length_.set_timestep(timesteps[1]);
+  double numbers[4];
+  std::memcpy(numbers, buffer, sizeof(double));
+  const bool earlier = numbers[0] != LAYOUT;
+  std::memcpy(numbers + (earlier ? 1 : 0), buffer, (earlier ? 2 : 4) * sizeof(double));
+  if (update->dt == numbers[1] && numbers[1] != numbers[2]) length_.set_timestep(numbers[2]);
+  if (earlier) return;
+  law_in_restart_.assign(buffer + sizeof(numbers), static_cast<std::size_t>(numbers[3]));
+  const bool same_law = first_word(law_in_restart_) == first_word(settings_.law_words);
+  if (law_in_restart_.empty() || same_law || comm->me != 0) return;
+  error->warning(FLERR,
+                 "Fix inelastic: the restart file holds what contacts remember by law {}, which "
+                 "is dropped: this fix has law {}",
+                 law_in_restart_, settings_.law_words.empty() ? "inelastic" : settings_.law_words);
 }
 
 double FixInelastic::memory_usage()

@@ -21,6 +21,7 @@ FixStyle(inelastic,FixInelastic);
 #include "contact_output.h"
 #include "fix_settings.h"
 #include "ghost_exchange.h"
+#include "law_contacts.h"
 #include "motion_check.h"
 #include "phase_clock.h"
 #include "problem_record.h"
@@ -37,6 +38,7 @@ FixStyle(inelastic,FixInelastic);
 #include "fix.h"
 
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -85,6 +87,7 @@ class FixInelastic : public Fix {
   Step step_;
   GhostExchange ranks_;
   AtomState state_;
+  LawContacts laws_;
   std::unique_ptr<RigidMotion> bodies_;    // null in a scene of free spheres
   SphereMotion spheres_;
   std::vector<Mover *> movers_;    // the free spheres, then the bodies
@@ -98,8 +101,10 @@ class FixInelastic : public Fix {
   ContactOutput output_;
   RunSummary summary_;
   ProblemRecord record_;
+  std::string law_in_restart_;    // the law whose memory a restart file holds; empty for none
 
   void announce_to_lammps();
+  void find_lost_memory() const;
   double measure_radii();
   void check_group() const;
   void check_run() const;

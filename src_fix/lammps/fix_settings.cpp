@@ -1,5 +1,6 @@
 #include "fix_settings.h"
 
+#include "make_law.h"
 #include "make_solver.h"
 
 #include "group.h"
@@ -14,8 +15,8 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-constexpr const char *KEYWORDS[] = {"region",  "rigid",  "accuracy", "solver",
-                                    "maxiter", "frozen", "record",   "shorten"};
+constexpr const char *KEYWORDS[] = {"region",  "rigid",  "law",    "accuracy", "solver",
+                                    "maxiter", "frozen", "record", "shorten"};
 
 bool is_keyword(const char *word)
 {
@@ -37,6 +38,7 @@ class Reader {
  private:
   void read_regions(const char *first);
   void read_rigid(const char *fix_id);
+  void read_law(const std::string &name);
   void read_solver(const char *name);
   void read_max_iterations(const char *value);
   void read_frozen(const char *group_id);
@@ -56,8 +58,8 @@ void Reader::read_keywords()
     const std::string keyword = arg_[at_];
     if (!is_keyword(arg_[at_]))
       error_->all(FLERR, at_,
-                  "Unknown fix inelastic keyword {}: use region, rigid, accuracy, solver, maxiter, "
-                  "frozen, record or shorten",
+                  "Unknown fix inelastic keyword {}: use region, rigid, law, accuracy, solver, "
+                  "maxiter, frozen, record or shorten",
                   keyword);
     if (at_ + 2 > narg_) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error_);
     const char *const value = arg_[at_ + 1];
@@ -66,6 +68,8 @@ void Reader::read_keywords()
       read_regions(value);
     else if (keyword == "rigid")
       read_rigid(value);
+    else if (keyword == "law")
+      read_law(value);
     else if (keyword == "accuracy")
       settings_.accuracy = read_accuracy(lmp_, value, at_ - 1);
     else if (keyword == "solver")
@@ -98,6 +102,27 @@ void Reader::read_rigid(const char *fix_id)
   ++at_;
   settings_.rigid_fix = fix_id;
   settings_.inertia = inertia == "point" ? Inertia::POINT : Inertia::SOLID;
+}
+
+void Reader::read_law(const std::string &name)
+{
+  const int at_name = at_ - 1;
+  if (!settings_.law_words.empty())
+    error_->all(FLERR, at_name, "Fix inelastic: two laws, {} and {}: all contacts have one law",
+                settings_.law_words, name);
+  const inelastic::NamedLaw *const law = inelastic::find_law(name);
+  if (!law)
+    error_->all(FLERR, at_name, "Fix inelastic law must be {}, not {}", inelastic::names_of_laws(),
+                name);
+  settings_.law_words = name;
+  std::vector<std::string> words;
+  while (at_ < narg_ && !is_keyword(arg_[at_])) words.emplace_back(arg_[at_++]);
+  for (const std::string &word : words) settings_.law_words += " " + word;
+  std::string allowed;
+  settings_.law = law->make(words, allowed);
+  if (!allowed.empty())
+    error_->all(FLERR, at_name, "Fix inelastic needs law {}, not law {}", allowed,
+                settings_.law_words);
 }
 
 void Reader::read_solver(const char *name)

@@ -3,8 +3,11 @@
 #ifndef INELASTIC_FIX_SETTINGS_H
 #define INELASTIC_FIX_SETTINGS_H
 
+#include "contact_law.h"
+
 #include "error.h"
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,6 +39,9 @@ struct Settings {
   // The fix rigid/small whose bodies take part; empty in a scene of free spheres.
   std::string rigid_fix;
   Inertia inertia = Inertia::POINT;
+  // The contact law, and the words that name it; null for the inelastic one.
+  std::unique_ptr<inelastic::ContactLaw> law;
+  std::string law_words;
   // File name with a *, and the number of steps between two records (0 = no records).
   std::string record_file;
   int record_every = 0;

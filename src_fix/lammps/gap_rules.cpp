@@ -31,6 +31,25 @@ double GapRules::contact_gap(const Side &side) const
                           : gap;
 }
 
+double GapRules::gap_by_law(const Side &side, const LawContact &contact) const
+{
+  if (contact.demand.least_impulse < 0.0) return held_gap(side.gap_now, contact.predicted_speed);
+  const double gap = contact_gap(side);
+  return contact.demand.parts
+      ? std::min(gap, -step_.problem.timestep * contact.demand.parting_speed)
+      : gap;
+}
+
+// The surfaces of a held contact are brought back to one another, but by no more than velocities are resolved
+// to, or half as fast as they would part: this never adds to the kinetic energy.
+double GapRules::held_gap(double gap, double predicted_speed) const
+{
+  constexpr double PART = 0.5;
+  const double h = step_.problem.timestep;
+  const double target = std::min(step_.resolution * h, step_.settings.tolerance);
+  return std::clamp(gap, -target, std::max(target, PART * h * predicted_speed));
+}
+
 void GapRules::rest(Side &side, const ContactMemory::Contact &known, int i, int j,
                     const double *normal) const
 {
@@ -45,6 +64,8 @@ void GapRules::rest(Side &side, const ContactMemory::Contact &known, int i, int 
   side.sustained = known.sustained;
   const bool at_rest = known.force > 0.0 && known.sustained >= AT_REST * known.force;
   if (!at_rest || !(step_.change > 0.0) || overlaps_.is_bad(side.gap_now)) return;
+  const LawContact *const law = step_.law_contact(side);
+  if (law && !law->demand.is_inelastic()) return;
   // The same force is half of the impulse in half a kick.
   side.compliance = step_.problem.mobility_of_pair(i, j, normal) / step_.kicks() *
       std::min({MOST_COMPLIANCE, PER_ACCURACY * step_.settings.accuracy,
@@ -67,7 +88,11 @@ double GapRules::asked_gap(const Side &side) const
 double GapRules::effective_gap(const Side &side) const
 {
   const double gap = side.gap_now;
-  if (step_.phase == Phase::CONTACT) return overlaps_.is_bad(gap) ? 0.0 : contact_gap(side);
+  if (step_.phase == Phase::CONTACT) {
+    if (overlaps_.is_bad(gap)) return 0.0;
+    const LawContact *const law = step_.law_contact(side);
+    return law ? gap_by_law(side, *law) : contact_gap(side);
+  }
   const double limit = PUSH_LIMIT * side.size * step_.problem.timestep / step_.regular_timestep;
   return std::max(gap, -std::max(limit, REGULAR_OVERLAP * step_.settings.tolerance));
 }
@@ -105,14 +130,40 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     if (!side.as_at_start || asks_for_all || overlaps_.is_bad(side.gap_now)) continue;
     if (step_.is_member(contacts.first[c])) continue;
     if (side.wall == 0 && step_.is_member(contacts.second[c])) continue;
+    const LawContact *const law = step_.law_contact(side);
+    if (law && law->demand.parts) continue;
     const double at_end = gap_at_end(c, velocity);
-    if (at_end >= -tolerance && (at_end <= tolerance || contacts.impulse[c] == 0.0)) continue;
+    const bool open = contacts.impulse[c] == contacts.least[c];
+    if (at_end >= -tolerance && (at_end <= tolerance || open)) continue;
     contacts.gap[c] = linear_gap;
     contacts.compliance[c] = side.compliance = 0.0;
     side.as_at_start = false;
     ++changed;
   }
   return changed;
+}
+
+long GapRules::hold(std::size_t c, double gap_at_end, double opening, double along)
+{
+  const double tolerance = step_.settings.tolerance;
+  inelastic::ContactSet &contacts = step_.problem.contacts;
+  Side &side = step_.sides[c];
+  const double exact = gap_at_end - opening;
+  double gap = exact;
+  if (gap_at_end < -tolerance) {
+    gap = std::min(exact, side.gap_now - side.wall_motion);
+    if (contacts.gap[c] == gap || step_.relinearisations > MAX_RELINEARISATIONS) return 0;
+  } else {
+    if (gap_at_end <= RELINEARISE_BEYOND * tolerance || !step_.holds(c)) return 0;
+    if (along < LEAST_ALONG || step_.relinearisations > MAX_RELINEARISATIONS / 2) {
+      if (step_.settings.shorten)
+        step_.excess = std::max(step_.excess, gap_at_end - REGULAR_OVERLAP * tolerance);
+      return 0;
+    }
+  }
+  contacts.gap[c] = gap;
+  side.as_at_start = false;
+  return 1;
 }
 
 double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) const

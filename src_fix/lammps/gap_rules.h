@@ -16,6 +16,8 @@ class GapRules {
   // Rounds of a step that may change the gaps of constraints. Each one squares the error where a body
   // turns little; one that turns by a radian takes up to twenty.
   static constexpr int MAX_RELINEARISATIONS = 40;
+  // The cosine of the angle, 60 degrees, by which a normal may turn in a step for its gap to be made exact.
+  static constexpr double LEAST_ALONG = 0.5;
 
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Side &side) const;
@@ -48,6 +50,14 @@ class GapRules {
   // constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
+  // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the step: the exact
+  // gap there is `gap_at_end`, the velocities open the linearised one by `opening` [length], and `along` is the
+  // cosine of the angle by which the normal turns. Surfaces that turn about one another part, though their
+  // linearised gap stays. Where they would overlap, at least the linearised gap is asked for, which is never
+  // more than that of two spheres. A contact that turns too far is left as it is; `shorten yes` takes its gap for
+  // an excess. Not for bad starts. Returns how many constraints changed.
+  long hold(std::size_t c, double gap_at_end, double opening, double along);
+
   // Lets constraints of free spheres that these velocities leave beyond the tolerance ask for their
   // present gap, as rigid contacts: what they asked for at the start went by what velocities of the last
   // step were resolved to, and those of this step may be known less well. Returns how many.
@@ -63,6 +73,8 @@ class GapRules {
 
  private:
   double contact_gap(const Side &side) const;
+  double gap_by_law(const Side &side, const LawContact &contact) const;
+  double held_gap(double gap, double predicted_speed) const;
   // [length] of constraint c with these velocities, along a straight line.
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 

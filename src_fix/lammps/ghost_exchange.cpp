@@ -13,7 +13,7 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-constexpr int REDUCED_SUMS = 4;
+constexpr int REDUCED_SUMS = 5;
 constexpr int REDUCED_MAXIMA = 8;
 
 struct Reduced {
@@ -81,10 +81,26 @@ void GhostExchange::sum_over_chosen_ghosts(float *per_particle)
   exchange(Exchange::CHOSEN_SINGLE, true, true);
 }
 
-void GhostExchange::gather_memory(ContactMemory &memory)
+void GhostExchange::gather(ContactMemory &memory)
 {
   exchanged_memory_ = &memory;
   exchange(Exchange::MEMORY, true, false);
+}
+
+// A ghost may get more to tell from other ghosts of the same atom while it tells what it has.
+void GhostExchange::gather(LawMemory &memory)
+{
+  if (!has_ghosts()) return;
+  static_assert(LawMemory::packed_size(LawMemory::ENTRIES_PER_MESSAGE) <= REVERSE_SIZE,
+                "LAMMPS sizes its buffers by REVERSE_SIZE");
+  exchanged_law_memory_ = &memory;
+  while (true) {
+    double unsent =
+        static_cast<double>(memory.number_unsent(atom->nlocal, atom->nlocal + atom->nghost));
+    reduce(&unsent, 1, nullptr, 0);
+    if (unsent == 0.0) return;
+    exchange(Exchange::LAW_MEMORY, true, false);
+  }
 }
 
 // In the reverse communication ghosts tell their owned atoms, in the forward communication after it
@@ -129,6 +145,11 @@ int GhostExchange::pack_reverse(int n, int first, double *buffer)
         m += exchanged_memory_->pack(first + k, buffer + m, ContactMemory::SHARED_PARTNERS);
       return m;
     }
+    case Exchange::LAW_MEMORY: {
+      int m = 0;
+      for (int k = 0; k < n; ++k) m += exchanged_law_memory_->pack_unsent(first + k, buffer + m);
+      return m;
+    }
     case Exchange::CHOICE:
       return chosen_ghosts_.pack_choice(n, first, buffer);
     case Exchange::CHOSEN:
@@ -148,6 +169,9 @@ void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
   switch (exchanging_) {
     case Exchange::MEMORY:
       for (int k = 0, m = 0; k < n; ++k) m += exchanged_memory_->unpack(list[k], buffer + m);
+      return;
+    case Exchange::LAW_MEMORY:
+      for (int k = 0, m = 0; k < n; ++k) m += exchanged_law_memory_->unpack(list[k], buffer + m);
       return;
     case Exchange::CHOICE:
       chosen_ghosts_.unpack_choice(n, list, buffer);

@@ -7,6 +7,7 @@
 #include "chosen_ghosts.h"
 #include "contact_memory.h"
 #include "host.h"
+#include "law_memory.h"
 #include "phase_clock.h"
 
 #include "pointers.h"
@@ -40,7 +41,8 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   bool has_ghosts() const override;
 
   // Adds to each owned atom the contacts that its ghosts remember.
-  void gather_memory(ContactMemory &memory);
+  void gather(ContactMemory &memory);
+  void gather(LawMemory &memory);
 
   int pack_forward(int n, const int *list, double *buffer) const;
   void unpack_forward(int n, int first, const double *buffer);
@@ -62,7 +64,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
 
  private:
   // The pack and unpack functions work on one of these.
-  enum class Exchange { VECTORS, MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
+  enum class Exchange { VECTORS, MEMORY, LAW_MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
 
   void exchange(Exchange what, bool reverse, bool forward);
 
@@ -74,6 +76,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   double *exchanged_ = nullptr;          // VECTORS: 3 numbers per particle; CHOSEN: 4
   float *exchanged_single_ = nullptr;    // 4 numbers per particle
   ContactMemory *exchanged_memory_ = nullptr;
+  LawMemory *exchanged_law_memory_ = nullptr;
   ChosenGhosts chosen_ghosts_;
 };
 

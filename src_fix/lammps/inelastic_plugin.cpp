@@ -1,7 +1,9 @@
 // Registers the fixes and the command when LAMMPS loads this file as a plugin.
 
+#include "contact_law_plugin.h"
 #include "fix_inelastic.h"
 #include "fix_random_force.h"
+#include "make_law.h"
 #include "parameters.h"
 
 #include "comm.h"
@@ -9,6 +11,7 @@
 #include "lammps.h"
 
 #include <cstring>
+#include <string>
 
 using namespace LAMMPS_NS;
 
@@ -34,6 +37,20 @@ typedef struct {
 typedef void (*lammpsplugin_regfunc)(lammpsplugin_t *, void *);
 
 __attribute__((visibility("default"))) void lammpsplugin_init(void *, void *, void *);
+
+// Plugins with contact laws find this function here: LAMMPS loads plugins so that they see one another.
+__attribute__((visibility("default"))) void
+inelastic_add_contact_law(void *lammps, int version, const char *name, inelastic::MakeLaw make)
+{
+  Error *const error = static_cast<LAMMPS *>(lammps)->error;
+  if (version != inelastic::CONTACT_LAW_VERSION)
+    error->all(FLERR,
+               "The plugin of contact law {} was built for version {} of contact laws, this is "
+               "version {}: build it again",
+               name, version, inelastic::CONTACT_LAW_VERSION);
+  const std::string wrong = inelastic::add_law(name, make);
+  if (!wrong.empty()) error->all(FLERR, "The plugin of contact law {}: {}", name, wrong);
+}
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include "contact_memory.h"
 #include "entangled_bodies.h"
 #include "gap_rules.h"
+#include "law_contacts.h"
 #include "rigid_motion.h"
 
 #include "atom.h"
@@ -35,10 +36,10 @@ bool ends_beyond(double reach, const double *away, double h, const double *openi
 
 }    // namespace
 
-PairConstraints::PairConstraints(LAMMPS *lmp, Step &step, GapRules &rules,
+PairConstraints::PairConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
                                  const EntangledBodies &entangled, const ContactMemory &memory,
                                  const RigidMotion *bodies) :
-    Pointers(lmp), step_(step), rules_(rules), entangled_(entangled), memory_(memory),
+    Pointers(lmp), step_(step), rules_(rules), laws_(laws), entangled_(entangled), memory_(memory),
     bodies_(bodies)
 {
 }
@@ -93,7 +94,7 @@ void PairConstraints::collect(double margin)
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
     const double touching = radius[i] + radius[j];
     const double reach = touching + margin;
-    if (dot(away, away) > reach * reach) {
+    if (dot(away, away) > reach * reach && !is_remembered(i, j, away)) {
       if (ends_beyond(touching + widest, away, h, opening)) return;
       if (ends_beyond(reach, away, h, opening)) {
         if (scanned_) near_pairs_.push_back({slot, i, j});
@@ -136,10 +137,21 @@ void PairConstraints::take(std::size_t slot, int i, int j)
     return;
   }
   Side side = {0, gap, size, 0.0};
+  laws_.ask(side, i, j, atom->tag[j], normal, rules_.overlaps().is_bad(gap));
   rules_.rest(side, memory_.find(i, atom->tag[j]), i, j, normal);
   problem.contacts.add(i, j, normal, rules_.asked_gap(side), step_.impulse_per_force * side.force,
-                       side.compliance);
+                       side.compliance, step_.least_impulse(side));
   step_.sides.push_back(side);
+}
+
+// A pair that the contact law remembers is in the problem even if it is farther apart than others in it.
+bool PairConstraints::is_remembered(int i, int j, const double *away) const
+{
+  if (!laws_.has_law()) return false;
+  const double distance = norm(away);
+  const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
+  const double gap = distance - atom->radius[i] - atom->radius[j];
+  return laws_.remembers(i, atom->tag[j], normal, gap);
 }
 
 double PairConstraints::gap_at_end(int i, int j, double *away) const
@@ -212,20 +224,22 @@ double PairConstraints::change_since_scan() const
 
 long PairConstraints::relinearise()
 {
-  constexpr double LEAST_ALONG = 0.5;    // the line between the spheres turns by 60 degrees
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const std::vector<double> &velocity = step_.velocity;
   double away[3];
-  auto relinearised_gap = [&](std::size_t c, double gap) {
+  auto opening = [&](std::size_t c) {
     const double *const n = &contacts.normal[3 * c];
-    double opening = 0.0;
+    double speed = 0.0;
     for (int d = 0; d < 3; ++d)
-      opening +=
-          n[d] * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
-    const double along = std::max(LEAST_ALONG, dot(n, away) / norm(away));
+      speed += n[d] * (velocity[3 * contacts.first[c] + d] - velocity[3 * contacts.second[c] + d]);
+    return step_.problem.timestep * speed;
+  };
+  auto relinearised_gap = [&](std::size_t c, double gap) {
+    const double along =
+        std::max(GapRules::LEAST_ALONG, dot(&contacts.normal[3 * c], away) / norm(away));
     const Side &side = step_.sides[c];
     const double lacking = gap - rules_.wanted_gap(side);
-    return (lacking < 0.0 ? lacking / along : lacking) - step_.problem.timestep * opening;
+    return (lacking < 0.0 ? lacking / along : lacking) - opening(c);
   };
 
   const bool may_change = step_.relinearisations <= GapRules::MAX_RELINEARISATIONS;
@@ -233,10 +247,17 @@ long PairConstraints::relinearise()
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const Side &side = step_.sides[c];
     const int i = contacts.first[c], j = contacts.second[c];
-    if (side.wall != 0 || !(step_.is_member(i) || step_.is_member(j))) continue;
+    const bool may_hold = contacts.least[c] < 0.0;
+    if (side.wall != 0 || !(may_hold || step_.is_member(i) || step_.is_member(j))) continue;
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
     const bool too_deep = rules_.ends_too_deep(side, gap);
+    if (may_hold && step_.phase == Phase::CONTACT && !rules_.overlaps().is_bad(side.gap_now)) {
+      const double along = dot(&contacts.normal[3 * c], away) / norm(away);
+      changed += rules_.hold(c, gap, opening(c), along);
+      continue;
+    }
+    if (!(step_.is_member(i) || step_.is_member(j))) continue;
     if ((too_deep || side.followed) && may_change)
       changed += rules_.follow(c, relinearised_gap(c, gap), too_deep);
   }

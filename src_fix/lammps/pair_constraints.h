@@ -15,14 +15,16 @@ namespace LAMMPS_NS {
 class ContactMemory;
 class EntangledBodies;
 class GapRules;
+class LawContacts;
 class NeighList;
 class RigidMotion;
 
 class PairConstraints : protected Pointers {
  public:
   // `bodies` is null in a scene of free spheres.
-  PairConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, const EntangledBodies &entangled,
-                  const ContactMemory &memory, const RigidMotion *bodies);
+  PairConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
+                  const EntangledBodies &entangled, const ContactMemory &memory,
+                  const RigidMotion *bodies);
 
   void use(NeighList *list) { list_ = list; }
 
@@ -33,7 +35,7 @@ class PairConstraints : protected Pointers {
   // many.
   long add_violated();
 
-  // Makes the gaps of bodies exact for the present solution. The distance between turning bodies is not
+  // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The distance between turning bodies is not
   // convex. The length that the end of the step lacks beside the linearised gap is put into the gap of the
   // constraint; where the end has more, nothing changes. The normal stays that of the positions from
   // which the force acts: along any other, two opposite forces would be a couple, and angular momentum
@@ -50,10 +52,12 @@ class PairConstraints : protected Pointers {
   template <typename Visitor> void for_each_listed(Visitor &&visit) const;
   void take(std::size_t slot, int i, int j);
   double gap_at_end(int i, int j, double *away) const;
+  bool is_remembered(int i, int j, const double *away) const;
   double change_since_scan() const;
 
   Step &step_;
   GapRules &rules_;
+  LawContacts &laws_;
   const EntangledBodies &entangled_;
   const ContactMemory &memory_;
   const RigidMotion *bodies_;

@@ -205,11 +205,16 @@ void ProblemRecord::write(const inelastic::ProjectionResult &result) const
     if (step_.is_member(i) && all.place[i] == all.start[all.body[i]]) first_of_bodies.push_back(i);
   }
   Table of_atoms = atoms();
+  Table of_contacts = contacts();
+  if (step_.settings.law)
+    of_contacts.push_back({"least_impulse", 1, Column::REAL, [this](int c, double *out) {
+                             *out = step_.problem.contacts.least[c];
+                           }});
   const bool has_bodies = step_.has_bodies;
   if (has_bodies)
     for (const Column &column : members()) of_atoms.push_back(column);
   const std::vector<double> atom_rows = rows(of_atoms, owned);
-  const std::vector<double> contact_rows = rows(contacts(), constraints);
+  const std::vector<double> contact_rows = rows(of_contacts, constraints);
   const std::vector<double> body_rows = rows(bodies(), first_of_bodies);
   std::string message;
   if (comm->me == 0) {
@@ -220,7 +225,7 @@ void ProblemRecord::write(const inelastic::ProjectionResult &result) const
     file.add("iterations", static_cast<double>(result.iterations));
     add(file, of_atoms, sorted_by_first(atom_rows, width(of_atoms)));
     if (has_bodies) add(file, bodies(), body_rows);
-    add(file, contacts(), contact_rows);
+    add(file, of_contacts, contact_rows);
     const std::string path = utils::star_subst(step_.settings.record_file, update->ntimestep, 0);
     if (!file.write(path))
       message = fmt::format("cannot write the record {}: {}", path, utils::getsyserror());

@@ -108,7 +108,7 @@ Rest::Motion Rest::measure() const
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const bool fixed = step_.sides[c].wall != 0 || problem.inverse_mass[contacts.first[c]] == 0.0 ||
         problem.inverse_mass[contacts.second[c]] == 0.0;
-    if (fixed && contacts.impulse[c] > 0.0) maxima[SUPPORTED] = 1.0;
+    if (fixed && contacts.impulse[c] != 0.0) maxima[SUPPORTED] = 1.0;
     if (step_.sides[c].wall_motion != 0.0) maxima[DRIVEN] = 1.0;
   }
   ranks_.reduce(sums, 2, maxima, MAXIMA);

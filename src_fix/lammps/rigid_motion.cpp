@@ -41,21 +41,28 @@ std::string RigidMotion::find_bodies()
 void RigidMotion::predict()
 {
   measure();
-  gather_momenta();
-  for (std::size_t b = 0; b < bodies_.size(); ++b) predict_body(b);
+  if (step_.settings.law) predict_bodies(0.0, step_.velocity_before);
+  predict_bodies(step_.impulse_per_force, step_.problem.predicted_velocity);
   predicted_ = step_.problem.predicted_velocity;
   pushing_ = stopping_ = false;
 }
 
+// Sets the velocities of members (3 per particle) after forces have acted for a time, in units that turn a
+// force into a momentum.
+void RigidMotion::predict_bodies(double kick, std::vector<double> &velocity)
+{
+  gather_momenta(kick);
+  for (std::size_t b = 0; b < bodies_.size(); ++b) predict_body(b, velocity);
+}
+
 // Sets each member's part of its body's momenta, ghosts included.
-void RigidMotion::gather_momenta()
+void RigidMotion::gather_momenta(double kick)
 {
   const std::size_t size = 3 * static_cast<std::size_t>(step_.problem.particles);
   linear_.assign(size, 0.0);
   change_.assign(size, 0.0);
   carried_part_.assign(size, 0.0);
   const bool carried = step_.continues;
-  const double kick = step_.impulse_per_force;
   for (int i = 0; i < atom->nlocal; ++i) {
     const int b = step_.problem.bodies.body[i];
     if (b < 0) continue;
@@ -107,7 +114,7 @@ void RigidMotion::take_carried(int i)
           SPHERE_MOMENT * mass_of(atom, i) * atom->radius[i] * atom->radius[i] * atom->omega[i][d];
 }
 
-void RigidMotion::predict_body(std::size_t b)
+void RigidMotion::predict_body(std::size_t b, std::vector<double> &velocity)
 {
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
   Body &body = bodies_[b];
@@ -130,8 +137,7 @@ void RigidMotion::predict_body(std::size_t b)
     double around[3];
     cross(spin, &bodies.arm[3 * k], around);
     for (int d = 0; d < 3; ++d)
-      step_.problem.predicted_velocity[3 * static_cast<std::size_t>(bodies.member[k]) + d] =
-          body.velocity[d] + around[d];
+      velocity[3 * static_cast<std::size_t>(bodies.member[k]) + d] = body.velocity[d] + around[d];
   }
 }
 

@@ -84,9 +84,10 @@ class RigidMotion final : public Mover, protected Pointers {
     Push stop;    // beyond what contacts do; see stop()
   };
 
-  void gather_momenta();
+  void gather_momenta(double kick);
   void take_carried(int i);
-  void predict_body(std::size_t b);
+  void predict_bodies(double kick, std::vector<double> &velocity);
+  void predict_body(std::size_t b, std::vector<double> &velocity);
   Push replace_push(int i, double *force);
   void keep(int i, const Push &push, const double *contact_force);
   double angle_of_first_momentum(int b) const;

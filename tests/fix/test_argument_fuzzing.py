@@ -117,6 +117,7 @@ NO_LENGTH = [
 NO_COUNT = ["0", "-5", "1.5", "1e5", "x", "nan", "99999999999999999999", "v_x", "*", "1;2"]
 RIGHT = {
     "region": ["container", "container lid", "lid container"],
+    "law": ["inelastic", "gluey", "gluey limit 0.5", "restitution 0", "restitution 1"],
     "solver": ["apgd", "uzawa"],
     "accuracy": ["1e-3", "1", "1e-9"],
     "maxiter": ["1000", "100000", "1000 warn", "2147483648"],
@@ -127,6 +128,17 @@ RIGHT = {
 WRONG = {
     "region": ["", "nowhere", "container nowhere", "box2", "1", "*"],
     "rigid": ["", "motion", "motion point", "nofix solid", "motion cube", "gravity point"],
+    "law": [
+        "",
+        "elastic",
+        "Gluey",
+        "inelastic 1",
+        "gluey limit",
+        "gluey 0.5",
+        *(f"gluey limit {value}" for value in ("0", "-1", "nan", "inf", "1e999", "x", "1 2")),
+        *(f"restitution {value}" for value in ("", "1.1", "-0.1", "nan", "x", "0.5 0.5", "0,5")),
+        "gluey law restitution 0.5",
+    ],
     "solver": ["", "newton", "APGD", "apgd2", "0"],
     "accuracy": ["", "0", "-1", "1.0001", "nan", "inf", "loose"],
     "maxiter": ["", "warn", "10 warning", "10 10", *NO_COUNT],

@@ -523,6 +523,7 @@ def packings(tmp_path_factory: pytest.TempPathFactory) -> Path:
             {"packing": "clusters"},
             "is a packing of dimers or clusters, this deck needs",
         ),
+        ("gluey", {"packing": "dimers"}, "is a packing of dimers or clusters, this deck needs"),
         ("settling", {"packing": "dimers"}, "particle must be dimers, not spheres"),
         ("settling", {"packing": "clusters"}, "particle must be dimers, not spheres"),
         (
@@ -536,6 +537,7 @@ def packings(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "is a packing of clusters, this deck needs spheres or dimers",
         ),
         ("response", {"packing": "spheres", "diameter": 0.1}, "diameter must be that of the large"),
+        ("gluey", {"packing": "spheres", "diameter": 0.1}, "diameter must be that of the largest"),
         ("settling", {"packing": "spheres", "diameter": 0.1}, "diameter must be that of the large"),
         ("settling", {"packing": "spheres", "diameter": 0.12}, "diameter must be that of the larg"),
         (

@@ -1,0 +1,126 @@
+#include "law_contacts.h"
+
+#include "ghost_exchange.h"
+
+#include "atom.h"
+
+#include <algorithm>
+#include <cmath>
+
+using namespace LAMMPS_NS;
+using inelastic::Demand;
+
+namespace {
+
+// [length / time] Without that of a wall, for which j is the number of particles.
+double parting_speed(const std::vector<double> &velocity, int particles, int i, int j,
+                     const double *normal)
+{
+  double speed = 0.0;
+  for (int d = 0; d < 3; ++d)
+    speed += normal[d] * (velocity[3 * i + d] - (j < particles ? velocity[3 * j + d] : 0.0));
+  return speed;
+}
+
+}    // namespace
+
+const LawMemory::Entry *LawContacts::find(int i, tagint partner, const double *normal,
+                                          double gap) const
+{
+  // Nothing has moved since the last step when a run starts, in which the surfaces may have collided from afar.
+  if (step_.kick == Kick::HALF) return memory_.find(i, partner, normal);
+  const double tolerance = std::max(last_tolerance_, step_.settings.tolerance);
+  return gap <= REGULAR_OVERLAP * tolerance ? memory_.find(i, partner, normal) : nullptr;
+}
+
+void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *normal,
+                      bool bad_start)
+{
+  if (!has_law()) return;
+  const inelastic::ContactProblem &problem = step_.problem;
+  const double h = problem.timestep;
+  const double speed_of_wall = side.wall_motion / h;
+  const double speed_before = parting_speed(step_.velocity_before, problem.particles, i, j, normal);
+  LawContact contact{};
+  contact.predicted_speed =
+      parting_speed(problem.predicted_velocity, problem.particles, i, j, normal) - speed_of_wall;
+  const LawMemory::Entry *const last = find(i, partner, normal, side.gap_now);
+  if (last) {
+    contact.known = true;
+    contact.remembered = last->remembered;
+    contact.last_impulse = last->impulse;
+  }
+  const inelastic::ContactState state = {h, side.gap_now, speed_before - speed_of_wall,
+                                         contact.predicted_speed};
+  Demand &demand = contact.demand;
+  demand = step_.settings.law->ask(state, contact.remembered.data());
+  demand.least_impulse = std::min(0.0, demand.least_impulse + taken_before(contact));
+  // The velocities at the start of a run are half way through a collision of the last step, if they are
+  // those with which it ended. (Spheres of bodies turn a little.)
+  constexpr double SAME = 0.05;
+  if (is_repeated(contact) && last->demand.parts &&
+      std::abs(speed_before - last->speed) <= SAME * last->demand.parting_speed) {
+    demand.parts = true;
+    demand.parting_speed = last->demand.parting_speed;
+  }
+  if (bad_start) demand.parts = false;
+  side.law_contact = static_cast<int>(step_.law_contacts.size());
+  step_.law_contacts.push_back(contact);
+}
+
+// Several constraints can be one contact: planes at a curved wall.
+void LawContacts::take_impulses()
+{
+  for (std::size_t c = 0; c < step_.sides.size(); ++c)
+    if (LawContact *const contact = step_.law_contact(step_.sides[c]))
+      contact->impulse += step_.problem.contacts.impulse[c];
+  for (LawContact &contact : step_.law_contacts)
+    contact.kept = step_.settings.law->remember(contact.impulse - taken_before(contact),
+                                                contact.remembered.data());
+}
+
+// In the half kick with which a run starts velocities are at the end of the last step already; the next run
+// may start with the same half kick.
+LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawContact &contact,
+                                       tagint partner) const
+{
+  const inelastic::ContactProblem &problem = step_.problem;
+  const int i = problem.contacts.first[c], j = problem.contacts.second[c];
+  const double *const n = &problem.contacts.normal[3 * c];
+  const double before = parting_speed(step_.velocity_before, problem.particles, i, j, n);
+  const double after = parting_speed(step_.velocity, problem.particles, i, j, n);
+  LawMemory::Entry entry;
+  entry.partner = partner;
+  std::copy_n(n, 3, entry.normal.begin());
+  entry.demand = contact.demand;
+  entry.impulse = contact.impulse / step_.kicks();
+  entry.speed = step_.kick == Kick::WHOLE ? 0.5 * (before + after) : before;
+  entry.remembered = contact.remembered;
+  return entry;
+}
+
+void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
+{
+  if (!has_law()) return;
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  for (int i = 0; i < step_.problem.particles; ++i) memory_.forget(i);
+  int last = -1;
+  for (std::size_t c = 0; c < step_.sides.size(); ++c) {
+    const Side &side = step_.sides[c];
+    const LawContact *const contact = step_.law_contact(side);
+    // The constraints that were added later for a contact come after all first ones.
+    if (!contact || side.law_contact <= last) continue;
+    last = side.law_contact;
+    if (!contact->kept && contact->demand.is_inelastic()) continue;
+    const int i = contacts.first[c], j = contacts.second[c];
+    const tagint partner = side.wall != 0 ? -side.wall : atom->tag[j];
+    LawMemory::Entry entry = entry_of(c, *contact, partner);
+    memory_.remember(i, entry);
+    if (side.wall != 0) continue;
+    entry.partner = atom->tag[i];
+    for (double &component : entry.normal) component = -component;
+    memory_.remember(j, entry);
+  }
+  ranks.gather(memory_);
+  last_tolerance_ = step_.settings.tolerance;
+}
