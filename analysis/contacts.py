@@ -1,12 +1,13 @@
 """Contact frames: LAMMPS's local text dump of the fix's contacts.
 
 MDAnalysis does not read local dumps, so this module does. Every row is a contact that carries a
-force: a positive multiplier, no distance criterion.
+force: a positive multiplier, no distance criterion. With the law gluey a row is a contact that
+carries a force, which may pull, or that has stored an impulse; the dump then has the column stored.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -26,6 +27,7 @@ from .errors import DumpError
 from .geometry import BoolArray, FloatArray, IntArray
 
 COLUMNS = ("id1", "id2", "x", "y", "z", "nx", "ny", "nz", "gap", "force")
+STORED = "stored"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,9 @@ class ContactFrame:
     points : (m, 3), contact point, length
     normals : (m, 3), unit vector from side 2 to side 1
     gaps : (m,), negative where the two overlap, length
-    forces : (m,), positive, force
+    forces : (m,), positive, force; with a law by which contacts pull of any sign, < 0 where they do
+    stored : (m,), impulse that presses them less what has pulled, <= 0, mass length/time; None if
+        contacts store nothing
     """
 
     step: int
@@ -48,6 +52,7 @@ class ContactFrame:
     normals: FloatArray
     gaps: FloatArray
     forces: FloatArray
+    stored: FloatArray | None = None
 
 
 def iterate_contact_frames(path: str | PathLike[str]) -> Iterator[ContactFrame]:
@@ -64,7 +69,9 @@ def iterate_contact_frames(path: str | PathLike[str]) -> Iterator[ContactFrame]:
 
 
 def _parsed_frame(rows: list[bytes], header: FrameHeader, path: Path) -> ContactFrame:
-    data = np.empty((0, len(COLUMNS)))
+    stores = STORED in header.columns
+    names = (*COLUMNS, STORED) if stores else COLUMNS
+    data = np.empty((0, len(names)))
     if rows:
         try:
             table = np.loadtxt(rows, comments=None, ndmin=2)
@@ -74,8 +81,8 @@ def _parsed_frame(rows: list[bytes], header: FrameHeader, path: Path) -> Contact
             raise malformed_row(rows, header, COLUMNS, path) or DumpError(
                 path, "every column must hold numbers", header.first_row_line
             )
-        data = table[:, [header.columns.index(name) for name in COLUMNS]]
-    _check(data, header, path)
+        data = table[:, [header.columns.index(name) for name in names]]
+    _check(data, names, header, path)
     return ContactFrame(
         step=header.step,
         ids=data[:, 0:2].astype(np.int64),
@@ -83,15 +90,16 @@ def _parsed_frame(rows: list[bytes], header: FrameHeader, path: Path) -> Contact
         normals=data[:, 5:8].copy(),
         gaps=data[:, 8].copy(),
         forces=data[:, 9].copy(),
+        stored=data[:, 10].copy() if stores else None,
     )
 
 
-def _check(data: FloatArray, header: FrameHeader, path: Path) -> None:
+def _check(data: FloatArray, names: Sequence[str], header: FrameHeader, path: Path) -> None:
     finite = np.isfinite(data)
     if not finite.all():
         row, column = np.argwhere(~finite)[0]
         raise DumpError(
-            path, f"{COLUMNS[column]} is {data[row, column]}", header.first_row_line + int(row)
+            path, f"{names[column]} is {data[row, column]}", header.first_row_line + int(row)
         )
     ids = data[:, 0:2]
     for wrong, message in (
@@ -103,7 +111,11 @@ def _check(data: FloatArray, header: FrameHeader, path: Path) -> None:
             "id1 must be a sphere's id and id2 a sphere's id or minus a wall's number",
         ),
         (ids[:, 0] == ids[:, 1], "a sphere is in contact with itself"),
-        (data[:, 9] <= 0, "the force of a contact must be positive"),
+        (
+            np.full(len(data), len(names) == len(COLUMNS)) & (data[:, 9] <= 0),
+            "the force of a contact must be positive",
+        ),
+        (data[:, len(COLUMNS) :].max(axis=1, initial=0.0) > 0, "stored must not be positive"),
         (_repeated(ids), "this pair of spheres is listed twice"),
     ):
         if wrong.any():

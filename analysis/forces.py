@@ -84,19 +84,25 @@ def force_distribution(
     bins : number of bins of the same width, from 0
     largest : upper edge of the last bin, in mean forces
 
-    Raises InputError for forces that are negative, not finite or all 0, and without any bin.
+    Where some forces pull (< 0) the mean is that of their strengths, and as many bins go down to
+    -`largest`. Raises InputError for forces that are not finite or all 0, and without any bin.
     """
     strength = np.asarray(forces, dtype=np.float64)
     if strength.ndim != 1 or len(strength) == 0:
         raise InputError(f"forces must have shape (m,) with m >= 1, not {strength.shape}")
-    if not ((strength >= 0) & np.isfinite(strength)).all() or not strength.any():
-        raise InputError("forces must be finite and not negative, and not all of them 0")
+    if not np.isfinite(strength).all() or not strength.any():
+        raise InputError("forces must be finite, and not all of them 0")
     if bins < 1 or not (largest > 0 and math.isfinite(largest)):
         raise InputError(
             f"at least one bin up to a positive force is needed, not {bins}, {largest}"
         )
-    mean = float(strength.mean())
-    numbers, edges = np.histogram(strength / mean, bins=bins, range=(0.0, largest))
+    mean = float(np.abs(strength).mean())
+    pulls = bool((strength < 0).any())
+    numbers, edges = np.histogram(
+        strength / mean,
+        bins=2 * bins if pulls else bins,
+        range=(-largest if pulls else 0.0, largest),
+    )
     scale = len(strength) * np.diff(edges)
     return ForceDistribution(
         edges=edges,

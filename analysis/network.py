@@ -51,10 +51,10 @@ def network_difference(
     ----------
     contact_ids : (m, 2), m >= 1, spheres on both sides, in either order; the second is -k for wall
         k. A contact that is there several times counts with the sum of its forces
-    forces : (m,), not negative, of a positive sum
+    forces : (m,), not all 0; < 0 where a contact pulls
     reference_ids, reference_forces : (r, 2) and (r,), likewise
 
-    Raises InputError for arrays of other shapes, and for forces that are negative or all 0.
+    Raises InputError for arrays of other shapes, and for forces that are not finite or all 0.
     """
     one = _shares(contact_ids, forces)
     other = _shares(reference_ids, reference_forces)
@@ -64,7 +64,7 @@ def network_difference(
 
 
 def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], float]:
-    """Return for each pair its share of all forces."""
+    """Return for each pair its share of the strengths of all forces, < 0 where it pulls."""
     ids = np.asarray(contact_ids, dtype=np.int64)
     strength = np.asarray(forces, dtype=np.float64)
     if ids.ndim != 2 or ids.shape[1] != 2 or strength.shape != (len(ids),):
@@ -73,11 +73,12 @@ def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], 
             f"{strength.shape}"
         )
     # This condition is written so that NaN fails too.
-    if not ((strength >= 0).all() and 0 < strength.sum() < np.inf):
-        raise InputError("forces must not be negative, and their sum must be positive and finite")
+    total = np.abs(strength).sum()
+    if not 0 < total < np.inf:
+        raise InputError("forces must be finite, and not all of them 0")
     shares: dict[tuple[int, int], float] = {}
     ordered = np.sort(ids, axis=1).tolist()
-    for (low, high), share in zip(ordered, (strength / strength.sum()).tolist(), strict=True):
+    for (low, high), share in zip(ordered, (strength / total).tolist(), strict=True):
         shares[low, high] = shares.get((low, high), 0.0) + share
     return shares
 
@@ -147,8 +148,8 @@ def draw_network(
 ) -> Axes:
     """Draw the edges between particles as lines between their centres; walls are not drawn.
 
-    Thickness and colour grow with the force, up to four times the mean force. Without forces all
-    lines look alike.
+    Thickness and colour grow with the force, up to four times the mean strength of a force.
+    Contacts that pull are dashed. Without forces all lines look alike.
 
     Parameters
     ----------
@@ -171,13 +172,27 @@ def draw_network(
     depth = 3 - up - across
     order = [across, depth, up] if isinstance(ax, Axes3D) else [across, up]
     # The strongest are drawn last, on top of the others.
-    rank = np.arange(len(ends)) if force is None else np.argsort(force, kind="stable")
+    rank = np.arange(len(ends)) if force is None else np.argsort(np.abs(force), kind="stable")
     lines: FloatArray = ends[rank][:, :, order]
     share = np.zeros(len(lines))
     if force is not None and len(force):
-        share = np.minimum(force[rank] / force.mean(), LARGEST_SHOWN)
-    widths = MEAN_WIDTH if force is None else np.maximum(share, 0.15) * MEAN_WIDTH
-    _add_lines(ax, lines, share, linewidths=widths, cmap=palette)
+        mean = np.abs(force).mean()
+        share = np.minimum(np.abs(force[rank]) / (mean if mean > 0 else 1.0), LARGEST_SHOWN)
+    widths = np.full(len(lines), MEAN_WIDTH)
+    pulls = np.zeros(len(lines), dtype=bool)
+    if force is not None:
+        widths = np.maximum(share, 0.15) * MEAN_WIDTH
+        pulls = force[rank] < 0
+    for chosen, style in ((~pulls, "solid"), (pulls, "dashed")):
+        if chosen.any() or style == "solid":
+            _add_lines(
+                ax,
+                lines[chosen],
+                share[chosen],
+                linewidths=widths[chosen],
+                cmap=palette,
+                linestyles=style,
+            )
     ax.set_xlabel("xyz"[across])
     ax.set_ylabel("xyz"[depth if isinstance(ax, Axes3D) else up])
     if isinstance(ax, Axes3D):

@@ -6,7 +6,8 @@ against the tolerance, `network` the floppy modes and states of self-stress of m
 `start` a regular start of dimers beside a random one, `inertia` point masses beside solid spheres,
 `turning` the look at the end of the step beside a program without it, which is built for this,
 `convergence` the error of exactly known motions against time step and tolerance, `rest` what motion
-is left in a bed. Every row is nine seeds unless --seeds says otherwise; `convergence` needs none.
+is left in a bed, `gluey` how long glued packings hang that were pressed for a time, with a picture.
+Every row is nine seeds unless --seeds says otherwise; `convergence` needs none.
 The paper's numbers are studies.
 """
 
@@ -19,6 +20,11 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+import matplotlib
+import numpy as np
+
+from lammps_inelastic.analysis import ParticleDump, draw_packing, read_run_log
+from lammps_inelastic.analysis.run_log import Run as RunOfLog
 from tests.beds import BEDS, at_rest
 from tests.benchmark.scenes_without import TURNING, build
 from tests.convergence import ACCURACIES, STEPS, TOLERANCES
@@ -318,7 +324,68 @@ def network(seeds: int) -> Iterator[str]:
             yield f"| {name} | {timestep:g} | {tolerance:g} | {' | '.join(columns)} |"
 
 
+def gluey(seeds: int) -> Iterator[str]:
+    """Print how long packings hang, and draw one of them into gluey.png."""
+    yield "| pressed for | hang for | contacts that hold: pressed | hanging | after letting go |"
+    yield "|---|---|---|---|---|"
+    timestep = 0.005
+    for steps in (20, 60, 180):
+        hung, counts = [], []
+        for seed in range(1, seeds + 1):
+            with tempfile.TemporaryDirectory() as name_of_folder:
+                folder = Path(name_of_folder)
+                run_deck(folder / "spheres", shipped_deck("spheres"), {"seed": seed})
+                variables: dict[str, object] = {
+                    "packing": folder / "spheres" / "packing.restart",
+                    "steps_pressed": steps,
+                    "steps_turned": 2 * steps + 20,
+                    "dt": timestep,
+                    "dump_every": 1,
+                }
+                run_deck(folder / "gluey", shipped_deck("gluey"), variables)
+                pressed, turned = read_run_log(folder / "gluey" / "log.lammps").runs[1:3]
+                held, floor = turned.thermo["held"], turned.thermo["force_floor"]
+                # The floor pulls until its contacts have let go.
+                let_go = int(np.flatnonzero(floor == 0.0)[0])
+                hung.append(float(turned.thermo["Time"][let_go] - turned.thermo["Time"][0]))
+                counts.append([pressed.thermo["held"][-1], held[let_go // 2], held[-1]])
+                if steps == 60 and seed == 1:
+                    draw_gluey(Path("gluey.png"), folder / "gluey", pressed, turned)
+        columns = [spread(list(column), 0) for column in zip(*counts, strict=True)]
+        yield f"| {steps * timestep:g} | {spread(hung, 3)} | {' | '.join(columns)} |"
+
+
+def draw_gluey(path: Path, folder: Path, pressed: RunOfLog, turned: RunOfLog) -> None:
+    """Draw frames of a run of gluey.in, and the contacts that hold against time."""
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    steps = (40, 100, 140, 160)
+    figure, axes = pyplot.subplots(
+        1, 5, figsize=(13, 4), layout="constrained", width_ratios=(1, 1, 1, 1, 2.2)
+    )
+    dump = ParticleDump(folder / "particles.lammpsdump")
+    for frame in dump:
+        if frame.step not in steps:
+            continue
+        ax = axes[steps.index(frame.step)]
+        picture = folder / f"{frame.step}.png"
+        draw_packing(picture, frame.positions, frame.radii, ((0, 1), (0, 5), (0, 1)), pixels=700)
+        ax.imshow(pyplot.imread(picture))
+        ax.set_axis_off()
+        ax.set_title(f"t = {0.005 * frame.step:g}")
+    for run, name in ((pressed, "pressed"), (turned, "turned over")):
+        axes[4].plot(run.thermo["Time"], run.thermo["held"], label=name)
+    axes[4].set_xlabel("time")
+    axes[4].set_ylabel("contacts that hold")
+    axes[4].set_ylim(0)
+    axes[4].legend()
+    figure.savefig(path, dpi=100)
+    pyplot.close(figure)
+
+
 TABLES = {
+    "gluey": gluey,
     "contacts": contacts,
     "near": near,
     "network": network,

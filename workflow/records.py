@@ -51,9 +51,13 @@ class Recorded:
         ]
 
     @property
-    def springs(self) -> dict[str, Any]:
-        """The argument of `core.project` for contacts at rest."""
-        return {"compliance": self.arrays["compliance"]}
+    def contact_laws(self) -> dict[str, Any]:
+        """The arguments of `core.project` for contacts at rest, and for those that may pull."""
+        arguments = {"compliance": self.arrays["compliance"]}
+        # Records of the inelastic law have no such array.
+        if "least_impulse" in self.arrays:
+            arguments["least_impulse"] = self.arrays["least_impulse"]
+        return arguments
 
     @property
     def bodies(self) -> dict[str, Any]:

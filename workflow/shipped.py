@@ -12,10 +12,10 @@ from pathlib import Path
 
 from .errors import WorkflowError
 
-# The deck that starts from a packing of spheres, and the one that lets a start fall until it rests.
+# The deck that changes walls or gravity, and the one that lets a start fall until it rests.
 RESPONSE, SETTLING = "response", "settling"
 # These are the names of the decks, in files with the ending `.in`.
-DECKS = ("spheres", "dimers", "clusters", RESPONSE, SETTLING)
+DECKS = ("spheres", "dimers", "clusters", RESPONSE, "gluey", SETTLING)
 # These are the names of the studies, in files with the ending `.toml`, in the order of the paper.
 STUDIES = (
     "table-1",

@@ -29,6 +29,22 @@ def test_numbers_survive(write_contacts: Writer) -> None:
     assert frame.forces.tolist() == [PAIR[9], WALL[9]]
 
 
+def test_contacts_that_pull(write_contacts: Writer) -> None:
+    """With what they have stored, forces may be of any sign; without it, they must push."""
+    columns = "id1 id2 x y z nx ny nz gap force stored"
+    rows = [[*PAIR[:9], -2.0, -0.5], [*WALL[:9], 0.0, -1.5]]
+    (frame,) = read(write_contacts({40: rows}, columns))
+    assert frame.forces.tolist() == [-2.0, 0.0]
+    assert frame.stored is not None
+    assert frame.stored.tolist() == [-0.5, -1.5]
+    with pytest.raises(DumpError, match="stored must not be positive"):
+        read(write_contacts({40: [[*PAIR, 0.5]]}, columns))
+    with pytest.raises(DumpError, match="the force of a contact must be positive"):
+        read(write_contacts({40: [[*PAIR[:9], -2.0]]}))
+    (frame,) = read(write_contacts({40: [PAIR]}))
+    assert frame.stored is None
+
+
 def test_frames_without_contacts(write_contacts: Writer) -> None:
     frames = read(write_contacts({0: [], 1: [PAIR], 2: []}))
     assert [frame.step for frame in frames] == [0, 1, 2]

@@ -72,12 +72,21 @@ def test_plot() -> None:
     assert len(plot_force_distribution(Figure().subplots(), none).lines[0].get_xdata()) == 0
 
 
+def test_forces_that_pull() -> None:
+    """The mean is that of the strengths, and as many bins go down as up."""
+    both = force_distribution([1, 1, -2, 4], bins=2, largest=4)
+    assert both.mean == 2.0
+    assert both.edges.tolist() == [-4, -2, 0, 2, 4]
+    # Three of the four in [0, 2) or [2, 4], in mean forces: 0.5, 0.5 and 2; -1 pulls.
+    assert both.density.tolist() == [0.0, 0.125, 0.25, 0.125]
+
+
 @pytest.mark.parametrize(
     ("forces", "options", "message"),
     [
         ([], {}, r"forces must have shape \(m,\) with m >= 1, not \(0,\)"),
-        ([1, -1], {}, "finite and not negative"),
-        ([1, np.nan], {}, "finite and not negative"),
+        ([1, np.inf], {}, "finite, and not all of them 0"),
+        ([1, np.nan], {}, "finite, and not all of them 0"),
         ([0, 0], {}, "not all of them 0"),
         ([1], {"bins": 0}, "at least one bin"),
         ([1], {"largest": 0}, "at least one bin up to a positive force"),

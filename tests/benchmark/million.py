@@ -20,14 +20,14 @@ PARTICLES = 1_000_000
 RANKS = 2
 CONTAINER = [[0, 1], [0, 5], [0, 1]]
 COMMON: dict[str, object] = {"tolerance": 0.005}
-SETTLING: dict[str, object] = {"time_settling": 1.8, "time_between": 0.45}
-# A step of 0.05 finds the contacts of a bed at rest.
+SETTLING: dict[str, object] = {"time_settling": 2.5, "time_between": 0.5}
+# A few steps find the contacts of a bed at rest.
 MEASURING: dict[str, object] = {
     "change": "tilt",
     "angle": 0,
-    "dt": 0.05,
-    "steps_changing": 20,
-    "steps_tightening": 4,
+    "dt": 0.02,
+    "steps_changing": 2,
+    "steps_tightening": 3,
     "steps_measuring": 2,
     "tolerance_measuring": 0.0005,
     "dump_every": 100,

@@ -104,7 +104,7 @@ def _solve(problem: Recorded, tolerance: float, **options: Any) -> Solved | None
             timestep=problem.timestep,
             tolerance=tolerance,
             max_iterations=MOST_ITERATIONS,
-            **(problem.springs | problem.bodies | options),
+            **(problem.contact_laws | problem.bodies | options),
         )
 
     result, seconds = timed(once)

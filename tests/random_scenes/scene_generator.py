@@ -780,11 +780,24 @@ class _Draw:
             words.append(f"maxiter {self.one(500, 5000, 20000)} warn")
             self.note("warn")
         group = "grains" if self.outside else "all"
+        words += self.law()
         self.random.shuffle(words)
         if not self.warn:
             # A step that needs more ends the run, with a line that is allowed, within the minute.
             words.append(ITERATIONS)
         return f"fix contact {group} inelastic ${{eps}} {' '.join(words)}"
+
+    def law(self) -> list[str]:
+        """The contact law, drawn apart from all else, so that scenes do not depend on it."""
+        random = np.random.default_rng([self.seed, self.attempt, 1])
+        kind = random.choice(["inelastic", "gluey", "restitution"], p=[0.6, 0.2, 0.2])
+        if kind == "inelastic":
+            return []
+        self.note(f"law {kind}")
+        if kind == "restitution":
+            return [f"law restitution {random.choice([0.0, 0.5, 0.9, 1.0])}"]
+        limit = 10.0 ** random.uniform(-9, 0)
+        return [random.choice(["law gluey", f"law gluey limit {limit:.3g}"])]
 
     def rigid(self) -> tuple[list[str], list[str]]:
         """The commands that define the bodies, and those that set up point masses, a run 0."""

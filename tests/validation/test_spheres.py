@@ -257,7 +257,7 @@ def test_projection_against_a_quadratic_programming_library(tight_records: list[
             tolerance=1e-12,
             max_iterations=1_000_000,
             impulse=problem.arrays["impulse"],
-            **problem.springs,
+            **problem.contact_laws,
         )
         assert further.converged
         largest = np.linalg.norm(problem.arrays["predicted_velocity"], axis=1).max()

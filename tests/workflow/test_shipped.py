@@ -107,7 +107,7 @@ MOST = re.compile(r"\bup to ([\d.e]+)(?![\d.e]*\w)")
 
 
 # A deck's table names what is not as in the table of another one.
-TABLE_OF = {"dimers": "spheres", "clusters": "dimers", "response": "spheres"}
+TABLE_OF = {"dimers": "spheres", "clusters": "dimers", "response": "spheres", "gluey": "spheres"}
 
 
 def documented(name: str) -> list[tuple[str, str, str]]:

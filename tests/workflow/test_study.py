@@ -36,7 +36,8 @@ def mistakes_of(path: Path) -> list[str]:
         ('title = "t"\ndeck = []', "deck: a deck is a name, or a list of names, not []"),
         (
             'title = "t"\ndeck = "sphere"\n[parameters]\nseed = 1\ndrag = 1',
-            "deck: no deck 'sphere': it must be spheres, dimers, clusters, response, settling or",
+            "deck: no deck 'sphere': it must be spheres, dimers, clusters, response, gluey, "
+            "settling or",
         ),
         (HEAD + "foo = 1", "foo: no such key; allowed are title, deck, parameters, rows, outputs"),
         (

@@ -15,7 +15,7 @@ from .case import Stage, takes_out
 from .file_format import Bounds
 
 # These decks leave the container as they found it, so that another one may go on in it.
-KEEPS_CONTAINER = ("spheres", "dimers", "clusters", SETTLING)
+KEEPS_CONTAINER = ("spheres", "dimers", "clusters", "gluey", SETTLING)
 # These variables describe the packing and not what is done to it.
 SHARED = ("diameter", "inertia")
 

@@ -177,7 +177,7 @@ def solve_state(start: str, moment: str, problem: Recorded) -> Iterator[Solved]:
             yield Solved(
                 start,
                 moment,
-                int((exact.impulse > 0).sum()),
+                int((exact.impulse != 0).sum()),
                 way.name,
                 value,
                 result.iterations,
@@ -208,14 +208,14 @@ def errors(
     def over(part: float, whole: float) -> float:
         return part / whole if whole > 0 else math.nan
 
-    there, exactly = impulse > 0, exact_impulse > 0
+    there, exactly = impulse != 0, exact_impulse != 0
     return {
         "velocity_error": over(
             float(np.linalg.norm(velocity - exact_velocity)),
             float(np.linalg.norm(predicted - exact_velocity)),
         ),
         "force_error": over(
-            float(np.abs(impulse - exact_impulse).sum()), float(exact_impulse.sum())
+            float(np.abs(impulse - exact_impulse).sum()), float(np.abs(exact_impulse).sum())
         ),
         "missed": over(float((exactly & ~there).sum()), float(exactly.sum())),
         "false": over(float((there & ~exactly).sum()), float(there.sum())),
@@ -226,7 +226,7 @@ def _project(problem: Recorded, **options: Any) -> core.Projection:
     return core.project(
         *problem.spheres,
         timestep=problem.timestep,
-        **(problem.springs | problem.bodies | options),
+        **(problem.contact_laws | problem.bodies | options),
     )
 
 
