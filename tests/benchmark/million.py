@@ -1,9 +1,9 @@
 """A million spheres: poured from random points until they are at rest, on two ranks.
 
 The shipped decks run with other parameters, and no change: `spheres.in` makes the start,
-`settling.in` lets it fall until it is at rest, and `response.in`, whose gravity is not tilted here,
-measures it. The tolerance is 0.005 radii. Packing fraction and coordination number are those of the
-box of the paper, as for every other packing; the pictures are of the first frames and the last.
+`settling.in` lets it fall until it is at rest. The tolerance is 0.005 radii, and the contacts are
+those of the last step. Packing fraction and coordination number are those of the box of the paper,
+as for every other packing; the pictures are of the first frames and the last.
 """
 
 from __future__ import annotations
@@ -21,17 +21,6 @@ RANKS = 2
 CONTAINER = [[0, 1], [0, 5], [0, 1]]
 COMMON: dict[str, object] = {"tolerance": 0.005}
 SETTLING: dict[str, object] = {"time_settling": 2.5, "time_between": 0.5}
-# A few steps find the contacts of a bed at rest.
-MEASURING: dict[str, object] = {
-    "change": "tilt",
-    "angle": 0,
-    "dt": 0.02,
-    "steps_changing": 2,
-    "steps_tightening": 3,
-    "steps_measuring": 2,
-    "tolerance_measuring": 0.0005,
-    "dump_every": 100,
-}
 
 
 def diameter_of(particles: int) -> float:
@@ -45,10 +34,6 @@ def pour(folder: Path, particles: int) -> str:
     stages: dict[str, tuple[str, dict[str, object]]] = {
         "start": ("spheres", {"particles": particles, **NO_STEPS}),
         "settling": ("settling", {"packing": folder / "start" / "packing.restart", **SETTLING}),
-        "measuring": (
-            "response",
-            {"packing": folder / "settling" / "packing.restart", **MEASURING},
-        ),
     }
     words = []
     for name, (deck, variables) in stages.items():
@@ -71,7 +56,7 @@ def measure(folder: Path, particles: int = PARTICLES) -> None:
     if not took.exists():
         took.write_text(pour(folder.absolute(), particles))
     print(f"{particles:,} spheres\n{took.read_text()}", flush=True)
-    packing = measure_packing(folder / "measuring")
+    packing = measure_packing(folder / "settling")
     assert packing.packing_fraction.value is not None
     print(
         f"packing fraction {100 * packing.packing_fraction.value:.2f} %, "

@@ -22,7 +22,7 @@ from tests.fix.scenes import (
 
 RADIUS = 0.5
 EPS = 1e-6
-COEFFICIENTS = (0.0, 0.3, 0.9, 1.0)
+COEFFICIENTS = (0.0, 0.01, 0.3, 0.9, 1.0)
 WIDE = ((-20.0, 20.0),) * 3
 # The velocities of a collision are solved to a thousandth of what contacts change.
 ACCURACY = 2e-3
