@@ -402,7 +402,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   overlaps.warn_of_unexpected();
   {
     const PhaseClock::Within within(clock_, PhaseClock::APPLY);
-    laws_.take_impulses();
+    if (laws_.has_law()) laws_.take_impulses();
     output_.take(result, length_.shortened_steps(),
                  {vflag_global != 0, vflag_atom != 0, virial, vatom});
     array_local = output_.local();
@@ -417,7 +417,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   restart_global = length_.is_shortened() || laws_.has_law();
   {
     const PhaseClock::Within within(clock_, PhaseClock::APPLY);
-    laws_.remember(atom, ranks_);
+    if (laws_.has_law()) laws_.remember(atom, ranks_);
     state_.remember_contacts(ranks_);
   }
   maxexchange = state_.exchange_size();

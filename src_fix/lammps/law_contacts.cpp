@@ -36,7 +36,6 @@ const LawMemory::Entry *LawContacts::find(int i, tagint partner, const double *n
 void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *normal,
                       bool bad_start)
 {
-  if (!has_law()) return;
   const inelastic::ContactProblem &problem = step_.problem;
   const double h = problem.timestep;
   const double speed_of_wall = side.wall_motion / h;
@@ -101,7 +100,6 @@ LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawContact &contact,
 
 void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
 {
-  if (!has_law()) return;
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   for (int i = 0; i < step_.problem.particles; ++i) memory_.forget(i);
   int last = -1;

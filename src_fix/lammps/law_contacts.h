@@ -1,5 +1,6 @@
 // The contacts of a step as the contact law sees them. Constraints ask here what the law asks of them, and
-// after the step the law takes the impulses. Without a law this room is empty.
+// after the step the law takes the impulses. Without a law this room is empty, and is asked for nothing but
+// whether there is one and what it remembers: nothing.
 
 #ifndef INELASTIC_LAW_CONTACTS_H
 #define INELASTIC_LAW_CONTACTS_H

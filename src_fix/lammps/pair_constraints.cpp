@@ -83,6 +83,7 @@ void PairConstraints::collect(double margin)
   near_pairs_.clear();
   if (scanned_) velocity_at_scan_ = step_.problem.predicted_velocity;
   const double widest = std::max(margin, NEAR * step_.largest_radius);
+  const bool has_law = laws_.has_law();
   std::size_t slots = 0;
   for (int ii = 0; ii < list_->inum; ++ii) slots += list_->numneigh[list_->ilist[ii]];
   taken_.assign(slots, 0);
@@ -94,7 +95,7 @@ void PairConstraints::collect(double margin)
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
     const double touching = radius[i] + radius[j];
     const double reach = touching + margin;
-    if (dot(away, away) > reach * reach && !is_remembered(i, j, away)) {
+    if (dot(away, away) > reach * reach && !(has_law && is_remembered(i, j, away))) {
       if (ends_beyond(touching + widest, away, h, opening)) return;
       if (ends_beyond(reach, away, h, opening)) {
         if (scanned_) near_pairs_.push_back({slot, i, j});
@@ -137,7 +138,7 @@ void PairConstraints::take(std::size_t slot, int i, int j)
     return;
   }
   Side side = {0, gap, size, 0.0};
-  laws_.ask(side, i, j, atom->tag[j], normal, rules_.overlaps().is_bad(gap));
+  if (laws_.has_law()) laws_.ask(side, i, j, atom->tag[j], normal, rules_.overlaps().is_bad(gap));
   rules_.rest(side, memory_.find(i, atom->tag[j]), i, j, normal);
   problem.contacts.add(i, j, normal, rules_.asked_gap(side), step_.impulse_per_force * side.force,
                        side.compliance, step_.least_impulse(side));
@@ -147,7 +148,6 @@ void PairConstraints::take(std::size_t slot, int i, int j)
 // A pair that the contact law remembers is in the problem even if it is farther apart than others in it.
 bool PairConstraints::is_remembered(int i, int j, const double *away) const
 {
-  if (!laws_.has_law()) return false;
   const double distance = norm(away);
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
   const double gap = distance - atom->radius[i] - atom->radius[j];

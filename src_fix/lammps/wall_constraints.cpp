@@ -154,7 +154,9 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
   const double motion = view.distance_now - view.distance;
   constraint_[key(i, view.wall)] = problem.contacts.size();
   Side side = {view.wall, gap_now, size, motion};
-  laws_.ask(side, i, problem.particles, -view.wall, view.normal, rules_.overlaps().is_bad(gap_now));
+  if (laws_.has_law())
+    laws_.ask(side, i, problem.particles, -view.wall, view.normal,
+              rules_.overlaps().is_bad(gap_now));
   rules_.rest(side, memory_.find(i, -view.wall), i, problem.particles, view.normal);
   problem.contacts.add(i, problem.particles, view.normal, rules_.asked_gap(side),
                        step_.impulse_per_force * side.force, side.compliance,
@@ -229,7 +231,8 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   }
   inelastic::ContactProblem &problem = step_.problem;
   // A wall that is seen late only pushes in this step.
-  if (!known) laws_.ask(side, i, problem.particles, -view.wall, view.normal, true);
+  if (!known && laws_.has_law())
+    laws_.ask(side, i, problem.particles, -view.wall, view.normal, true);
   constraint_[key(i, view.wall)] = problem.contacts.size();
   problem.contacts.add(i, problem.particles, view.normal, gap, 0.0);
   step_.sides.push_back(side);

@@ -155,21 +155,25 @@ def test_pressed_and_pulled_twice_as_hard(
     assert abs(steps_held(result) * step - duration / 2) <= step
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("kind", ["sphere", "dimer"])
 @pytest.mark.parametrize("where", ["while pressed", "while pulled", "when it opens"])
-def test_restarted(where: str, tmp_path: Path, lmp: Runner) -> None:
+def test_restarted(where: str, kind: str, ranks: int, tmp_path: Path, lmp: Runner) -> None:
     """What a contact has stored is in the restart file, also in the step in which it opens."""
     step, pressed = 0.01, 40
     box = ((-5.0, 5.0), (0.0, 50.0), (-5.0, 5.0))
     at = {"while pressed": 17, "while pulled": 53, "when it opens": 60}[where]
-    deck = deck_of([0.0, RADIUS, 0.0], tmp_path, box=box, timestep=step) + DUMP_PARTICLES
+    bodies = lying_dimer(RADIUS) if kind == "dimer" else None
+    deck = deck_of([0.0, RADIUS, 0.0], tmp_path, bodies=bodies, box=box, timestep=step)
+    deck += DUMP_PARTICLES
     changing = deck.replace("pull equal 0", f"pull equal {MASS:.17g}*(-1+3*(step>={pressed}))")
     (tmp_path / "whole").mkdir()
     (tmp_path / "whole" / "spheres.data").write_text((tmp_path / "spheres.data").read_text())
-    uncut = lmp(changing + "run 80\n", into="whole")
+    uncut = lmp(changing + "run 80\n", into="whole", ranks=ranks)
     end = read_dump(uncut.folder / "particles.dump")[-1]
-    lmp(changing + f"run {at}\nwrite_restart half.restart\n")
+    lmp(changing + f"run {at}\nwrite_restart half.restart\n", ranks=ranks)
     again = changing.replace("read_data spheres.data", "read_restart half.restart")
-    result = lmp(again + f"run {80 - at}\n")
+    result = lmp(again + f"run {80 - at}\n", ranks=ranks)
     last = read_dump(result.folder / "particles.dump")[-1]
     assert last.step == end.step == 80
     # A run that goes on solves the last step again, to the accuracy of the fix.
