@@ -40,14 +40,20 @@ double GapRules::gap_by_law(const Side &side, const LawContact &contact) const
       : gap;
 }
 
-// The surfaces of a held contact are brought back to one another, but by no more than velocities are resolved
-// to, or half as fast as they would part: this never adds to the kinetic energy.
 double GapRules::held_gap(double gap, double predicted_speed) const
 {
-  constexpr double PART = 0.5;
   const double h = step_.problem.timestep;
   const double target = std::min(step_.resolution * h, step_.settings.tolerance);
-  return std::clamp(gap, -target, std::max(target, PART * h * predicted_speed));
+  return std::clamp(gap, -target, most_closed(predicted_speed));
+}
+
+// [length] The surfaces of a held contact are brought back to one another by no more than velocities are resolved
+// to, or as fast as they would part: this adds nothing to the kinetic energy.
+double GapRules::most_closed(double predicted_speed) const
+{
+  const double h = step_.problem.timestep;
+  const double target = std::min(step_.resolution * h, step_.settings.tolerance);
+  return std::max(target, h * predicted_speed);
 }
 
 void GapRules::rest(Side &side, const ContactMemory::Contact &known, int i, int j,
@@ -133,8 +139,11 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     const LawContact *const law = step_.law_contact(side);
     if (law && law->demand.parts) continue;
     const double at_end = gap_at_end(c, velocity);
-    const bool open = contacts.impulse[c] == contacts.least[c];
-    if (at_end >= -tolerance && (at_end <= tolerance || open)) continue;
+    // A held contact is closed no faster than its gap asks for.
+    const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
+    const bool may_stay = holds || contacts.impulse[c] == 0.0;
+    if (at_end >= -tolerance && (at_end <= tolerance || may_stay)) continue;
+    if (contacts.impulse[c] > 0.0) contacts.least[c] = 0.0;
     contacts.gap[c] = linear_gap;
     contacts.compliance[c] = side.compliance = 0.0;
     side.as_at_start = false;
@@ -148,19 +157,23 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
   const double tolerance = step_.settings.tolerance;
   inelastic::ContactSet &contacts = step_.problem.contacts;
   Side &side = step_.sides[c];
-  const double exact = gap_at_end - opening;
-  double gap = exact;
+  double gap = gap_at_end - opening;
   if (gap_at_end < -tolerance) {
-    gap = std::min(exact, side.gap_now - side.wall_motion);
-    if (contacts.gap[c] == gap || step_.relinearisations > MAX_RELINEARISATIONS) return 0;
+    gap = std::min(gap, side.gap_now - side.wall_motion);
+    if (step_.relinearisations > MAX_RELINEARISATIONS) return 0;
   } else {
-    if (gap_at_end <= RELINEARISE_BEYOND * tolerance || !step_.holds(c)) return 0;
-    if (along < LEAST_ALONG || step_.relinearisations > MAX_RELINEARISATIONS / 2) {
-      if (step_.settings.shorten)
-        step_.excess = std::max(step_.excess, gap_at_end - REGULAR_OVERLAP * tolerance);
+    if (gap_at_end <= RELINEARISE_BEYOND * tolerance || !step_.holds(c) || along < LEAST_ALONG ||
+        step_.relinearisations > MAX_RELINEARISATIONS / 2)
       return 0;
+    if (contacts.impulse[c] > 0.0) {
+      // What approaches across a gap needs no pull, and no push before it touches.
+      contacts.least[c] = 0.0;
+    } else {
+      gap = std::min(gap, most_closed(step_.law_contact(side)->predicted_speed) - side.wall_motion);
+      if (gap <= contacts.gap[c]) return 0;
     }
   }
+  if (contacts.gap[c] == gap) return 0;
   contacts.gap[c] = gap;
   side.as_at_start = false;
   return 1;

@@ -53,9 +53,9 @@ class GapRules {
   // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the step: the exact
   // gap there is `gap_at_end`, the velocities open the linearised one by `opening` [length], and `along` is the
   // cosine of the angle by which the normal turns. Surfaces that turn about one another part, though their
-  // linearised gap stays. Where they would overlap, at least the linearised gap is asked for, which is never
-  // more than that of two spheres. A contact that turns too far is left as it is; `shorten yes` takes its gap for
-  // an excess. Not for bad starts. Returns how many constraints changed.
+  // linearised gap stays; they are closed by no more than most_closed(). Where they would overlap, at least the
+  // linearised gap is asked for, which is never more than that of two spheres. Not for bad starts. Returns how
+  // many constraints changed.
   long hold(std::size_t c, double gap_at_end, double opening, double along);
 
   // Lets constraints of free spheres that these velocities leave beyond the tolerance ask for their
@@ -75,6 +75,7 @@ class GapRules {
   double contact_gap(const Side &side) const;
   double gap_by_law(const Side &side, const LawContact &contact) const;
   double held_gap(double gap, double predicted_speed) const;
+  double most_closed(double predicted_speed) const;
   // [length] of constraint c with these velocities, along a straight line.
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 

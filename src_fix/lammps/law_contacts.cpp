@@ -24,13 +24,13 @@ double parting_speed(const std::vector<double> &velocity, int particles, int i, 
 
 }    // namespace
 
-const LawMemory::Entry *LawContacts::find(int i, tagint partner, const double *normal,
-                                          double gap) const
+const LawMemory::Entry *LawContacts::find(int i, tagint partner, const double *normal, double gap,
+                                          double size) const
 {
+  constexpr double PARTED = 0.1;    // of the sum of radii
   // Nothing has moved since the last step when a run starts, in which the surfaces may have collided from afar.
-  if (step_.kick == Kick::HALF) return memory_.find(i, partner, normal);
-  const double tolerance = std::max(last_tolerance_, step_.settings.tolerance);
-  return gap <= REGULAR_OVERLAP * tolerance ? memory_.find(i, partner, normal) : nullptr;
+  if (step_.kick == Kick::WHOLE && gap > PARTED * size) return nullptr;
+  return memory_.find(i, partner, normal);
 }
 
 void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *normal,
@@ -43,7 +43,7 @@ void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *no
   LawContact contact{};
   contact.predicted_speed =
       parting_speed(problem.predicted_velocity, problem.particles, i, j, normal) - speed_of_wall;
-  const LawMemory::Entry *const last = find(i, partner, normal, side.gap_now);
+  const LawMemory::Entry *const last = find(i, partner, normal, side.gap_now, side.size);
   if (last) {
     contact.known = true;
     contact.remembered = last->remembered;
@@ -98,6 +98,18 @@ LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawContact &contact,
   return entry;
 }
 
+// Tells whether the push out of a bad start parts the surfaces, which is no motion of a contact.
+bool LawContacts::is_pushed_apart(std::size_t c) const
+{
+  if (!step_.bad_start) return false;
+  const inelastic::ContactProblem &problem = step_.problem;
+  const Side &side = step_.sides[c];
+  const double speed = parting_speed(step_.motion(), problem.particles, problem.contacts.first[c],
+                                     problem.contacts.second[c], &problem.contacts.normal[3 * c]);
+  const double gap = side.gap_now - side.wall_motion + problem.timestep * speed;
+  return gap > REGULAR_OVERLAP * step_.settings.tolerance;
+}
+
 void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
@@ -110,6 +122,7 @@ void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
     if (!contact || side.law_contact <= last) continue;
     last = side.law_contact;
     if (!contact->kept && contact->demand.is_inelastic()) continue;
+    if (is_pushed_apart(c)) continue;
     const int i = contacts.first[c], j = contacts.second[c];
     const tagint partner = side.wall != 0 ? -side.wall : atom->tag[j];
     LawMemory::Entry entry = entry_of(c, *contact, partner);
@@ -120,5 +133,4 @@ void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
     memory_.remember(j, entry);
   }
   ranks.gather(memory_);
-  last_tolerance_ = step_.settings.tolerance;
 }

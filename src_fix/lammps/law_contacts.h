@@ -24,9 +24,10 @@ class LawContacts {
   // the answer for its `side`. Of a bad start the law only asks which impulse is allowed.
   void ask(Side &side, int i, int j, tagint partner, const double *normal, bool bad_start);
 
-  // Tells whether the law remembers a contact with this gap [length], which then belongs to the problem.
-  bool remembers(int i, tagint partner, const double *normal, double gap) const
-  { return has_law() && find(i, partner, normal, gap) != nullptr; }
+  // Tells whether the law remembers a contact with this gap and sum of radii [length], which then belongs to the
+  // problem.
+  bool remembers(int i, tagint partner, const double *normal, double gap, double size) const
+  { return has_law() && find(i, partner, normal, gap, size) != nullptr; }
   bool remembers_wall(int i) const { return has_law() && memory_.remembers_wall(i); }
 
   // Gives the law the impulses of a step that is solved.
@@ -43,16 +44,17 @@ class LawContacts {
   bool is_repeated(const LawContact &contact) const
   { return contact.known && step_.kick == Kick::HALF; }
 
-  // Looks for what is remembered of a contact with this gap [length]. One whose surfaces something else than a
-  // step has parted, such as the push out of a bad start, begins anew.
-  const LawMemory::Entry *find(int i, tagint partner, const double *normal, double gap) const;
+  // Looks for what is remembered of a contact with this gap and sum of radii [length]. One whose surfaces
+  // something else than a step has parted begins anew.
+  const LawMemory::Entry *find(int i, tagint partner, const double *normal, double gap,
+                               double size) const;
+  bool is_pushed_apart(std::size_t c) const;
 
   // What is to be remembered of constraint c, on its first side.
   LawMemory::Entry entry_of(std::size_t c, const LawContact &contact, tagint partner) const;
 
   Step &step_;
   LawMemory &memory_;
-  double last_tolerance_ = EXTREME;    // [length] of the last step; not known before the first
 };
 
 }    // namespace LAMMPS_NS

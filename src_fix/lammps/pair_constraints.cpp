@@ -150,8 +150,8 @@ bool PairConstraints::is_remembered(int i, int j, const double *away) const
 {
   const double distance = norm(away);
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
-  const double gap = distance - atom->radius[i] - atom->radius[j];
-  return laws_.remembers(i, atom->tag[j], normal, gap);
+  const double size = atom->radius[i] + atom->radius[j];
+  return laws_.remembers(i, atom->tag[j], normal, distance - size, size);
 }
 
 double PairConstraints::gap_at_end(int i, int j, double *away) const
@@ -247,7 +247,7 @@ long PairConstraints::relinearise()
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const Side &side = step_.sides[c];
     const int i = contacts.first[c], j = contacts.second[c];
-    const bool may_hold = contacts.least[c] < 0.0;
+    const bool may_hold = step_.may_hold(c);
     if (side.wall != 0 || !(may_hold || step_.is_member(i) || step_.is_member(j))) continue;
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);

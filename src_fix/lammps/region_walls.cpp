@@ -80,6 +80,13 @@ void RegionWalls::init()
   }
 }
 
+bool RegionWalls::any_moves() const
+{
+  return std::any_of(obstacles_.begin(), obstacles_.end(), [](const Obstacle &obstacle) {
+    return obstacle.moving;
+  });
+}
+
 void RegionWalls::warn() const
 {
   for (const Obstacle &obstacle : obstacles_)

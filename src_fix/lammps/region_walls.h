@@ -34,6 +34,7 @@ class RegionWalls : protected Pointers {
   void init();
 
   bool empty() const { return ids_.empty(); }
+  bool any_moves() const;
   int number_of_walls() const { return number_of_walls_; }
 
   // Warns of regions that LAMMPS cannot show in full.

@@ -122,6 +122,9 @@ struct Step {
   double least_impulse(const Side &side) const
   { return side.law_contact < 0 ? 0.0 : law_contacts[side.law_contact].demand.least_impulse; }
 
+  // Tells whether the law lets a constraint pull.
+  bool may_hold(std::size_t c) const { return least_impulse(sides[c]) < 0.0; }
+
   // Tells whether a constraint holds: it may pull, and with the present impulse it does not open.
   bool holds(std::size_t c) const
   {

@@ -36,19 +36,20 @@ WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawCo
 {
 }
 
-// Points from which to look at the walls from where atoms are, as far as the step takes them, or at all walls
-// where the contact law remembers one.
+// Points from which to look at the walls from where atoms are, as far as the step takes them.
 const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *velocity,
                                                                double beyond)
 {
   viewpoints_.clear();
   const double h = step_.problem.timestep;
+  // A wall that moves away from a sphere that it holds may be far at the end of the step.
+  const bool may_be_far = laws_.has_law() && walls_.any_moves();
   const double anywhere = std::max({domain->xprd, domain->yprd, domain->zprd});
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
     const double near = atom->radius[i] + beyond + h * norm(velocity + 3 * i);
-    const double reach = laws_.remembers_wall(i) ? std::max(near, anywhere) : near;
+    const double reach = may_be_far && laws_.remembers_wall(i) ? std::max(near, anywhere) : near;
     if (reach >= clear_of_walls_[i]) viewpoints_.push_back({i, {x[0], x[1], x[2]}, reach});
   }
   return viewpoints_;
@@ -86,7 +87,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
   for (std::size_t c = 0; c < step_.sides.size(); ++c) {
     const int i = step_.problem.contacts.first[c];
     const Side &side = step_.sides[c];
-    const bool may_hold = step_.problem.contacts.least[c] < 0.0;
+    const bool may_hold = step_.may_hold(c);
     if (side.wall == 0 || !(side.followed || may_hold)) continue;
     if (!step_.is_member(i) || bodies_->angle_turned(step_.problem, i) < HALF_A_TURN)
       followed.insert(i);
@@ -125,7 +126,7 @@ void WallConstraints::collect(double margin)
         rules_.overlaps().note(gap_now, from.atom, -view.wall);
         const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
         if (gap + std::min(0.0, opening) <= margin ||
-            laws_.remembers(from.atom, -view.wall, view.normal, gap_now))
+            laws_.remembers(from.atom, -view.wall, view.normal, gap_now, atom->radius[from.atom]))
           take(from, view);
       },
       [&](const RegionWalls::Viewpoint &from, const std::string &region) {
@@ -274,7 +275,7 @@ long WallConstraints::relinearise(double margin)
 bool WallConstraints::may_hold(std::size_t c, const double *normal_at_end) const
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
-  return contacts.least[c] < 0.0 && step_.phase == Phase::CONTACT &&
+  return step_.may_hold(c) && step_.phase == Phase::CONTACT &&
       !rules_.overlaps().is_bad(step_.sides[c].gap_now) &&
       dot(&contacts.normal[3 * c], normal_at_end) >= GapRules::LEAST_ALONG;
 }

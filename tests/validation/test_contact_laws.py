@@ -240,17 +240,14 @@ def test_projection_against_clarabel(kind: str, tmp_path: Path) -> None:
     phases = {"falling": 65, "pressed": steps + 95, "pulled": steps + 100}
     if kind == "crystal":
         del phases["falling"]
+    paths = list(tmp_path.glob("*.npz"))
+    assert len(paths) == (steps + 100) // 5
+    for path in paths:
+        check_motion(read(path))
     for name, number in phases.items():
-        with np.load(tmp_path / f"problem.{number}.npz") as file:
-            problem = {key: file[key] for key in file.files}
+        problem = read(tmp_path / f"problem.{number}.npz")
         before, after = problem["predicted_velocity"], problem["velocity"]
         m = problem["mass"]
-        energies = [0.5 * m @ (v**2).sum(axis=1) for v in (before, after)]
-        assert energies[1] <= energies[0] * (1 + 1e-9)
-        # The impulses make all of the change, so that momentum is kept to round-off.
-        gained = m[:, None] * (after - before)
-        made = (jacobian(problem).T @ problem["impulse"]).reshape(-1, 3)
-        assert np.abs(gained - made).max() <= 1e-12 * np.abs(m[:, None] * before).max()
         exact, impulse = solution(problem)
         fastest = np.abs(before).max()
         error = np.abs(after - exact).max() / fastest
@@ -260,6 +257,25 @@ def test_projection_against_clarabel(kind: str, tmp_path: Path) -> None:
         assert error <= 1e-6
         if name == "pulled":
             assert pulling > len(m) / 2
+
+
+def read(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as file:
+        return {key: file[key] for key in file.files}
+
+
+def check_motion(problem: dict[str, np.ndarray]) -> None:
+    """See that the projection of a step keeps momentum, and adds no kinetic energy."""
+    before, after, m = problem["predicted_velocity"], problem["velocity"], problem["mass"]
+    # Impulses, which act on both sides of a contact, make all of the change, to round-off.
+    gained = m[:, None] * (after - before)
+    made = (jacobian(problem).T @ problem["impulse"]).reshape(-1, 3)
+    assert np.abs(gained - made).max() <= 1e-12 * np.abs(m[:, None] * before).max()
+    # What an overlap or a gap within the tolerance gives back is no more than velocities are
+    # resolved to, a thousandth of what contacts change.
+    energies = [0.5 * m @ (v**2).sum(axis=1) for v in (before, after)]
+    changed = 0.5 * m @ ((after - before) ** 2).sum(axis=1)
+    assert energies[1] <= energies[0] + 1e-3 * changed
 
 
 def solution(problem: dict[str, np.ndarray]) -> tuple[FloatArray, FloatArray]:
