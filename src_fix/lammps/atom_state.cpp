@@ -48,6 +48,11 @@ void AtomState::remember_contacts(GhostExchange &ranks)
     if (!wall) memory_.remember(j, atom->tag[i], contact);
   }
   ranks.gather(memory_);
+  measure_messages(ranks);
+}
+
+void AtomState::measure_messages(GhostExchange &ranks)
+{
   double most[2] = {0.0, 0.0};
   for (int i = 0; i < atom->nlocal; ++i) {
     most[0] = std::max(most[0], static_cast<double>(memory_.number_of_partners(i)));

@@ -44,6 +44,10 @@ class AtomState : protected Pointers {
   // the pair from the other side, and atoms may migrate before it is built. Collective.
   void remember_contacts(GhostExchange &ranks);
 
+  // Finds how long the messages of an atom are: after each step, and where a restart file has brought what the law
+  // remembers, before LAMMPS hands atoms to other ranks or writes another file. Collective.
+  void measure_messages(GhostExchange &ranks);
+
   // LAMMPS's callbacks.
   void grow(int atoms);
   void copy(int from, int to);

@@ -158,6 +158,8 @@ void FixInelastic::init()
         walls.number_of_walls(), walls_before, id);
   walls.warn();
   check_.begin_run();
+  state_.measure_messages(ranks_);
+  maxexchange = state_.exchange_size();
   // With newton off LAMMPS makes its buffers for reverse communication as large as the pair style
   // needs them, whatever fixes need.
   if (!force->newton && force->pair)

@@ -180,6 +180,17 @@ def test_restarted(where: str, kind: str, ranks: int, tmp_path: Path, lmp: Runne
     assert last.rows == pytest.approx(end.rows, abs=SUMMED)
 
 
+def test_a_restart_file_of_a_restart_file(tmp_path: Path, lmp: Runner) -> None:
+    """A file that is written before the first run holds all that the file before it held."""
+    box = ((-5.0, 5.0), (0.0, 50.0), (-5.0, 5.0))
+    deck = deck_of([0.0, RADIUS, 0.0], tmp_path, box=box, timestep=0.01)
+    lmp(deck + pull(-1.0) + "run 40\nwrite_restart one.restart\n")
+    lmp(deck.replace("read_data spheres.data", "read_restart one.restart") + "write_restart two\n")
+    again = deck.replace("read_data spheres.data", "read_restart two")
+    result = lmp(again + pull(2.0) + "run 40\n")
+    assert abs(steps_held(result) - 20) <= 1
+
+
 def test_restarted_without_its_memory(
     tmp_path: Path, lmp: Runner, refused: Callable[..., str]
 ) -> None:
