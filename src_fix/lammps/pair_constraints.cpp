@@ -14,6 +14,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 
 using namespace LAMMPS_NS;
 using inelastic::dot;
@@ -21,9 +23,12 @@ using inelastic::norm;
 
 namespace {
 
-// Pairs whose gap at the end of the step is smaller than this part of the largest radius are looked at in every
-// round of the step. (With a fifth of it spheres that are shaken move too far for it in most steps.)
+// A particle may move farther in a round than was allowed for by half of this part of the largest radius,
+// before the list is searched again. (With a fifth of it spheres that are shaken do so in most steps.)
 constexpr double NEAR = 1.0;
+
+// A coordinate in single precision is off by at most this part of it; so are sums of a few.
+constexpr float SINGLE = 4.0f * std::numeric_limits<float>::epsilon();
 
 // Tells whether the distance at the end of the step, linearised, |a| + h a.o / |a|, is more than `reach` > 0,
 // for a = `away` and o = `opening`, the relative velocity. It takes no root for pairs of the list.
@@ -44,29 +49,68 @@ PairConstraints::PairConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawCo
 {
 }
 
-template <typename Visitor> void PairConstraints::for_each_listed(Visitor &&visit) const
+// Takes into account where a particle is, and how far it goes in the step with this velocity.
+void PairConstraints::note_motion(const std::vector<double> &velocity)
 {
+  const double h = step_.problem.timestep;
+  for (std::size_t i = 0; i < motion_.size(); ++i)
+    motion_[i] = std::max(motion_[i], h * norm(&velocity[3 * i]));
+}
+
+// Two particles whose distance is above the sum of their ranges can neither touch at the end of the step
+// nor be nearer than `widest_`, though they may move by half of `widest_` more than was known. The ranges
+// are in single precision so that a particle takes 16 bytes: the search is bound by the memory.
+void PairConstraints::search_list()
+{
+  const double *const *const x = atom->x;
+  const std::size_t particles = motion_.size();
+  ranges_.resize(particles);
+  allowed_.resize(particles);
+  for (std::size_t i = 0; i < particles; ++i) {
+    allowed_[i] = motion_[i] + 0.5 * widest_;
+    const double off = std::max({std::abs(x[i][0]), std::abs(x[i][1]), std::abs(x[i][2])});
+    const double range =
+        atom->radius[i] + allowed_[i] + SINGLE * (off + atom->radius[i] + allowed_[i]);
+    for (int d = 0; d < 3; ++d) ranges_[i].centre[d] = static_cast<float>(x[i][d]);
+    ranges_[i].range = static_cast<float>(range);
+  }
+
   const int *const mask = atom->mask;
   const tagint *const tag = atom->tag;
   const int nlocal = atom->nlocal;
   const int group_bit = step_.settings.group_bit;
   const std::vector<int> &body = step_.problem.bodies.body;
-  std::size_t slot = 0;
+  const bool has_law = laws_.has_law();
+  candidates_.clear();
+  std::size_t first_slot = 0;
   for (int ii = 0; ii < list_->inum; ++ii) {
     const int i = list_->ilist[ii];
     const int *const neighbours = list_->firstneigh[i];
     const int count = list_->numneigh[i];
-    if (!(mask[i] & group_bit)) {
-      slot += count;
-      continue;
-    }
-    for (int jj = 0; jj < count; ++jj, ++slot) {
+    const std::size_t slot = first_slot;
+    first_slot += count;
+    if (!(mask[i] & group_bit)) continue;
+    if (row_.size() < static_cast<std::size_t>(count)) row_.resize(count);
+    const Range own = ranges_[i];
+    int found = 0;
+    for (int jj = 0; jj < count; ++jj) {
       const int j = neighbours[jj] & NEIGHMASK;
+      const Range &other = ranges_[j];
+      const float away[3] = {own.centre[0] - other.centre[0], own.centre[1] - other.centre[1],
+                             own.centre[2] - other.centre[2]};
+      const float reach = own.range + other.range;
+      const float square = away[0] * away[0] + away[1] * away[1] + away[2] * away[2];
+      row_[found] = jj;
+      // What is not a number is not beyond the reach.
+      found += !(square > reach * reach) || (has_law && is_remembered(i, j));
+    }
+    for (int k = 0; k < found; ++k) {
+      const int j = neighbours[row_[k]] & NEIGHMASK;
       if (!(mask[j] & group_bit)) continue;
       // Without newton a pair across ranks is on both lists: one of them takes it.
       if (j >= nlocal && !force->newton_pair && tag[i] > tag[j]) continue;
       if (bodies_ && body[i] >= 0 && body[i] == body[j]) continue;
-      visit(slot, i, j);
+      candidates_.push_back({slot + row_[k], i, j});
     }
   }
 }
@@ -76,34 +120,29 @@ void PairConstraints::collect(double margin)
   const double *const *const x = atom->x;
   const double *const radius = atom->radius;
   const double h = step_.problem.timestep;
-  const double *const velocity = step_.problem.predicted_velocity.data();
-
-  // The motion of bodies that turn is not known before the step is solved.
-  scanned_ = bodies_ == nullptr;
-  near_pairs_.clear();
-  if (scanned_) velocity_at_scan_ = step_.problem.predicted_velocity;
-  const double widest = std::max(margin, NEAR * step_.largest_radius);
+  const std::vector<double> &predicted = step_.problem.predicted_velocity;
+  const double *const velocity = predicted.data();
   const bool has_law = laws_.has_law();
   std::size_t slots = 0;
   for (int ii = 0; ii < list_->inum; ++ii) slots += list_->numneigh[list_->ilist[ii]];
   taken_.assign(slots, 0);
 
-  for_each_listed([&](std::size_t slot, int i, int j) {
+  widest_ = std::max(margin, NEAR * step_.largest_radius);
+  motion_.assign(step_.problem.particles, 0.0);
+  note_motion(predicted);
+  search_list();
+  for (const Candidate &pair : candidates_) {
+    const int i = pair.first, j = pair.second;
     const double away[3] = {x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2]};
     const double opening[3] = {velocity[3 * i] - velocity[3 * j],
                                velocity[3 * i + 1] - velocity[3 * j + 1],
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
-    const double touching = radius[i] + radius[j];
-    const double reach = touching + margin;
-    if (dot(away, away) > reach * reach && !(has_law && is_remembered(i, j, away))) {
-      if (ends_beyond(touching + widest, away, h, opening)) return;
-      if (ends_beyond(reach, away, h, opening)) {
-        if (scanned_) near_pairs_.push_back({slot, i, j});
-        return;
-      }
-    }
-    take(slot, i, j);
-  });
+    const double reach = radius[i] + radius[j] + margin;
+    if (dot(away, away) > reach * reach && ends_beyond(reach, away, h, opening) &&
+        !(has_law && is_remembered(i, j)))
+      continue;
+    take(pair.slot, i, j);
+  }
 }
 
 void PairConstraints::take(std::size_t slot, int i, int j)
@@ -146,8 +185,11 @@ void PairConstraints::take(std::size_t slot, int i, int j)
 }
 
 // A pair that the contact law remembers is in the problem even if it is farther apart than others in it.
-bool PairConstraints::is_remembered(int i, int j, const double *away) const
+bool PairConstraints::is_remembered(int i, int j) const
 {
+  const double *const xi = atom->x[i];
+  const double *const xj = atom->x[j];
+  const double away[3] = {xi[0] - xj[0], xi[1] - xj[1], xi[2] - xj[2]};
   const double distance = norm(away);
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
   const double size = atom->radius[i] + atom->radius[j];
@@ -185,41 +227,17 @@ long PairConstraints::add_violated()
         !(bodies_ && square_at_end(i, j) < distance * distance);
   };
   const std::size_t before = step_.problem.contacts.size();
-  auto look_at = [&](std::size_t slot, int i, int j) {
+  note_motion(velocity);
+  if (bodies_) note_motion(step_.motion());
+  if (!std::equal(motion_.begin(), motion_.end(), allowed_.begin(), std::less_equal<>()))
+    search_list();
+  for (const Candidate &pair : candidates_) {
+    if (taken_[pair.slot]) continue;
+    const int i = pair.first, j = pair.second;
     const double touching = radius[i] + radius[j] - step_.settings.tolerance;
-    if (!stays_apart(i, j, touching) && !entangled_.contains(i, j)) take(slot, i, j);
-  };
-  const double near = NEAR * step_.largest_radius;
-  if (scanned_ && 2.0 * h * change_since_scan() < near) {
-    for (const NearPair &pair : near_pairs_)
-      if (!taken_[pair.slot]) look_at(pair.slot, pair.first, pair.second);
-  } else {
-    near_pairs_.clear();
-    for_each_listed([&](std::size_t slot, int i, int j) {
-      if (taken_[slot] || stays_apart(i, j, radius[i] + radius[j] + near)) return;
-      near_pairs_.push_back({slot, i, j});
-      look_at(slot, i, j);
-    });
-    scanned_ = true;
-    velocity_at_scan_ = velocity;
-    if (bodies_) motion_at_scan_ = step_.motion();
+    if (!stays_apart(i, j, touching) && !entangled_.contains(i, j)) take(pair.slot, i, j);
   }
   return static_cast<long>(step_.problem.contacts.size() - before);
-}
-
-// The largest change of a velocity, or of the motion of a turning body, since all pairs were scanned.
-double PairConstraints::change_since_scan() const
-{
-  auto largest = [](const std::vector<double> &a, const std::vector<double> &b) {
-    double most = 0.0;
-    for (std::size_t k = 0; k < a.size(); k += 3) {
-      const double change[3] = {a[k] - b[k], a[k + 1] - b[k + 1], a[k + 2] - b[k + 2]};
-      most = std::max(most, dot(change, change));
-    }
-    return std::sqrt(most);
-  };
-  const double change = largest(step_.velocity, velocity_at_scan_);
-  return bodies_ ? std::max(change, largest(step_.motion(), motion_at_scan_)) : change;
 }
 
 long PairConstraints::relinearise()

@@ -35,8 +35,8 @@ class PairConstraints : protected Pointers {
   // many.
   long add_violated();
 
-  // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The distance between turning bodies is not
-  // convex. The length that the end of the step lacks beside the linearised gap is put into the gap of the
+  // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The distance
+  // between turning bodies is not convex. The length that the end of the step lacks beside the linearised gap is put into the gap of the
   // constraint; where the end has more, nothing changes. The normal stays that of the positions from
   // which the force acts: along any other, two opposite forces would be a couple, and angular momentum
   // would not be kept. The lacking length is made up along the normal, hence the division by a cosine.
@@ -44,16 +44,20 @@ class PairConstraints : protected Pointers {
   long relinearise();
 
  private:
-  struct NearPair {
+  // A pair of the list that the step may bring into contact.
+  struct Candidate {
     std::size_t slot;    // in taken_
     int first, second;
   };
+  struct Range {
+    float centre[3], range;
+  };
 
-  template <typename Visitor> void for_each_listed(Visitor &&visit) const;
+  void note_motion(const std::vector<double> &velocity);
+  void search_list();
   void take(std::size_t slot, int i, int j);
   double gap_at_end(int i, int j, double *away) const;
-  bool is_remembered(int i, int j, const double *away) const;
-  double change_since_scan() const;
+  bool is_remembered(int i, int j) const;
 
   Step &step_;
   GapRules &rules_;
@@ -63,11 +67,16 @@ class PairConstraints : protected Pointers {
   const RigidMotion *bodies_;
   NeighList *list_ = nullptr;
   std::vector<char> taken_;    // per pair of the neighbour list: whether it is in the problem
-  // After a scan of all pairs in a step only those that were near each other need another look, as long as
-  // no velocity has changed much since. The first scan is with the predicted velocities, of free spheres.
-  bool scanned_ = false;
-  std::vector<NearPair> near_pairs_;
-  std::vector<double> velocity_at_scan_, motion_at_scan_;
+  // The list reaches as far as the fastest particles go, so that most of its pairs are far apart. One
+  // search of a step finds those that may meet; later rounds look at these alone, as long as no particle
+  // goes much farther.
+  std::vector<Candidate> candidates_;    // in the order of the list
+  double widest_ = 0.0;    // [length] between surfaces at the end of the step: no farther ones
+  std::vector<double>
+      motion_;    // [length] per particle: at most so far in this step, as far as known
+  std::vector<double> allowed_;    // [length] up to so far candidates_ holds all that may meet
+  std::vector<Range> ranges_;
+  std::vector<int> row_;    // the places in a row of the list that were found
 };
 
 }    // namespace LAMMPS_NS
