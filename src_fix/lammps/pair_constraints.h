@@ -36,11 +36,11 @@ class PairConstraints : protected Pointers {
   long add_violated();
 
   // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The distance
-  // between turning bodies is not convex. The length that the end of the step lacks beside the linearised gap is put into the gap of the
-  // constraint; where the end has more, nothing changes. The normal stays that of the positions from
-  // which the force acts: along any other, two opposite forces would be a couple, and angular momentum
-  // would not be kept. The lacking length is made up along the normal, hence the division by a cosine.
-  // Returns how many constraints changed.
+  // between turning bodies is not convex. The length that the end of the step lacks beside the linearised
+  // gap is put into the gap of the constraint; where the end has more, nothing changes. The normal stays
+  // that of the positions from which the force acts: along any other, two opposite forces would be a
+  // couple, and angular momentum would not be kept. The lacking length is made up along the normal, hence
+  // the division by a cosine. Returns how many constraints changed.
   long relinearise();
 
  private:
