@@ -20,6 +20,8 @@ from .shipped import DECKS, SETTLING
 FINISHED = "finished.json"
 PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
 LOG = "log.lammps"
+# A result's record is that of its run, and says under this key which version has measured it.
+MEASURED_BY = "measured by"
 # So begins a line of the measuring process about a number that a result lacks.
 NOT_MEASURED = "not measured: "
 # These files of a finished run are read.
@@ -103,7 +105,8 @@ def other_run(folder: Path, record: Mapping[str, Any]) -> str:
         there = json.loads((folder / FINISHED).read_text())
     except (OSError, ValueError):
         return ""
-    if not isinstance(there, dict) or there == record:
+    run = {name: value for name, value in record.items() if name != MEASURED_BY}
+    if not isinstance(there, dict) or there == run:
         return ""
     return f"of the run of {record['started']}, but {folder} is that of {there.get('started')}"
 

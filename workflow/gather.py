@@ -10,6 +10,7 @@ from .errors import WorkflowError
 from .files import whole
 from .finished import other_run
 from .folder import Folder
+from .provenance import differs
 from .store import StoredStudy, origin_of, read_result
 from .study import Study
 
@@ -31,7 +32,16 @@ def gather_results(study: Study, folder: Folder) -> StoredStudy:
     return StoredStudy(study.name, study.title, study.text, results)
 
 
-def adopt_results(study: Study, folder: Folder, source: Path) -> int:
+def other_code(count: int, folder: Path) -> str:
+    """Return the line about results in a folder that were not made by the code of today."""
+    results = "result is" if count == 1 else "results are"
+    return (
+        f"{count} {results} of other versions of the fix or of the decks; they are kept. "
+        f"Delete them in {folder} to run these cases again."
+    )
+
+
+def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool = False) -> int:
     """Copy results that were kept elsewhere, for cases that have none; return how many.
 
     Parameters
@@ -39,20 +49,27 @@ def adopt_results(study: Study, folder: Folder, source: Path) -> int:
     study : study whose results they are
     folder : folder in which studies run, to which the results go
     source : folder of the results that were kept, with a folder for each study
+    of_any_code : whether results of other versions of the fix or of the decks are taken, too
     """
-    count = 0
+    count = other = 0
     for case in study.cases:
         kept, target = source / study.name / f"{case.name}.h5", folder.result(study, case)
         if folder.is_measured(study, case) or not kept.is_file():
             continue
         try:
-            origin_of(kept)
+            outputs, record = origin_of(kept)
         except WorkflowError as error:
             print(f"not taken: {error}")
+            continue
+        fits = outputs == study.outputs.measured and case.is_of(record)
+        if not fits or (not of_any_code and differs(case, record)):
+            other += 1
             continue
         for line in folder.set_aside(study, case):
             print(line)
         with whole(target) as temporary:
             shutil.copyfile(kept, temporary)
         count += 1
+    if other:
+        print(f"not taken: {other}, of other versions of the fix, of the decks or of the study")
     return count

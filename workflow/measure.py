@@ -54,8 +54,17 @@ from lammps_inelastic.analysis.run_files import AGAIN
 
 from .decks import gravity_of
 from .errors import WorkflowError
-from .finished import CONTACTS, FINISHED, LOG, NOT_MEASURED, PARTICLES, check_stage
+from .finished import (
+    CONTACTS,
+    FINISHED,
+    LOG,
+    MEASURED_BY,
+    NOT_MEASURED,
+    PARTICLES,
+    check_stage,
+)
 from .pictures import pictures_of
+from .provenance import THIS, versions
 from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
@@ -79,6 +88,7 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
     Raises AnalysisError or WorkflowError with one line if its files are not whole.
     """
     record = json.loads((folder / FINISHED).read_text())
+    measured = {**record, MEASURED_BY: versions()[THIS]}
     result: Result | None = None
     for stage in record["stages"]:
         files, log = _open(folder, record, stage)
@@ -87,7 +97,7 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
         if stage is record["stages"][-1]:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
             pictures = pictures_of(files.particles, _last_contacts(files, stage, outputs), outputs)
-        result = Result(values, pictures, record, outputs.measured, before=result)
+        result = Result(values, pictures, measured, outputs.measured, before=result)
     assert result is not None
     return result
 

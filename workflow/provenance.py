@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
+from lammps_inelastic import plugin
+
+from .build_version import version_now
 from .study import Case
 
-PACKAGES = ("lammps-inelastic", "lammps", "mpi4py", "MDAnalysis", "numpy", "scipy", "h5py")
+THIS = "lammps-inelastic"
+PACKAGES = (THIS, "lammps", "mpi4py", "MDAnalysis", "numpy", "scipy", "h5py")
 
 
 @cache
@@ -23,7 +29,46 @@ def versions() -> dict[str, str]:
             found[package] = version(package)
         except PackageNotFoundError:
             found[package] = "not installed"
+    found[THIS] = version_now(found[THIS])
     return found
+
+
+@cache
+def code() -> dict[str, str]:
+    """Return what tells the installed code from any other.
+
+    `version` ends in the commit, `sources` is a hash of the fix's C++ sources without comments, and
+    `plugin` one of the compiled plugin, which another compiler makes another one.
+    """
+    built = plugin.build()
+    return {
+        "version": versions()[THIS],
+        "sources": built["sources"],
+        "plugin": hashlib.sha256(Path(plugin.plugin_file()).read_bytes()).hexdigest(),
+        "compiler": built["compiler"],
+    }
+
+
+def version_in(record: Mapping[str, Any]) -> str:
+    """Return the version of the code that made a run."""
+    return str(record["versions"].get(THIS, "unknown"))
+
+
+def differs(case: Case, record: Mapping[str, Any]) -> str:
+    """Say in what the code of a run differs from that of today; empty if in nothing.
+
+    Parameters
+    ----------
+    case : case as its decks are today
+    record : record of a run of the case
+    """
+    words = []
+    if record["fingerprint"] != case.fingerprint:
+        words.append("another version of the deck")
+    # Runs of version 0.1 did not note the code.
+    if record.get("code", {}).get("sources") != code()["sources"]:
+        words.append(f"version {version_in(record)} of the fix")
+    return ", ".join(words)
 
 
 def run_record(
@@ -58,4 +103,5 @@ def run_record(
         "started": datetime.fromtimestamp(started, UTC).isoformat(timespec="seconds"),
         "wall_seconds": round(seconds, 2),
         "versions": versions(),
+        "code": code(),
     }

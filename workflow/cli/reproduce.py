@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     for number, study in enumerate(studies, 1):
         print(f"study {number} of {len(studies)}: {study.name}, {study.title}")
         if stored is not None:
-            count = adopt_results(study, folder, stored)
+            count = adopt_results(study, folder, stored, of_any_code=options.stored_only)
             print(f"{study.name}: {count} stored results of {len(study.cases)} taken")
         if not options.stored_only:
             failed += len(run_and_gather(study, study.cases, folder, running).failed)

@@ -10,7 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from ..folder import Folder, last_lines
+from ..gather import other_code
 from ..launch import MEASURED, failure_in
+from ..provenance import differs
 from ..store import read_result
 from ..study import Case, Study
 from ..wide_table import print_wide
@@ -57,16 +59,13 @@ def _print_status(study: Study, folder: Folder) -> None:
     print_wide(table)
     print(f"{study.name}: " + ", ".join(f"{count} {state}" for state, count in states.items()))
     if other:
-        print(
-            f"{other} results are of other versions of the decks; they are kept. Delete them in "
-            f"{folder.result_folder(study)} to run these cases again."
-        )
+        print(other_code(other, folder.result_folder(study)))
 
 
 def _of_result(study: Study, case: Case, folder: Folder) -> tuple[str, bool]:
-    """Say how long a case took, and whether its decks were those of today."""
+    """Say how long a case took, and whether its code was that of today."""
     record = read_result(folder.result(study, case)).record
     note = f"{record['wall_seconds']:.0f} s"
-    if record["fingerprint"] == case.fingerprint:
-        return note, True
-    return f"{note}, by another version of the deck", False
+    if other := differs(case, record):
+        return f"{note}, by {other}", False
+    return note, True

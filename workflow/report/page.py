@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
-from importlib.metadata import version
 from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined, select_autoescape
 
+from ..provenance import THIS, versions
 from .blocks import Cell, Comparison, Section, Table
 from .columns import Column, difference_cell, ours_text, table
 from .data import Data
-from .sections.provenance import commands
+from .sections.provenance import codes_line, commands
 from .statistics import LARGE, SHARE_ABOVE_LARGE, computing_seconds
 from .text import as_short, as_stated, as_text, as_time
 
@@ -98,7 +98,8 @@ def render(data: Data, sections: Sequence[Section]) -> str:
         cases=len(once),
         time=as_time(computing_seconds(once)),
         written=datetime.now(UTC).strftime("%Y-%m-%d"),
-        version=version("lammps-inelastic"),
+        version=versions()[THIS],
+        codes=codes_line(list(once)),
     )
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...decks import gravity_of
+from ...finished import MEASURED_BY
+from ...provenance import version_in
 from ...shipped import QUICK_FOLDER, STUDIES_FOLDER
 from ...store import Result, StoredStudy
 from ..blocks import Block, Listing, Section, Table, Text, nothing_run
@@ -43,6 +46,21 @@ def commands(data: Data, name: str) -> list[str]:
 def _is_shipped(study: StoredStudy, folder: Path) -> bool:
     path = folder / f"{study.name}.toml"
     return path.is_file() and path.read_text(encoding="utf-8") == study.text
+
+
+def codes_line(results: Sequence[Result]) -> str:
+    """Say which versions of the code made the packings, and whether they are of one code."""
+    if not results:
+        return ""
+    made = Counter(version_in(result.record) for result in results)
+    sources = {result.record.get("code", {}).get("sources") for result in results}
+    if len(made) == 1:
+        return f"All packings are of version {next(iter(made))}."
+    versions = ", ".join(f"{version} ({count})" for version, count in made.most_common())
+    # Version 0.1 did not note the code.
+    if len(sources) == 1 and None not in sources:
+        return f"The packings are of several versions, all with the same fix: {versions}."
+    return f"The packings are of several versions of the fix: {versions}."
 
 
 def provenance_section(data: Data, files: Sequence[str]) -> Section:
@@ -194,6 +212,11 @@ def _versions_table(results: Sequence[Result]) -> Table:
     for result in results:
         for package, version in result.record["versions"].items():
             found.setdefault(package, {})[str(version)] = None
+        for what, name in (("plugin", "plugin (SHA-256)"), ("compiler", "compiler")):
+            if what in result.record.get("code", {}):
+                found.setdefault(name, {})[result.record["code"][what]] = None
+        if MEASURED_BY in result.record:
+            found.setdefault(MEASURED_BY, {})[result.record[MEASURED_BY]] = None
     return table(
         "Versions that made and measured the packings",
         VERSIONS_COLUMNS,

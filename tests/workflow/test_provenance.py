@@ -1,0 +1,179 @@
+"""Which code a result is of: versions with commits, hashes, and what is said of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lammps_inelastic import plugin
+from lammps_inelastic.workflow.build_version import dynamic_metadata, version_now, version_of
+from lammps_inelastic.workflow.folder import Folder
+from lammps_inelastic.workflow.gather import adopt_results
+from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.provenance import code, differs
+from lammps_inelastic.workflow.report.sections.provenance import codes_line
+from lammps_inelastic.workflow.store import Result, read_result, write_result
+from lammps_inelastic.workflow.study import read_study
+from tests.workflow.study_run import run_few
+
+
+def git(folder: Path, *arguments: str) -> str:
+    identity = ["-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false"]
+    command = ["git", *identity, *arguments]
+    return subprocess.run(
+        command, cwd=folder, check=True, capture_output=True, text=True
+    ).stdout.strip()
+
+
+def repository(folder: Path) -> Path:
+    folder.mkdir()
+    (folder / "file").write_text("one\n")
+    git(folder, "init", "-q")
+    git(folder, "add", "file")
+    git(folder, "commit", "-q", "-m", "first")
+    return folder
+
+
+def test_a_version_holds_the_commit_and_whether_a_file_differs(tmp_path: Path) -> None:
+    root = repository(tmp_path / "clone")
+    commit = git(root, "rev-parse", "--short=10", "HEAD")
+    assert version_of(root, "0.2.0") == f"0.2.0+g{commit}"
+    # Files that git does not track, such as runs, change nothing.
+    (root / "out").write_text("")
+    assert version_of(root, "0.2.0") == f"0.2.0+g{commit}"
+    (root / "file").write_text("two\n")
+    assert version_of(root, "0.2.0") == f"0.2.0+g{commit}.modified"
+
+
+def test_without_git_a_version_is_that_of_the_distribution_or_unknown(tmp_path: Path) -> None:
+    # A folder inside of another repository is not that repository.
+    inside = repository(tmp_path / "other") / "unpacked"
+    inside.mkdir()
+    assert version_of(inside, "0.2.0") == "0.2.0+unknown"
+    (inside / "PKG-INFO").write_text("Metadata-Version: 2.2\nVersion: 0.2.0+gabc\n")
+    assert version_of(inside, "0.2.0") == "0.2.0+gabc"
+
+
+def test_the_build_asks_for_the_version_of_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(repository(tmp_path / "clone"))
+    (found,) = dynamic_metadata({"release": "9.8"}, {}).values()
+    assert found.startswith("9.8+g")
+
+
+def test_an_installed_package_keeps_its_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "lammps_inelastic" / "workflow" / "build_version.py"
+    monkeypatch.setattr("lammps_inelastic.workflow.build_version.__file__", str(file))
+    assert version_now("0.2.0+gabc.modified") == "0.2.0+gabc.modified"
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a study of two cases."""
+    return run_few(tmp_path_factory.mktemp("few"), "[1, 2]")
+
+
+def results_of(few: Path) -> list[Path]:
+    return sorted((few / "out" / "results" / "few").glob("*.h5"))
+
+
+def made_by(path: Path, **changes: Any) -> Result:
+    """Write a result again, as if by other code; return it."""
+    result = read_result(path)
+    record = json.loads(json.dumps(dict(result.record))) | changes
+    other = Result(result.values, result.pictures, record, result.outputs)
+    write_result(path, other)
+    return other
+
+
+def test_a_result_holds_the_version_and_hashes_of_plugin_and_sources(few: Path) -> None:
+    record = read_result(results_of(few)[0]).record
+    bytes_of_plugin = Path(plugin.plugin_file()).read_bytes()
+    assert record["code"]["plugin"] == hashlib.sha256(bytes_of_plugin).hexdigest()
+    assert record["code"]["sources"] == plugin.build()["sources"]
+    assert record["code"]["version"] == record["versions"]["lammps-inelastic"]
+    assert record["measured by"] == record["code"]["version"]
+    assert "+g" in record["code"]["version"] or record["code"]["version"].endswith("+unknown")
+    (case, _) = read_study(few / "few.toml").cases
+    assert record["fingerprint"] == case.fingerprint
+
+
+def test_results_of_other_code_are_kept_and_named(
+    few: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(few, tmp_path / "few")
+    folder = tmp_path / "few"
+    path = results_of(folder)[0]
+    arguments = [str(folder / "few.toml"), "--out", str(folder / "out")]
+    assert main(["status", *arguments]) == 0
+    assert "other versions" not in capsys.readouterr().out
+    # Version 0.1 noted its version alone.
+    old = {"versions": {**code(), "lammps-inelastic": "0.1.0"}, "code": {}}
+    made_by(path, **old)
+    assert main(["status", *arguments]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "by version 0.1.0 of the fix" in said
+    assert "1 result is of other versions of the fix or of the decks; they are kept" in said
+    # So does a run, which does not make it again.
+    assert main(["run", *arguments]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "2 there before" in said
+    assert "1 result is of other versions" in said
+    assert "0.1.0" in codes_line([read_result(one) for one in results_of(folder)])
+
+
+def test_stored_results_of_other_code_are_not_taken(
+    few: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = tmp_path / "kept" / "few"
+    shutil.copytree(few / "out" / "results" / "few", kept)
+    first, second = sorted(kept.glob("*.h5"))
+    made_by(first, code={**code(), "sources": "another"})
+    study = read_study(few / "few.toml")
+    assert adopt_results(study, Folder(tmp_path / "out"), tmp_path / "kept") == 1
+    assert "not taken: 1, of other versions" in capsys.readouterr().out
+    folder = Folder(tmp_path / "any")
+    assert adopt_results(study, folder, tmp_path / "kept", of_any_code=True) == 2
+    # A result that was measured in another way is not what the study asks for, whoever made it.
+    result = read_result(second)
+    write_result(second, Result(result.values, {}, result.record, "{}"))
+    folder = Folder(tmp_path / "third")
+    assert adopt_results(study, folder, tmp_path / "kept", of_any_code=True) == 1
+
+
+def test_a_changed_deck_is_other_code(few: Path) -> None:
+    (case, _) = read_study(few / "few.toml").cases
+    record = dict(read_result(results_of(few)[0]).record)
+    assert differs(case, record) == ""
+    assert differs(case, {**record, "fingerprint": "0"}) == "another version of the deck"
+
+
+def test_the_report_says_whether_packings_are_of_one_code(few: Path) -> None:
+    (one, other) = (read_result(path) for path in results_of(few))
+    version = code()["version"]
+    assert codes_line([one, other]) == f"All packings are of version {version}."
+    assert codes_line([]) == ""
+
+    def of(version: str, sources: str) -> Result:
+        record = {
+            **other.record,
+            "versions": {**other.record["versions"], "lammps-inelastic": version},
+            "code": {"sources": sources},
+        }
+        return Result(other.values, {}, record, other.outputs)
+
+    same = codes_line([one, of("0.2.0+gb", code()["sources"])])
+    assert "several versions, all with the same fix" in same
+    assert "0.2.0+gb (1)" in same
+    assert codes_line([one, of("0.2.0+gb", "x")]).startswith(
+        "The packings are of several versions of the fix: "
+    )
