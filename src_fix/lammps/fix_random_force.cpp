@@ -1,5 +1,6 @@
 #include "fix_random_force.h"
 
+#include "lammps_versions.h"
 #include "random.h"
 
 #include "atom.h"
@@ -17,13 +18,14 @@ FixRandomForce::FixRandomForce(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, nar
 {
   if (narg < 5) utils::missing_cmd_args(FLERR, "fix random/force", error);
   if (narg > 5)
-    error->all(FLERR, 5,
-               "Unknown fix random/force argument {}: it takes an acceleration and a seed", arg[5]);
+    error_at(error, FLERR, 5,
+             "Unknown fix random/force argument {}: it takes an acceleration and a seed", arg[5]);
   acceleration_ = utils::numeric(FLERR, arg[3], false, lmp);
   if (!(acceleration_ >= 0.0) || std::isinf(acceleration_))
-    error->all(FLERR, 3, "Fix random/force acceleration must be 0 or greater, not {}", arg[3]);
+    error_at(error, FLERR, 3, "Fix random/force acceleration must be 0 or greater, not {}", arg[3]);
   const int seed = utils::inumeric(FLERR, arg[4], false, lmp);
-  if (seed < 0) error->all(FLERR, 4, "Fix random/force seed must be 0 or greater, not {}", arg[4]);
+  if (seed < 0)
+    error_at(error, FLERR, 4, "Fix random/force seed must be 0 or greater, not {}", arg[4]);
   seed_ = static_cast<std::uint32_t>(seed);
   if (!atom->tag_enable)
     error->all(FLERR, "Fix random/force needs atom IDs: use atom_modify id yes");

@@ -57,10 +57,10 @@ void Reader::read_keywords()
   while (at_ < narg_) {
     const std::string keyword = arg_[at_];
     if (!is_keyword(arg_[at_]))
-      error_->all(FLERR, at_,
-                  "Unknown fix inelastic keyword {}: use region, rigid, law, accuracy, solver, "
-                  "maxiter, frozen, record or shorten",
-                  keyword);
+      error_at(error_, FLERR, at_,
+               "Unknown fix inelastic keyword {}: use region, rigid, law, accuracy, solver, "
+               "maxiter, frozen, record or shorten",
+               keyword);
     if (at_ + 2 > narg_) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error_);
     const char *const value = arg_[at_ + 1];
     at_ += 2;
@@ -95,10 +95,10 @@ void Reader::read_rigid(const char *fix_id)
 {
   const std::string inertia = at_ < narg_ ? arg_[at_] : "nothing";
   if (inertia != "point" && inertia != "solid")
-    error_->all(FLERR, at_ - 1,
-                "Fix inelastic needs rigid FIX-ID point or rigid FIX-ID solid (the mass of each "
-                "sphere in its centre, or a solid ball), not {}",
-                inertia);
+    error_at(error_, FLERR, at_ - 1,
+             "Fix inelastic needs rigid FIX-ID point or rigid FIX-ID solid (the mass of each "
+             "sphere in its centre, or a solid ball), not {}",
+             inertia);
   ++at_;
   settings_.rigid_fix = fix_id;
   settings_.inertia = inertia == "point" ? Inertia::POINT : Inertia::SOLID;
@@ -108,12 +108,13 @@ void Reader::read_law(const std::string &name)
 {
   const int at_name = at_ - 1;
   if (!settings_.law_words.empty())
-    error_->all(FLERR, at_name, "Fix inelastic: two laws, {} and {}: all contacts have one law",
-                settings_.law_words, name);
+    error_at(error_, FLERR, at_name,
+             "Fix inelastic: two laws, {} and {}: all contacts have one law", settings_.law_words,
+             name);
   const inelastic::NamedLaw *const law = inelastic::find_law(name);
   if (!law)
-    error_->all(FLERR, at_name, "Fix inelastic law must be {}, not {}", inelastic::names_of_laws(),
-                name);
+    error_at(error_, FLERR, at_name, "Fix inelastic law must be {}, not {}",
+             inelastic::names_of_laws(), name);
   settings_.law_words = name;
   std::vector<std::string> words;
   while (at_ < narg_ && !is_keyword(arg_[at_])) words.emplace_back(arg_[at_++]);
@@ -121,14 +122,14 @@ void Reader::read_law(const std::string &name)
   std::string allowed;
   settings_.law = law->make(words, allowed);
   if (!allowed.empty())
-    error_->all(FLERR, at_name, "Fix inelastic needs law {}, not law {}", allowed,
-                settings_.law_words);
+    error_at(error_, FLERR, at_name, "Fix inelastic needs law {}, not law {}", allowed,
+             settings_.law_words);
 }
 
 void Reader::read_solver(const char *name)
 {
   if (!inelastic::make_solver(name))
-    error_->all(FLERR, at_ - 1, "Fix inelastic solver must be apgd or uzawa, not {}", name);
+    error_at(error_, FLERR, at_ - 1, "Fix inelastic solver must be apgd or uzawa, not {}", name);
   settings_.solver = name;
 }
 
@@ -136,7 +137,7 @@ void Reader::read_max_iterations(const char *value)
 {
   settings_.max_iterations = utils::bnumeric(FLERR, value, false, lmp_);
   if (settings_.max_iterations < 1)
-    error_->all(FLERR, at_ - 1, "Fix inelastic maxiter must be at least 1, not {}", value);
+    error_at(error_, FLERR, at_ - 1, "Fix inelastic maxiter must be at least 1, not {}", value);
   if (at_ < narg_ && strcmp(arg_[at_], "warn") == 0) {
     settings_.warn_only = true;
     ++at_;
@@ -147,23 +148,23 @@ void Reader::read_frozen(const char *group_id)
 {
   const int frozen_group = lmp_->group->find(group_id);
   if (frozen_group < 0)
-    error_->all(FLERR, at_ - 1, "Fix inelastic frozen group {} does not exist", group_id);
+    error_at(error_, FLERR, at_ - 1, "Fix inelastic frozen group {} does not exist", group_id);
   settings_.frozen_bit = lmp_->group->bitmask[frozen_group];
 }
 
 void Reader::read_record(const char *file)
 {
   if (at_ + 2 > narg_ || strcmp(arg_[at_], "every") != 0)
-    error_->all(FLERR, at_ - 1, "Fix inelastic record needs: record FILE every N");
+    error_at(error_, FLERR, at_ - 1, "Fix inelastic record needs: record FILE every N");
   settings_.record_file = file;
   settings_.record_every = utils::inumeric(FLERR, arg_[at_ + 1], false, lmp_);
   if (settings_.record_every < 1)
-    error_->all(FLERR, at_ + 1, "Fix inelastic record every must be at least 1, not {}",
-                settings_.record_every);
+    error_at(error_, FLERR, at_ + 1, "Fix inelastic record every must be at least 1, not {}",
+             settings_.record_every);
   if (settings_.record_file.find('*') == std::string::npos)
-    error_->all(FLERR, at_ - 1,
-                "Fix inelastic record file {} must contain a *, which becomes the step",
-                settings_.record_file);
+    error_at(error_, FLERR, at_ - 1,
+             "Fix inelastic record file {} must contain a *, which becomes the step",
+             settings_.record_file);
   at_ += 2;
 }
 
@@ -173,8 +174,8 @@ double LAMMPS_NS::read_tolerance(LAMMPS *lmp, const char *text, int argument)
 {
   const double tolerance = utils::numeric(FLERR, text, false, lmp);
   if (!(tolerance > 0.0) || std::isinf(tolerance))
-    lmp->error->all(FLERR, argument,
-                    "Fix inelastic tolerance must be a length greater than 0, not {}", text);
+    error_at(lmp->error, FLERR, argument,
+             "Fix inelastic tolerance must be a length greater than 0, not {}", text);
   return tolerance;
 }
 
@@ -182,8 +183,8 @@ double LAMMPS_NS::read_accuracy(LAMMPS *lmp, const char *text, int argument)
 {
   const double accuracy = utils::numeric(FLERR, text, false, lmp);
   if (!(accuracy > 0.0 && accuracy <= 1.0))
-    lmp->error->all(FLERR, argument,
-                    "Fix inelastic accuracy must be greater than 0 and at most 1, not {}", text);
+    error_at(lmp->error, FLERR, argument,
+             "Fix inelastic accuracy must be greater than 0 and at most 1, not {}", text);
   return accuracy;
 }
 

@@ -4,8 +4,7 @@
 #define INELASTIC_FIX_SETTINGS_H
 
 #include "contact_law.h"
-
-#include "error.h"
+#include "lammps_versions.h"
 
 #include <memory>
 #include <string>
@@ -55,10 +54,10 @@ Settings read_settings(LAMMPS *lmp, int narg, char **arg, int group_bit);
 
 // Reads EPS [length]. Errors: anything but a finite number greater than 0, which the error points to if
 // it knows the argument's index.
-double read_tolerance(LAMMPS *lmp, const char *text, int argument = Error::NOPOINTER);
+double read_tolerance(LAMMPS *lmp, const char *text, int argument = NO_WORD);
 
 // Reads the accuracy in the same way. Errors: anything but a number greater than 0 and at most 1.
-double read_accuracy(LAMMPS *lmp, const char *text, int argument = Error::NOPOINTER);
+double read_accuracy(LAMMPS *lmp, const char *text, int argument = NO_WORD);
 
 }    // namespace LAMMPS_NS
 

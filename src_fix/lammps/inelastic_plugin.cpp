@@ -10,8 +10,12 @@
 #include "error.h"
 #include "lammps.h"
 
+#include "fmt/format.h"
+
+#include <cstddef>
 #include <cstring>
 #include <string>
+#include <utility>
 
 using namespace LAMMPS_NS;
 
@@ -37,6 +41,9 @@ typedef struct {
 typedef void (*lammpsplugin_regfunc)(lammpsplugin_t *, void *);
 
 __attribute__((visibility("default"))) void lammpsplugin_init(void *, void *, void *);
+
+// LAMMPS's library has this function; a program without the library may not.
+__attribute__((weak)) int lammps_extract_setting(void *, const char *);
 
 // Plugins with contact laws find this function here: LAMMPS loads plugins so that they see one another.
 __attribute__((visibility("default"))) void
@@ -64,21 +71,41 @@ Fix *create_fix_random_force(LAMMPS *lmp, int narg, char **arg)
 Command *create_parameters(LAMMPS *lmp)
 { return new Parameters(lmp); }
 
+// What tells the LAMMPS that runs from the one for which the plugin was built; empty if they may be the
+// same. The classes that plugins share with LAMMPS change their layout even within a release: two updates
+// that both print one date do not fit together. The git descriptor tells them apart, where it is known.
+std::string foreign_to(LAMMPS *lmp)
+{
+  const char *const built = INELASTIC_LAMMPS_BUILD, *const date = INELASTIC_LAMMPS_DATE;
+  if (strcmp(LAMMPS::git_descriptor(), built) != 0)
+    return fmt::format("{}, this is {}", built, LAMMPS::git_descriptor());
+  if (date[0] != '\0' && strcmp(lmp->version, date) != 0)
+    return fmt::format("of {}, this is of {}", date, lmp->version);
+  if (lammps_extract_setting != nullptr) {
+    const std::pair<const char *, std::size_t> sizes[] = {
+        {"bigint", sizeof(bigint)}, {"tagint", sizeof(tagint)}, {"imageint", sizeof(imageint)}};
+    for (const auto &[name, size] : sizes) {
+      const int here = lammps_extract_setting(lmp, name);
+      if (here > 0 && static_cast<std::size_t>(here) != size)
+        return fmt::format("with a {} of {} bytes, this has one of {}", name, size, here);
+    }
+  }
+  return "";
+}
+
 }    // namespace
 
 void lammpsplugin_init(void *lmp_pointer, void *handle, void *register_function)
 {
   auto *lmp = static_cast<LAMMPS *>(lmp_pointer);
 
-  // The classes that plugins share with LAMMPS change their layout even within a release: two
-  // updates that both print one date do not fit together. The git descriptor tells them apart.
-  if (strcmp(LAMMPS::git_descriptor(), INELASTIC_LAMMPS_BUILD) != 0) {
+  const std::string foreign = foreign_to(lmp);
+  if (!foreign.empty()) {
     if (lmp->comm->me == 0)
-      lmp->error->warning(
-          FLERR,
-          "fix inelastic is not available: its plugin was built for LAMMPS {}, this is {}. "
-          "Install lammps-inelastic again in this environment",
-          INELASTIC_LAMMPS_BUILD, LAMMPS::git_descriptor());
+      lmp->error->warning(FLERR,
+                          "fix inelastic is not available: its plugin was built for LAMMPS {}. "
+                          "Install lammps-inelastic again in this environment",
+                          foreign);
     return;
   }
 

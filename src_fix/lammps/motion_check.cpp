@@ -2,11 +2,10 @@
 
 #include "atom_state.h"
 #include "ghost_exchange.h"
+#include "lammps_versions.h"
 #include "rigid_motion.h"
 
 #include "atom.h"
-#include "domain.h"
-#include "error.h"
 #include "fix.h"
 #include "force.h"
 #include "group.h"
@@ -137,7 +136,7 @@ std::string MotionCheck::compare(int i) const
   const double *const expected_v = state_.expected_velocity(i);
   double off[3] = {atom->x[i][0] - expected_x[0], atom->x[i][1] - expected_x[1],
                    atom->x[i][2] - expected_x[2]};
-  domain->minimum_image(FLERR, off);
+  to_nearest_image(domain, off);
   const double faster[3] = {atom->v[i][0] - expected_v[0], atom->v[i][1] - expected_v[1],
                             atom->v[i][2] - expected_v[2]};
   const bool frozen = (atom->mask[i] & step_.settings.frozen_bit) != 0;

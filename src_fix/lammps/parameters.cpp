@@ -1,8 +1,8 @@
 #include "parameters.h"
 
+#include "lammps_versions.h"
+
 #include "comm.h"
-#include "error.h"
-#include "info.h"
 #include "input.h"
 #include "platform.h"
 #include "utils.h"
@@ -168,9 +168,9 @@ std::string Parameters::Rule::allowed() const
 void Parameters::command(int narg, char **arg)
 {
   if (narg != 1)
-    error->all(FLERR, Error::NOLASTLINE,
-               "Command parameters takes one argument, a table in triple quotes or log, not {}",
-               narg);
+    error_at(error, FLERR, NO_LINE,
+             "Command parameters takes one argument, a table in triple quotes or log, not {}",
+             narg);
   if (strcmp(arg[0], "log") == 0) {
     write_to_log();
     return;
@@ -221,24 +221,24 @@ std::vector<Parameters::Parameter> Parameters::read_table(const std::string &tex
     const std::vector<std::string> words = utils::split_words(line);
     if (words.empty()) continue;
     if (words.size() < 3)
-      error->all(FLERR, Error::NOLASTLINE,
-                 "A line of parameters must be: name, default, what is allowed; not: {}",
-                 shown(line));
+      error_at(error, FLERR, NO_LINE,
+               "A line of parameters must be: name, default, what is allowed; not: {}",
+               shown(line));
     Parameter parameter;
     parameter.name = words[0];
     parameter.usual = words[1];
     if (!is_name(parameter.name) || parameter.name == LIST)
-      error->all(FLERR, Error::NOLASTLINE,
-                 "A parameter's name must be of letters, digits and underscores, and not "
-                 "\"{}\": {}",
-                 LIST, shown(line));
+      error_at(error, FLERR, NO_LINE,
+               "A parameter's name must be of letters, digits and underscores, and not "
+               "\"{}\": {}",
+               LIST, shown(line));
     for (const Parameter &other : table)
       if (other.name == parameter.name)
-        error->all(FLERR, Error::NOLASTLINE, "Parameter {} is in the table twice", parameter.name);
+        error_at(error, FLERR, NO_LINE, "Parameter {} is in the table twice", parameter.name);
     parameter.rule = read_rule({words.begin() + 2, words.end()}, line);
     table.push_back(parameter);
   }
-  if (table.empty()) error->all(FLERR, Error::NOLASTLINE, "The table of parameters is empty");
+  if (table.empty()) error_at(error, FLERR, NO_LINE, "The table of parameters is empty");
   return table;
 }
 
@@ -264,10 +264,10 @@ Parameters::Rule Parameters::read_rule(const std::vector<std::string> &words,
           words[i] == "<=";
       Bound bound{i + 1 < words.size() ? words[i + 1] : "", 0.0, words[i].size() == 2};
       if (!is_bound || given || !read_number(bound.text, bound.value))
-        error->all(FLERR, Error::NOLASTLINE,
-                   "The bounds of a parameter must be > or >= and a number, < or <= and a "
-                   "number: {}",
-                   shown(line));
+        error_at(error, FLERR, NO_LINE,
+                 "The bounds of a parameter must be > or >= and a number, < or <= and a "
+                 "number: {}",
+                 shown(line));
       (words[i][0] == '>' ? rule.low : rule.high) = bound;
       given = true;
     }
@@ -276,18 +276,17 @@ Parameters::Rule Parameters::read_rule(const std::vector<std::string> &words,
   for (std::size_t i = 0; i < words.size(); ++i) {
     const bool is_choice = i % 2 == 0;
     if (is_choice ? words[i] == "or" : words[i] != "or")
-      error->all(FLERR, Error::NOLASTLINE,
-                 "What a parameter may be must be integer or number with bounds, words with "
-                 "\"or\" between them, or folder: {}",
-                 shown(line));
+      error_at(error, FLERR, NO_LINE,
+               "What a parameter may be must be integer or number with bounds, words with "
+               "\"or\" between them, or folder: {}",
+               shown(line));
     if (is_choice && words[i] == "file")
       rule.file = true;
     else if (is_choice)
       rule.words.push_back(words[i]);
   }
   if (words.size() % 2 == 0)
-    error->all(FLERR, Error::NOLASTLINE, "A word is missing after the last \"or\": {}",
-               shown(line));
+    error_at(error, FLERR, NO_LINE, "A word is missing after the last \"or\": {}", shown(line));
   return rule;
 }
 
@@ -326,7 +325,7 @@ std::vector<std::string> Parameters::find_unknown(const std::vector<Parameter> &
 bool Parameters::is_index_variable(int variable) const
 {
   // The styles are private, but this text has that of the variable behind its name.
-  const std::string text = Info(lmp).get_variable_info(variable);
+  const std::string text = description_of_variable(lmp, variable);
   const std::string before = "style = ";
   const std::size_t at = text.find(before);
   return at != std::string::npos && text.compare(at + before.size(), 6, "index,") == 0;
@@ -346,7 +345,7 @@ bool Parameters::is_alone(const Parameter &parameter) const
   const int variable = input->variable->find(parameter.name.c_str());
   if (!is_index_variable(variable)) return true;
   // Ends with all values.
-  const std::string text = Info(lmp).get_variable_info(variable);
+  const std::string text = description_of_variable(lmp, variable);
   return text.substr(text.find(" def =") + 6) == " " + parameter.value + "\n";
 }
 
@@ -413,8 +412,7 @@ std::string Parameters::make_folder(const Parameter &parameter) const
 void Parameters::write_to_log() const
 {
   if (!is_there_a_list())
-    error->all(FLERR, Error::NOLASTLINE,
-               "Command parameters log must follow a table of parameters");
+    error_at(error, FLERR, NO_LINE, "Command parameters log must follow a table of parameters");
   if (comm->me == 0 && logfile) fprintf(logfile, "%s\n", input->variable->retrieve(LIST));
 }
 
@@ -469,5 +467,5 @@ void Parameters::stop(const std::vector<std::string> &mistakes) const
   std::string text = mistakes[0];
   for (std::size_t i = 1; i < mistakes.size(); ++i) text += "\nERROR: " + mistakes[i];
   // Without the last input line, which would be the whole table.
-  error->all(FLERR, Error::NOLASTLINE, "{}", text);
+  error_at(error, FLERR, NO_LINE, "{}", text);
 }

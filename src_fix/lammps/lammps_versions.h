@@ -1,0 +1,77 @@
+// What differs between the releases of LAMMPS for which these sources compile: errors that point to a word of
+// the input and the arguments of `minimum_image` are of 2025, a description of a variable is of 2024.
+
+#ifndef INELASTIC_LAMMPS_VERSIONS_H
+#define INELASTIC_LAMMPS_VERSIONS_H
+
+#include "domain.h"
+#include "error.h"
+#include "info.h"
+
+#include <cstdlib>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+namespace LAMMPS_NS {
+
+// The places in the input to which an error may point beside the index of an argument: none, and not even
+// the last line that was read. `points` tells whether this release takes them.
+template <typename E, typename = void> struct PlaceOfError {
+  static constexpr bool points = false;
+  static constexpr int nowhere = 0, no_line = 0;
+};
+template <typename E>
+struct PlaceOfError<E, std::void_t<decltype(E::NOPOINTER), decltype(E::NOLASTLINE)>> {
+  static constexpr bool points = true;
+  static constexpr int nowhere = E::NOPOINTER, no_line = E::NOLASTLINE;
+};
+constexpr int NO_WORD = PlaceOfError<Error>::nowhere;
+constexpr int NO_LINE = PlaceOfError<Error>::no_line;
+
+// Ends all ranks with an error that points to the place, where this release can. Call it with FLERR.
+template <typename E, typename... Values>
+[[noreturn]] void error_at(E *error, const char *file, int line, int place,
+                           const std::string &format, Values &&...values)
+{
+  if constexpr (PlaceOfError<E>::points)
+    error->all(file, line, place, format, std::forward<Values>(values)...);
+  else
+    error->all(file, line, format, std::forward<Values>(values)...);
+  // Earlier headers do not say that the function never returns.
+  std::abort();
+}
+
+template <typename D, typename = void> struct NearestImage {
+  static void of(D *domain, double *vector) { domain->minimum_image(vector); }
+};
+template <typename D>
+struct NearestImage<D,
+                    std::void_t<decltype(std::declval<D>().minimum_image(
+                        std::string(), 0, std::declval<double *>()))>> {
+  static void of(D *domain, double *vector) { domain->minimum_image(__FILE__, __LINE__, vector); }
+};
+
+// Replaces a vector (3) between two points by that to the nearest periodic image of the second.
+inline void to_nearest_image(Domain *domain, double *vector)
+{ NearestImage<Domain>::of(domain, vector); }
+
+template <typename I, typename = void> struct Description {
+  static std::string of_variable(I &, int) { return ""; }
+};
+template <typename I>
+struct Description<I, std::void_t<decltype(std::declval<I>().get_variable_info(0))>> {
+  static std::string of_variable(I &info, int variable) { return info.get_variable_info(variable); }
+};
+
+// Returns the text about a variable that `info variables` prints: its name, "style = ...," and behind
+// "def =" its values. It is empty in releases that cannot tell.
+inline std::string description_of_variable(LAMMPS *lmp, int variable)
+{
+  Info info(lmp);
+  return Description<Info>::of_variable(info, variable);
+}
+
+}    // namespace LAMMPS_NS
+
+#endif
