@@ -63,6 +63,7 @@ from .profile import (
 from .rattlers import Backbone, backbone, contacts_to_hold
 from .run_files import RunFiles, check_contacts, open_run
 from .run_log import Run, RunLog, at_steps, read_run_log
+from .scaling import PowerLaw, local_ratios, logarithmic_density, power_law, small_gaps
 from .structure import (
     BondOrder,
     RadialDistribution,
@@ -98,6 +99,7 @@ __all__ = [
     "Particles",
     "PictureError",
     "Plateau",
+    "PowerLaw",
     "RadialDistribution",
     "Run",
     "RunFiles",
@@ -129,6 +131,8 @@ __all__ = [
     "iterate_contact_frames",
     "largest_pair_overlap",
     "largest_wall_overlap",
+    "local_ratios",
+    "logarithmic_density",
     "measure_evolution",
     "measure_packing",
     "measure_packing_fraction",
@@ -145,9 +149,11 @@ __all__ = [
     "plot_evolution",
     "plot_force_distribution",
     "plot_radial_distribution",
+    "power_law",
     "radial_distribution",
     "read_particle_frame",
     "read_run_log",
+    "small_gaps",
     "sphere_volumes_in_box",
     "voxel_shape",
     "voxel_slices",

@@ -65,10 +65,11 @@ from .finished import (
 )
 from .pictures import pictures_of
 from .provenance import THIS, versions
+from .reference_values import excess_contacts, power_laws
 from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
-from .thermo import read_thermo
+from .thermo import cumulated, read_thermo
 
 # The packing fraction of a frame has so many random points, where it is not exact.
 POINTS_PER_FRAME = 100_000
@@ -133,6 +134,10 @@ def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Ou
         **_effort(log, smallest),
     }
     numbers["largest_overlap"] = packing.pair_overlap.depth / smallest
+    numbers |= {
+        f"centre_{axis}": float(v)
+        for axis, v in zip("xyz", frame.positions.mean(axis=0), strict=True)
+    }
     resolution = _resolution(stage, float(frame.radii.max()))
     if resolution is not None:
         numbers["resolution"] = resolution
@@ -140,6 +145,10 @@ def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Ou
     if in_box.any():
         numbers |= _contact_numbers(packing, contacts, values)
         numbers |= _orientation(packing.orientation)
+        _layers(frame, contacts.counts, box, values)
+        if contacts.excess and not has_soft_contacts(stage):
+            numbers["excess_contacts"] = float(np.mean(contacts.excess))
+            numbers |= power_laws(contacts.last[0], frame, stage, values)
         if outputs.structure:
             numbers |= _structure(frame, particles, box, values)
     if outputs.evolution or is_settling(stage):
@@ -187,6 +196,8 @@ class _ContactFrames:
     held : mean contacts of the others among themselves, one entry a frame that has others
     forces : forces of contacts in the box, one array a frame
     normals : their normals, one array a frame
+    excess : contacts less degrees of freedom of the whole packing, one entry a frame
+    last : last frame; none without frames
     """
 
     counts: list[ContactCounts] = field(default_factory=list)
@@ -194,6 +205,8 @@ class _ContactFrames:
     held: list[float] = field(default_factory=list)
     forces: list[NDArray[np.float64]] = field(default_factory=list)
     normals: list[NDArray[np.float64]] = field(default_factory=list)
+    excess: list[float] = field(default_factory=list)
+    last: list[ContactFrame] = field(default_factory=list)
 
     @classmethod
     def of(
@@ -212,6 +225,8 @@ class _ContactFrames:
             if not firm.rattlers[in_box].all():
                 held = firm.counts.particles[in_box & ~firm.rattlers]
                 found.held.append(float(held.mean()))
+            found.excess.append(excess_contacts(contacts, frame))
+            found.last[:] = [contacts]
         return found
 
 
@@ -265,6 +280,33 @@ def _last_contacts(
         return None
     *_, contacts = contact_frames(files, stage, files.particles[-1])
     return contacts
+
+
+def _layers(
+    frame: ParticleFrame,
+    counts: Sequence[ContactCounts],
+    box: NDArray[np.float64],
+    values: Values,
+) -> None:
+    """Add the contacts of particles in layers above the floor, a diameter thick, to values.
+
+    The particles are those between the box's sides, at any height.
+    """
+    centres = frame.particles.centres(frame.positions)
+    between = ((centres >= box[:, 0]) & (centres <= box[:, 1]))[:, [0, 2]].all(axis=1)
+    if not between.any():
+        return
+    diameter = 2 * float(frame.radii.max())
+    heights = (centres[between, 1] - frame.box[1, 0]) / diameter
+    layers = np.floor(np.maximum(heights, 0)).astype(np.int64)
+    number = np.bincount(layers)
+    mean = np.mean([one.particles for one in counts], axis=0)[between]
+    filled = number > 0
+    values["layers/height"] = (np.arange(len(number)) + 0.5)[filled]
+    values["layers/particles"] = number[filled].astype(float)
+    values["layers/coordination_number"] = (
+        np.bincount(layers, weights=mean)[filled] / number[filled]
+    )
 
 
 def _structure(
@@ -324,6 +366,8 @@ def _evolution(
     clock = read_thermo(log, "Time")
     values["evolution/step"] = seen.steps
     values["evolution/time"] = at_steps(seen.steps, clock["Step"], clock["Time"])
+    work = cumulated(log, "CPU")
+    values["evolution/seconds"] = at_steps(seen.steps, work["Step"], work["CPU"])
     values["evolution/packing_fraction"] = seen.packing_fraction
     values["evolution/coordination_number"] = seen.coordination
     values["evolution/centre_height"] = seen.height

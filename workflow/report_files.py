@@ -28,7 +28,10 @@ def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None
     write_text(out, text)
     summary = summarise(sections)
     if summary is not None:
-        print(f"{summary.large} of {summary.compared} differences are above two standard errors")
+        print(
+            f"{summary.remaining} of {summary.compared} numbers differ from the paper's; "
+            f"{summary.held} of {summary.told} sentences hold"
+        )
     if figures is not None:
         with writing(figures):
             figures.mkdir(parents=True, exist_ok=True)

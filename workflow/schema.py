@@ -83,6 +83,22 @@ SCHEMA: Mapping[str, Entry] = {
     "numbers/largest_overlap_of_all_steps": _number(
         "radii", "of two particles or with a wall, at any step, as the fix reports it"
     ),
+    "numbers/centre_x": _number("length", "mean x of all spheres in the last frame of the dump"),
+    "numbers/centre_y": _number("length", "of y"),
+    "numbers/centre_z": _number("length", "of z"),
+    "numbers/excess_contacts": _number(
+        "1",
+        "contacts, those with walls included, less degrees of freedom of all particles that are "
+        "held, per 1,000 degrees, mean over the contact frames; 0 if isostatic",
+    ),
+    "numbers/gap_exponent": _number(
+        "1", "k of the density g^k of the gaps between particles that touch no wall"
+    ),
+    "numbers/gap_exponent_error": _number("1", "its standard error, gaps taken as independent"),
+    "numbers/weak_force_exponent": _number(
+        "1", "k of the density f^k of forces, over their mean at the same height"
+    ),
+    "numbers/weak_force_exponent_error": _number("1", "its standard error"),
     "numbers/q6": _number("1", "mean local bond-orientational order of the particles in the box"),
     "numbers/q4": _number("1", "mean local bond-orientational order of the particles in the box"),
     "numbers/crystalline": _number("1", "share of the particles in the box that are crystalline"),
@@ -113,8 +129,17 @@ SCHEMA: Mapping[str, Entry] = {
     ),
     "forces/ratio": Entry("(b,)", "1", "contact force over its mean, middle of each bin"),
     "forces/density": Entry("(b,)", "1", "probability density of that ratio"),
+    "forces/local_ratio": Entry(
+        "(b,)", "1", "contact force over the mean at its height, middle of each bin"
+    ),
+    "forces/local_density": Entry("(b,)", "1", "probability density of that ratio"),
+    "gaps/size": Entry("(b,)", "1", "gap over the diameter, middle of each bin"),
+    "gaps/density": Entry("(b,)", "1", "its probability density among gaps up to 0.3"),
     "evolution/step": Entry("(f,)", "steps", "of each frame of the particle dump"),
     "evolution/time": Entry("(f,)", "time", "of each frame; shortened steps count as they were"),
+    "evolution/seconds": Entry(
+        "(f,)", "s", "of each frame: wall time of all steps up to it, without that of the start"
+    ),
     "evolution/packing_fraction": Entry("(f,)", "1", "in the box"),
     "evolution/coordination_number": Entry("(f,)", "1", "in the box; NaN while it is empty"),
     "evolution/centre_height": Entry("(f,)", "length", "mean y of all particles"),
@@ -125,6 +150,13 @@ SCHEMA: Mapping[str, Entry] = {
     "profile/packing_fraction": Entry("(s,)", "1", "in each slab, exact"),
     "profile/monte_carlo": Entry("(s,)", "1", "in each slab, by random points"),
     "profile/monte_carlo_error": Entry("(s,)", "1", "its standard error (binomial)"),
+    "layers/height": Entry(
+        "(l,)", "diameters", "above the floor, middle of each layer, a diameter thick"
+    ),
+    "layers/particles": Entry("(l,)", "1", "particles of the layer between the sides of the box"),
+    "layers/coordination_number": Entry(
+        "(l,)", "1", "their contacts with other particles, mean over the contact frames"
+    ),
     "structure/distance": Entry("(b,)", "length", "between two centres, middle of each bin"),
     "structure/radial_distribution": Entry("(b,)", "1", "g(r) of the particles' centres"),
 }

@@ -26,7 +26,10 @@ STUDIES = (
     "dimers",
     "figure-10",
     "dimers-agitation",
+    "dimers-soft",
     "response",
+    "repose",
+    "reference",
     "protocol",
 )
 _INPUTS = files("lammps_inelastic.inputs")

@@ -29,3 +29,24 @@ def read_thermo(log: RunLog, *names: str) -> dict[str, FloatArray]:
             lines |= {int(row[0]): row for row in rows}
     table = np.array([lines[step] for step in sorted(lines)]).reshape(-1, len(wanted))
     return dict(zip(wanted, table.T, strict=True))
+
+
+def cumulated(log: RunLog, name: str) -> dict[str, FloatArray]:
+    """Return a column that each run counts from zero, such as CPU, counted through all runs.
+
+    Steps and values are as `read_thermo` returns them: what a run had reached in its last line is
+    added to the lines of the next ones.
+    """
+    lines: dict[int, float] = {}
+    before = 0.0
+    for run in log.runs:
+        if name not in run.thermo or len(run.thermo["Step"]) == 0:
+            continue
+        values = run.thermo[name]
+        lines |= {
+            int(step): before + float(value)
+            for step, value in zip(run.thermo["Step"], values, strict=True)
+        }
+        before += float(values[-1])
+    table = np.array(sorted(lines.items())).reshape(-1, 2)
+    return {"Step": table[:, 0], name: table[:, 1]}

@@ -61,7 +61,7 @@ def numbers_of(path: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
 
     def keep(name: str, item: h5py.HLObject) -> None:
-        if isinstance(item, h5py.Dataset) and not name.endswith("wall_seconds"):
+        if isinstance(item, h5py.Dataset) and not name.endswith("seconds"):
             found[name] = item[()]
 
     with h5py.File(path) as file:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .figures import Figure, Pictures
-from .statistics import LARGE, Sample, Stated, difference_in_errors
+from .statistics import Difference, Sample, Stated, difference
 from .text import NOT_RUN
 
 # A column with a word of three letters in it is set as text, not as numbers.
@@ -115,19 +114,25 @@ class Comparison:
     why: str = ""
 
     @property
-    def difference(self) -> float:
-        """The difference in standard errors; NaN where none is known."""
-        return difference_in_errors(self.ours, self.stated)
+    def difference(self) -> Difference:
+        """Ours less the paper's."""
+        return difference(self.ours, self.stated)
 
-    @property
-    def is_known(self) -> bool:
-        """Whether the difference can be told in standard errors."""
-        return not math.isnan(self.difference)
 
-    @property
-    def is_large(self) -> bool:
-        """Whether the difference is more than two standard errors."""
-        return abs(self.difference) > LARGE
+@dataclass(frozen=True)
+class Statement:
+    """A sentence of the paper in words of ours, and whether our runs bear it out.
+
+    Attributes
+    ----------
+    text : what the paper says
+    holds : whether it does here; None where nothing was run that could tell
+    evidence : the numbers by which that is decided
+    """
+
+    text: str
+    holds: bool | None
+    evidence: str
 
 
 @dataclass(frozen=True)
@@ -137,11 +142,13 @@ class Content:
     Attributes
     ----------
     blocks : from top to bottom; none where nothing has been run
-    comparisons : the section's rows of the summary
+    comparisons : the section's numbers in the summary
+    statements : the section's sentences in the summary
     """
 
     blocks: Sequence[Block] = ()
     comparisons: Sequence[Comparison] = ()
+    statements: Sequence[Statement] = ()
 
 
 @dataclass(frozen=True)
@@ -153,8 +160,9 @@ class Section:
     anchor : the section's name in links
     title : the section's heading
     blocks : from top to bottom
-    comparisons : the section's rows of the summary
+    comparisons : the section's numbers in the summary
     studies : names of the studies that the section needs
+    statements : the section's sentences in the summary
     """
 
     anchor: str
@@ -162,6 +170,7 @@ class Section:
     blocks: Sequence[Block]
     comparisons: Sequence[Comparison] = ()
     studies: Sequence[str] = ()
+    statements: Sequence[Statement] = ()
 
     @property
     def is_missing(self) -> bool:

@@ -12,7 +12,7 @@ from typing import Generic, Protocol, TypeVar
 
 from ..store import Result
 from .blocks import Cell, Comparison, Table
-from .statistics import LARGE
+from .statistics import Difference
 from .text import NOT_RUN, as_difference, as_sample
 
 Row = TypeVar("Row")
@@ -78,9 +78,9 @@ RUNS: Column[Grouped] = Column("runs", lambda row: len(row.group))
 RUNS_OF_PAPER: Column[Grouped] = Column("runs", lambda row: len(row.group) or NOT_RUN)
 
 
-def difference_cell(value: float) -> Cell:
-    """Return a difference in standard errors, marked where it is large."""
-    return Cell(as_difference(value), marked=abs(value) > LARGE)
+def difference_cell(one: Difference) -> Cell:
+    """Return a difference in standard errors, marked where chance would hardly make it."""
+    return Cell(as_difference(one.in_errors), marked=one.is_significant)
 
 
 def ours_text(comparison: Comparison) -> str:

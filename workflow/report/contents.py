@@ -20,9 +20,12 @@ from .sections import (
     dimer_orientation,
     dimer_packing_fraction,
     dimer_wall,
+    dimers_soft,
     number_of_spheres,
     pictures,
     protocol,
+    reference,
+    repose,
     response,
     sphere_contacts,
     sphere_wall,
@@ -54,7 +57,14 @@ class Entry:
         content = self.build(data)
         note = missing(self.studies[0]) if self.studies else nothing_run()
         blocks = content.blocks or [note]
-        return Section(name, self.title, blocks, tuple(content.comparisons), tuple(self.studies))
+        return Section(
+            name,
+            self.title,
+            blocks,
+            tuple(content.comparisons),
+            tuple(self.studies),
+            tuple(content.statements),
+        )
 
 
 SECTIONS: Mapping[str, Entry] = {
@@ -108,6 +118,15 @@ SECTIONS: Mapping[str, Entry] = {
         "Are the packings random? Structure", structure.structure, ["table-2", "dimers"]
     ),
     "forces": Entry("Contact forces", structure.forces, ["table-2", "dimers"]),
+    "dimers-soft": Entry(
+        "Where dimers are densest: hard and soft contacts", dimers_soft.dimers_soft, ["dimers-soft"]
+    ),
+    "reference": Entry(
+        "Reference values: isostaticity, small gaps, weak forces",
+        reference.reference,
+        ["reference"],
+    ),
+    "repose": Entry("Angle of repose without friction", repose.repose, ["repose"]),
     "response": Entry("Response of a packing", response.response, ["response"]),
     "protocol": Entry("Time step, random force and drag", protocol.protocol, ["protocol"]),
     "checks": Entry("Overlap and resolution of every case", checks.checks),

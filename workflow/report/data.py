@@ -17,7 +17,7 @@ from ..errors import WorkflowError
 from ..shipped import DECKS
 from ..shipped import STUDIES as OF_THE_PAPER
 from ..store import Result, StoredStudy, read_studies
-from .statistics import FloatArray
+from .curves import FloatArray
 
 # This deck pours free spheres: its particles are spheres.
 SPHERES = "spheres"

@@ -34,7 +34,8 @@ from lammps_inelastic.analysis.plots import (
 )
 
 from ..files import whole
-from .statistics import FloatArray, Sample
+from .curves import FloatArray
+from .statistics import Sample
 
 Kind = Literal["curve", "points", "apart", "distribution", "profile"]
 
@@ -124,6 +125,7 @@ class Panel:
     moments : vertical lines, and what is written beside them
     title : above the axes
     log : whether y is on a logarithmic scale
+    log_x : whether x is, too
     ticks : names of x = 0, 1, ...
     top : upper end of y, where the highest values say little
     """
@@ -136,6 +138,7 @@ class Panel:
     moments: Sequence[tuple[str, float]] = ()
     title: str = ""
     log: bool = False
+    log_x: bool = False
     ticks: Sequence[str] = ()
     top: float | None = None
 
@@ -349,6 +352,8 @@ def _draw(ax: Axes, panel: Panel) -> None:
     if bottom is not None:
         ax.set_yscale("log", nonpositive="mask")
         ax.set_ylim(bottom=bottom)
+    if panel.log_x:
+        ax.set_xscale("log")
     if panel.ticks:
         ax.set_xticks(range(len(panel.ticks)), panel.ticks, rotation=30, ha="right")
         ax.set_xlim(-0.5, len(panel.ticks) - 0.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -11,43 +12,51 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined, select_autoescape
 
 from ..provenance import THIS, versions
-from .blocks import Cell, Comparison, Section, Table
+from .blocks import Cell, Comparison, Section, Statement, Table
 from .columns import Column, difference_cell, ours_text, table
 from .data import Data
 from .sections.provenance import codes_line, commands
-from .statistics import LARGE, SHARE_ABOVE_LARGE, computing_seconds
-from .text import as_short, as_stated, as_text, as_time
+from .statistics import FEW, SIGNIFICANT, adjusted, computing_seconds
+from .text import DASH, as_probability, as_stated, as_text, as_time
 
 TEMPLATE = "template.html.j2"
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The table at the top of a report, and its sum.
+    """The answer at the top of a report: does it reproduce the paper?
 
     Attributes
     ----------
-    table : all comparisons with the paper
-    compared : how many of them have a difference in standard errors
-    large : how many of these differences are large
+    numbers : the paper's numbers beside ours
+    compared : how many of them have a difference whose error is known
+    significant : how many of these differences chance alone would hardly make, each by itself
+    remaining : how many of them are left when they are corrected for how many were compared
+    statements : the paper's sentences, and whether they hold here; None where there are none
+    held, told : how many of the sentences hold, and of how many it is known
     """
 
-    table: Table
+    numbers: Table
     compared: int
-    large: int
+    significant: int
+    remaining: int
+    statements: Table | None
+    held: int
+    told: int
 
     @property
-    def large_by_chance(self) -> str:
-        """How many differences would be large if nothing but chance made them."""
-        return as_text(SHARE_ABOVE_LARGE * self.compared, 1)
+    def by_chance(self) -> str:
+        """How many differences would be significant if nothing but chance made them."""
+        return as_text(SIGNIFICANT * self.compared, 1)
 
 
 @dataclass(frozen=True)
 class _Row:
-    """A comparison and the section that it stands in."""
+    """A comparison, its corrected probability, and the section that it stands in."""
 
     section: Section
     comparison: Comparison
+    corrected: float
 
     def with_unit(self, text: str) -> str:
         """Write the unit of the comparison behind a number."""
@@ -55,10 +64,20 @@ class _Row:
         return f"{text} {unit}" if unit else text
 
     @property
+    def verdict(self) -> str:
+        """Whether both numbers agree; see `adjusted`."""
+        if math.isnan(self.comparison.difference.p):
+            return DASH
+        if not self.comparison.difference.is_significant:
+            return "agrees"
+        return "differs" if self.corrected < SIGNIFICANT else "differs, perhaps by chance"
+
+    @property
     def remarks(self) -> str:
         """The differences from the paper's case, and why a large difference is large."""
         one = self.comparison
-        return "; ".join(text for text in (one.note, one.why if one.is_large else "") if text)
+        why = one.why if one.difference.is_significant else ""
+        return "; ".join(text for text in (one.note, why) if text)
 
 
 COLUMNS: Sequence[Column[_Row]] = (
@@ -67,7 +86,32 @@ COLUMNS: Sequence[Column[_Row]] = (
     Column("ours", lambda row: row.with_unit(ours_text(row.comparison))),
     Column("runs", lambda row: row.comparison.ours.n),
     Column("difference", lambda row: difference_cell(row.comparison.difference), "SE"),
+    Column("p", lambda row: as_probability(row.comparison.difference.p)),
+    Column("verdict", lambda row: row.verdict),
     Column("not as in the paper, and why", lambda row: row.remarks),
+)
+
+
+@dataclass(frozen=True)
+class _Said:
+    """A statement, and the section that it stands in."""
+
+    section: Section
+    statement: Statement
+
+    @property
+    def verdict(self) -> Cell:
+        """Whether the sentence holds."""
+        holds = self.statement.holds
+        if holds is None:
+            return Cell("not known")
+        return Cell("holds" if holds else "does not hold", marked=not holds)
+
+
+STATEMENT_COLUMNS: Sequence[Column[_Said]] = (
+    Column("the paper says", lambda said: Cell(said.statement.text, link=said.section.anchor)),
+    Column("here", lambda said: said.verdict),
+    Column("by what", lambda said: said.statement.evidence),
 )
 
 
@@ -104,23 +148,35 @@ def render(data: Data, sections: Sequence[Section]) -> str:
 
 
 def summarise(sections: Sequence[Section]) -> Summary | None:
-    """Return the table of all comparisons; None if there are none."""
-    rows = [_Row(section, one) for section in sections for one in section.comparisons]
-    if not rows:
+    """Return all comparisons and statements; None if there are none."""
+    pairs = [(section, one) for section in sections for one in section.comparisons]
+    said = [_Said(section, one) for section in sections for one in section.statements]
+    if not pairs and not said:
         return None
-    compared = [row.comparison for row in rows if row.comparison.is_known]
+    probabilities = [one.difference.p for _, one in pairs]
+    corrected = adjusted(probabilities)
+    rows = [_Row(*pair, p) for pair, p in zip(pairs, corrected, strict=True)]
+    told = [one.statement.holds for one in said if one.statement.holds is not None]
     return Summary(
         table(
-            "Paper and ours",
+            "The paper's numbers and ours",
             COLUMNS,
             rows,
             (
-                "Ours: mean ± standard deviation (standard error). SE: standard errors, "
-                "sqrt(ours² + the paper's²); a ± that the paper states as such is taken for its "
-                "standard error. Where it states no scatter, ours alone. Marked: more than "
-                f"{as_short(LARGE)}. Dash: a single run has no standard error.",
+                "Ours: mean ± standard deviation (standard error); a row of fewer than "
+                f"{FEW} runs has the scatter of all rows of its table, pooled, where there are "
+                "several. SE: standard errors, sqrt(ours² + the paper's²); a ± that the paper "
+                "states as such is taken for its standard error. Where it states no scatter, ours "
+                "alone. p: how often chance alone would make a difference at least as large, by "
+                f"Student's t (Welch). Marked: p below {SIGNIFICANT}. Rows share runs, and there "
+                "are many: a number differs only if p is below that after Holm's correction, "
+                "which holds whatever rows share.",
             ),
         ),
-        len(compared),
-        sum(one.is_large for one in compared),
+        sum(not math.isnan(p) for p in probabilities),
+        sum(p < SIGNIFICANT for p in probabilities),
+        sum(p < SIGNIFICANT for p in corrected),
+        table("The paper's sentences", STATEMENT_COLUMNS, said) if said else None,
+        sum(told),
+        len(told),
     )

@@ -66,6 +66,10 @@ FABRIC = tuple(Quantity(f"fabric_{axis}", f"fabric, {axis}", decimals=4) for axi
 Q4, Q6 = Quantity("q4", "q4"), Quantity("q6", "q6")
 CRYSTALLINE = Quantity("crystalline", "crystalline", "%", 100.0, 2)
 
+EXCESS_CONTACTS = Quantity("excess_contacts", "excess contacts", "‰", decimals=2)
+GAP_EXPONENT = Quantity("gap_exponent", "exponent of gaps")
+WEAK_FORCE_EXPONENT = Quantity("weak_force_exponent", "exponent of weak forces")
+
 # The table of a study that is none of the paper's has these columns, as far as they were measured.
 OF_ANY_STUDY = (
     PACKING_FRACTION,

@@ -102,6 +102,11 @@ def as_difference(value: float) -> str:
     return f"{'+' if value > 0 else ''}{as_text(value, 1)}"
 
 
+def as_probability(value: float) -> str:
+    """Write a probability: `0.03`, `< 0.001`, or a dash for NaN."""
+    return "< 0.001" if value < 0.001 else as_text(value, 3 if value < 0.1 else 2)
+
+
 def as_choice(values: Sequence[int]) -> str:
     """Write several whole numbers: `0, 1, 11 or 12`."""
     return ", ".join(map(str, values[:-1])) + f" or {values[-1]}"

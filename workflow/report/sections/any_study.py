@@ -10,11 +10,12 @@ import numpy as np
 from ...store import Result, StoredStudy
 from ..blocks import Block, Section, Table, missing
 from ..columns import RUNS, Case, Column, table
+from ..curves import mean_curve, mean_distribution
 from ..data import arrays_of, profiles, series
 from ..figures import Curve, Figure, Panel, curve, points
 from ..groups import by_value, by_variables, grouped, labelled, varying
 from ..quantities import OF_ANY_STUDY
-from ..statistics import mean_curve, mean_distribution, numbers
+from ..statistics import numbers
 from ..text import as_value
 from .pictures import network_picture, step_pictures
 

@@ -7,17 +7,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from lammps_inelastic.analysis import AnalysisError, Plateau, plateau
 
 from ...store import Result
-from ..blocks import Content, Text
-from ..columns import Column, table
+from ..blocks import Content, Statement, Text
+from ..columns import RUNS, Column, table
+from ..curves import FloatArray
 from ..data import Data, series
 from ..figures import Curve, Figure, Panel, curve
-from ..groups import count_of, nearest_size, seed_label
+from ..groups import by_value, count_of, grouped, nearest_size, seed_label
 from ..quantities import COORDINATION_NUMBER, PACKING_FRACTION, Quantity
-from ..statistics import FloatArray
-from ..text import DASH, as_count, as_text
+from ..statistics import Sample, difference, sample
+from ..text import DASH, as_count, as_mean, as_probability, as_sample, as_short, as_text
 
 # The paper calls its two curves constant within these shares of the final mean.
 BAND_OF_PHI, BAND_OF_Z = 0.001, 0.0005
@@ -51,6 +54,16 @@ def coming_to_rest(data: Data) -> Content:
         return Content()
     stated = data.paper["protocol"]
     moments = _moments(results[0], stated)
+    runs = [
+        _Run(
+            count_of([result]),
+            seed_label(result),
+            _plateau(result, PACKING_FRACTION, BAND_OF_PHI),
+            _plateau(result, COORDINATION_NUMBER, BAND_OF_Z),
+        )
+        for result in results
+    ]
+    to_plateau = _times_to_the_plateau(data)
     return Content(
         [
             Figure(
@@ -69,15 +82,7 @@ def coming_to_rest(data: Data) -> Content:
             table(
                 "From which step on the packing stays as it is",
                 COLUMNS,
-                [
-                    _Run(
-                        count_of([result]),
-                        seed_label(result),
-                        _plateau(result, PACKING_FRACTION, BAND_OF_PHI),
-                        _plateau(result, COORDINATION_NUMBER, BAND_OF_Z),
-                    )
-                    for result in results
-                ],
+                runs,
                 (
                     "The mean is that of the last quarter of the frames. Dash: not even the last "
                     "frame.",
@@ -91,8 +96,96 @@ def coming_to_rest(data: Data) -> Content:
                 "of steps cannot. z is that of single frames, and until the count it is taken with "
                 "the larger ε, with which single frames scatter."
             ),
-        ]
+            *(
+                [
+                    table(
+                        "How long it takes to the plateau of φ",
+                        PLATEAU_COLUMNS,
+                        to_plateau,
+                        (
+                            "The plateau begins with the first frame from which on φ stays within "
+                            f"±{as_text(100 * BAND_OF_PHI, 1)} % of the mean of the last quarter. "
+                            "Mean ± standard deviation (standard error) over the runs.",
+                        ),
+                    )
+                ]
+                if to_plateau
+                else []
+            ),
+        ],
+        statements=[*_statements(runs), *_statement_on_times(to_plateau)],
     )
+
+
+def _statements(runs: Sequence[_Run]) -> list[Statement]:
+    """Say whether both numbers come to a plateau in all runs."""
+    found = []
+    for name, band, plateaus in (
+        ("packing fraction", BAND_OF_PHI, [run.phi for run in runs]),
+        ("coordination number", BAND_OF_Z, [run.z for run in runs]),
+    ):
+        steps = [one.step for one in plateaus if one is not None and one.step is not None]
+        found.append(
+            Statement(
+                f"The {name} comes to a plateau, constant within ±{as_text(100 * band, 2)} %.",
+                len(steps) == len(plateaus),
+                f"{len(steps)} of {len(plateaus)} runs"
+                + (f", from step {min(steps)} to {max(steps)} on" if steps else ""),
+            )
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class _ToPlateau:
+    """How long the runs of one random force take to the plateau: time, and seconds of computing."""
+
+    force: float
+    group: Sequence[Result]
+    time: Sample
+    seconds: Sample
+
+
+PLATEAU_COLUMNS: Sequence[Column[_ToPlateau]] = (
+    Column("random force", lambda row: as_short(row.force)),
+    RUNS,
+    Column("time", lambda row: as_sample(row.time, 2)),
+    Column("computing", lambda row: as_sample(row.seconds, 2), "s"),
+)
+
+
+def _times_to_the_plateau(data: Data) -> list[_ToPlateau]:
+    """Return how long it takes with each random force, in the study with many seeds."""
+    known = [r for r in data.results("more-seeds") if series(r, "evolution/seconds") is not None]
+    rows = []
+    for force, group in sorted(grouped(known, by_value("random_force")).items()):
+        found = [(r, _plateau(r, PACKING_FRACTION, BAND_OF_PHI)) for r in group]
+        reached = [(r, p.step) for r, p in found if p is not None and p.step is not None]
+        times, seconds = (
+            sample(
+                float(np.interp(step, r.values["evolution/step"], r.values[f"evolution/{name}"]))
+                for r, step in reached
+            )
+            for name in ("time", "seconds")
+        )
+        rows.append(_ToPlateau(force, [r for r, _ in reached], times, seconds))
+    return rows
+
+
+def _statement_on_times(rows: Sequence[_ToPlateau]) -> list[Statement]:
+    without = next((row for row in rows if row.force == 0), None)
+    shaken = next((row for row in rows if row.force > 0), None)
+    if without is None or shaken is None:
+        return []
+    apart = difference(shaken.seconds, without.seconds)
+    return [
+        Statement(
+            "It takes slightly less computing time to the plateau with a random force.",
+            apart.value < 0,
+            f"{as_mean(shaken.seconds, 2)} s with, {as_mean(without.seconds, 2)} s without "
+            f"(p = {as_probability(apart.p)})",
+        )
+    ]
 
 
 def _curves(results: Sequence[Result], quantity: Quantity) -> list[Curve]:

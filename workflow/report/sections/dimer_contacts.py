@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...store import Result
-from ..blocks import Block, Cell, Comparison, Content, Text
+from ..blocks import Block, Cell, Comparison, Content, Statement, Text
 from ..columns import RUNS, Column, table
+from ..curves import FloatArray, mean_distribution
 from ..data import Data, arrays_of
 from ..figures import Curve, Figure, Panel, curve
 from ..groups import unlike
@@ -21,80 +23,82 @@ from ..quantities import (
     NEIGHBOURS,
     RATTLERS,
 )
-from ..statistics import FloatArray, Sample, Stated, mean_distribution, numbers, pooled_numbers
+from ..statistics import Stated, numbers
 from ..text import DASH, as_sample, as_short, as_text
 from .aspect_ratios import (
+    HEAD,
     POOLED,
-    ByAspect,
+    Row,
+    Shaken,
     against_aspect,
-    by_aspect,
-    cell_of,
     listed,
     name_of,
-    true_dimers,
+    rows_of,
+    shaken,
 )
 
+# So small a share of the particles outside of a range is not seen in a plot of shares.
+RARE = 0.001
 
-@dataclass(frozen=True)
-class _Row:
-    """The runs of one aspect ratio, and numbers of theirs with the pooled scatter."""
-
-    aspect: float
-    group: Sequence[Result]
-    contacts: Sample
-    neighbours: Sample
-    without_rattlers: Sample
-
-    def is_outside(self, stated: Stated) -> bool:
-        """Say whether dimers have more or fewer contacts than the paper's range."""
-        return self.aspect > 1 and abs(self.contacts.mean - stated.value) > stated.error
+SHOWN = (COORDINATION_NUMBER, NEIGHBOURS, COORDINATION_NUMBER_WITHOUT_RATTLERS)
 
 
-def _columns(stated: Stated) -> Sequence[Column[_Row]]:
+def _is_outside(row: Row, stated: Stated) -> bool:
+    """Say whether dimers have more or fewer contacts than the paper's range."""
+    contacts = row.numbers[COORDINATION_NUMBER.name]
+    return row.aspect > 1 and abs(contacts.mean - stated.value) > stated.error
+
+
+def _columns(stated: Stated) -> Sequence[Column[Row]]:
     return (
-        Column("L/d", lambda row: cell_of(row.aspect)),
-        RUNS,
+        *HEAD,
         Column(
             "contacts z",
-            lambda row: Cell(as_sample(row.contacts, 3), marked=row.is_outside(stated)),
+            lambda row: Cell(
+                as_sample(row.numbers[COORDINATION_NUMBER.name], 3), marked=_is_outside(row, stated)
+            ),
         ),
-        Column("neighbours", lambda row: as_sample(row.neighbours, 3)),
+        Column("neighbours", lambda row: as_sample(row.numbers[NEIGHBOURS.name], 3)),
         MEAN_RESOLUTION,
         Column(
             RATTLERS.heading,
             lambda row: as_text(RATTLERS.over(row.group).mean, RATTLERS.decimals),
             RATTLERS.unit,
         ),
-        Column("z without rattlers", lambda row: as_sample(row.without_rattlers, 3)),
+        Column(
+            "z without rattlers",
+            lambda row: as_sample(row.numbers[COORDINATION_NUMBER_WITHOUT_RATTLERS.name], 3),
+        ),
     )
 
 
 def contacts_and_neighbours(data: Data) -> Content:
     """Show contacts and neighbours of a particle against the aspect ratio."""
-    known = {
-        aspect: group
-        for aspect, group in by_aspect(data).items()
-        if numbers(group, "coordination_number").n
-    }
-    if not known:
+    forces = [
+        one.kept({a: g for a, g in one.groups.items() if numbers(g, "coordination_number").n})
+        for one in shaken(data)
+    ]
+    forces = [one for one in forces if one.groups]
+    if not forces:
         return Content()
     stated = data.paper["dimers"]
     per_particle = stated["contacts_per_particle"]
     of_paper = Stated(per_particle["value"], per_particle["tolerance"])
     paper_range = f"{as_short(of_paper.value)} ± {as_short(of_paper.error)}"
-    means = [numbers(group, "neighbours").mean for group in true_dimers(known).values()]
-    most = max(means, default=math.nan)
+    rows = rows_of(forces, SHOWN)
+    most = max((row.numbers[NEIGHBOURS.name].mean for row in rows), default=math.nan)
     blocks: list[Block] = [
         Figure(
             "figure-13",
-            "Contacts and neighbours of a particle against the aspect ratio; several contacts "
-            "with one neighbour count apart. Shaded: the paper's range for dimers.",
-            [_panel(known, of_paper, paper_range)],
+            "Contacts and neighbours of a particle against the aspect ratio, by the random force; "
+            "several contacts with one neighbour count apart. Shaded: the paper's range for "
+            "dimers.",
+            [_panel(forces, of_paper, paper_range)],
         ),
         table(
             "Contacts and neighbours against aspect ratio",
             _columns(of_paper),
-            _rows(known),
+            rows,
             (
                 f"{POOLED} Marked: outside {paper_range}. Near L/d = 1 the two contacts of a dimer "
                 "with a neighbour lie close together, and only a tolerance well below ε = 0.005 "
@@ -109,27 +113,22 @@ def contacts_and_neighbours(data: Data) -> Content:
             f"most {as_text(most, 2)} neighbours in the mean."
         ),
     ]
-    return Content(blocks, _compared(true_dimers(known), of_paper, stated["count"]))
-
-
-def _rows(known: ByAspect) -> list[_Row]:
-    contacts, neighbours, without_rattlers = (
-        pooled_numbers(known, quantity.name)
-        for quantity in (COORDINATION_NUMBER, NEIGHBOURS, COORDINATION_NUMBER_WITHOUT_RATTLERS)
+    dimers = [row for row in rows if row.aspect > 1]
+    return Content(
+        blocks,
+        _compared(dimers, of_paper, stated["count"]),
+        _statements(rows, of_paper, stated["neighbours_mean_below"]),
     )
-    return [
-        _Row(aspect, group, contacts[aspect], neighbours[aspect], without_rattlers[aspect])
-        for aspect, group in known.items()
-    ]
 
 
-def _panel(known: ByAspect, of_paper: Stated, paper_range: str) -> Panel:
+def _panel(forces: Sequence[Shaken], of_paper: Stated, paper_range: str) -> Panel:
     return Panel(
         "aspect ratio L/d",
         "number per particle",
         [
-            against_aspect("contacts", known, COORDINATION_NUMBER),
-            against_aspect("neighbours", known, NEIGHBOURS),
+            against_aspect(f"{quantity.heading}, {one.label}", one.groups, quantity)
+            for one in forces
+            for quantity in (COORDINATION_NUMBER, NEIGHBOURS)
         ],
         bounds=(
             f"paper: {paper_range}",
@@ -139,20 +138,43 @@ def _panel(known: ByAspect, of_paper: Stated, paper_range: str) -> Panel:
     )
 
 
-def _compared(dimers: ByAspect, of_paper: Stated, particles: int) -> list[Comparison]:
+def _compared(dimers: Sequence[Row], of_paper: Stated, particles: int) -> list[Comparison]:
     """Compare the contacts of all dimers with the paper's one number for them."""
-    runs = [result for group in dimers.values() for result in group]
+    runs = [result for row in dimers for result in row.group]
     if not runs:
         return []
+    aspects = len({row.aspect for row in dimers})
     return [
         Comparison(
-            f"z of dimers, mean over {len(dimers)} aspect ratios",
+            f"z of dimers, mean over {aspects} aspect ratios",
             of_paper,
             COORDINATION_NUMBER.over(runs),
             COORDINATION_NUMBER.decimals,
             COORDINATION_NUMBER.unit,
             unlike(runs, particles),
         )
+    ]
+
+
+def _statements(rows: Sequence[Row], of_paper: Stated, below: float) -> list[Statement]:
+    dimers = [row for row in rows if row.aspect > 1]
+    if not dimers:
+        return []
+    z = [row.numbers[COORDINATION_NUMBER.name].mean for row in dimers]
+    neighbours = [row.numbers[NEIGHBOURS.name].mean for row in dimers]
+    paper_range = f"{as_short(of_paper.value)} ± {as_short(of_paper.error)}"
+    return [
+        Statement(
+            f"A dimer has {paper_range} contacts at every L/d above 1, as isostaticity wants it.",
+            not any(_is_outside(row, of_paper) for row in dimers),
+            f"{as_text(min(z), 3)} to {as_text(max(z), 3)}, from L/d = "
+            f"{as_short(min(row.aspect for row in dimers))} on",
+        ),
+        Statement(
+            f"The mean number of neighbours is below {as_short(below)}.",
+            max(neighbours) < below,
+            f"{as_text(min(neighbours), 2)} to {as_text(max(neighbours), 2)}",
+        ),
     ]
 
 
@@ -197,8 +219,9 @@ class _Distribution:
 
 @dataclass(frozen=True)
 class _Curves:
-    """The distributions of one aspect ratio, by the names of the numbers."""
+    """The distributions of one random force and aspect ratio, by the names of the numbers."""
 
+    force: float
     aspect: float
     group: Sequence[Result]
     distributions: Mapping[str, _Distribution]
@@ -232,13 +255,19 @@ def distributions(data: Data) -> Content:
         "neighbours": tuple(stated["neighbours_range"]),
     }
     rows = [
-        _Curves(aspect, group, _distributions(group, ranges))
-        for aspect, group in listed(data, by_aspect(data)).items()
-        if arrays_of(group, "distribution/contacts")
+        _Curves(one.force, aspect, group, _distributions(group, ranges))
+        for number, one in enumerate(shaken(data))
+        for aspect, group in listed(data, one.groups).items()
+        if arrays_of(group, "distribution/contacts") and (aspect > 1 or number == 0)
     ]
     if not rows:
         return Content()
-    columns: list[Column[_Curves]] = [Column("curve", lambda row: name_of(row.aspect)), RUNS]
+    weakest = [row for row in rows if row.force == rows[0].force]
+    columns: list[Column[_Curves]] = [
+        Column("random force", lambda row: as_short(row.force) if row.aspect > 1 else DASH),
+        Column("curve", lambda row: name_of(row.aspect)),
+        RUNS,
+    ]
     for name, stated_range in ranges.items():
         columns += _distribution_columns(name, stated_range)
     contacts, neighbours = ranges["contacts"], ranges["neighbours"]
@@ -247,9 +276,10 @@ def distributions(data: Data) -> Content:
             Figure(
                 "figure-14",
                 "Share of the particles in the box with so many contacts (left) and neighbours "
-                "(right); error bars: standard error over the runs.",
+                f"(right), random force {as_short(rows[0].force)}; error bars: standard error "
+                "over the runs.",
                 [
-                    Panel(f"number of {name}", "share of particles", _curves(rows, name))
+                    Panel(f"number of {name}", "share of particles", _curves(weakest, name))
                     for name in ranges
                 ],
             ),
@@ -261,8 +291,47 @@ def distributions(data: Data) -> Content:
                 "printed as d/L = 0.4 and 0.6 (perhaps L/d 1.4 and 1.6); neighbours range from "
                 f"{neighbours[0]} to {neighbours[1]} and depend on the aspect ratio."
             ),
-        ]
+        ],
+        statements=_statements_on_distributions(weakest, stated),
     )
+
+
+def _statements_on_distributions(
+    rows: Sequence[_Curves], stated: Mapping[str, Any]
+) -> list[Statement]:
+    dimers = [row for row in rows if row.aspect > 1]
+    if not dimers:
+        return []
+    found = []
+    for name in ("contacts", "neighbours"):
+        low, high = stated[f"{name}_range"]
+        outside = max(row.distributions[name].outside for row in dimers)
+        found.append(
+            Statement(
+                f"The number of {name} ranges from {low} to {high} (in most runs).",
+                outside < RARE,
+                f"at most {as_text(100 * outside, 2)} % of the dimers of an L/d lie outside",
+            )
+        )
+    probable = stated["contacts_most_probable"]
+    tops = {int(np.argmax(row.distributions["contacts"].shares)) for row in dimers}
+    widths = {row.aspect: row.distributions["contacts"].width for row in dimers}
+    narrow = sorted(widths, key=lambda aspect: widths[aspect])[:2]
+    return [
+        Statement(
+            f"The most probable number of contacts is {probable}.",
+            tops == {probable},
+            f"most probable: {', '.join(map(str, sorted(tops)))}",
+        ),
+        *found,
+        Statement(
+            "The distribution of contacts is slightly narrower for two aspect ratios, printed as "
+            "d/L = 0.4 and 0.6 (perhaps L/d = 1.4 and 1.6).",
+            set(narrow) == {1.4, 1.6} if {1.4, 1.6} <= set(widths) else None,
+            "standard deviation: "
+            + ", ".join(f"{as_text(w, 2)} at {as_short(a)}" for a, w in widths.items()),
+        ),
+    ]
 
 
 def _distributions(

@@ -11,35 +11,49 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ...store import Result
-from ..blocks import Block, Comparison, Content, Text
+from ..blocks import Block, Comparison, Content, Statement, Text
 from ..columns import RUNS, Column, table
 from ..data import Data
 from ..figures import Curve, Figure, Panel, points
 from ..groups import by_size, by_value, grouped
 from ..quantities import COORDINATION_NUMBER, PACKING_FRACTION
-from ..statistics import Sample, Stated, numbers, sample
+from ..statistics import (
+    SIGNIFICANT,
+    Sample,
+    Stated,
+    adjusted,
+    difference,
+    numbers,
+    sample,
+)
 from ..text import DASH, as_count, as_mean, as_short, as_text
-from .aspect_ratios import by_aspect
+from .aspect_ratios import shaken
 
 AXES = "xyz"
 # The paper's dimers are made of spheres of this diameter.
 DIAMETER = 0.052
+# From this aspect ratio on a dimer is so long that it matters how it lies.
+LONG = 1.2
 
 
 def ratio_over_isotropic(group: Sequence[Result], axis: str) -> Sample:
     """Return a_x, a_y or a_z over its isotropic value.
 
     Its standard error is that between the runs, or that which the number of dimers leaves if this
-    is larger: two runs may agree by chance.
+    is larger: a few runs may agree by chance. The latter is known from many dimers, so that its
+    degrees of freedom are unlimited.
     """
     known = [result for result in group if not math.isnan(result.number(f"a_{axis}"))]
     found = sample(result.number(f"a_{axis}") / result.number("a_isotropic") for result in known)
     if not known:
         return found
     of_dimers = _error_of_a_run(known, axis)
-    std = of_dimers if math.isnan(found.std) else max(found.std, of_dimers)
-    return Sample(found.mean, std, found.n)
+    if found.std > of_dimers:
+        return found
+    return Sample(found.mean, of_dimers, found.n, math.inf)
 
 
 def _error_of_a_run(group: Sequence[Result], axis: str) -> float:
@@ -77,6 +91,8 @@ class _Orientation:
 
     Attributes
     ----------
+    force : largest random acceleration, per direction; NaN of the paper
+    value : the aspect ratio; NaN of the paper
     aspect : the aspect ratio, with what else is to be said of it
     runs : how many runs of ours; None for the paper
     components : a_x, a_y, a_z, length
@@ -84,6 +100,8 @@ class _Orientation:
     ratios : a_x, a_y, a_z over that; the paper's are of no runs
     """
 
+    force: float
+    value: float
     aspect: str
     runs: int | None
     components: Mapping[str, float]
@@ -93,9 +111,10 @@ class _Orientation:
 
 @dataclass(frozen=True)
 class _Agitated:
-    """A row of the table against the random force: the runs of one size and force."""
+    """A row of the table against the random force: the runs of one size, start and force."""
 
     particles: float
+    start: str
     force: float
     group: Sequence[Result]
     ratios: Mapping[str, Sample]
@@ -114,6 +133,7 @@ def _ratio_column(axis: str) -> Column[_Orientation | _Agitated]:
 
 
 COLUMNS: Sequence[Column[_Orientation]] = (
+    Column("random force", lambda row: as_short(row.force)),
     Column("L/d", lambda row: row.aspect),
     Column("runs", lambda row: DASH if row.runs is None else row.runs),
     *(_component_column(axis) for axis in AXES),
@@ -122,6 +142,7 @@ COLUMNS: Sequence[Column[_Orientation]] = (
 )
 AGITATED_COLUMNS: Sequence[Column[_Agitated]] = (
     Column("dimers", lambda row: as_count(row.particles)),
+    Column("start", lambda row: row.start),
     Column("random force", lambda row: as_short(row.force)),
     RUNS,
     *(_ratio_column(axis) for axis in AXES),
@@ -133,33 +154,51 @@ AGITATED_COLUMNS: Sequence[Column[_Agitated]] = (
 def against_aspect(data: Data) -> Content:
     """Show the orientation of dimers against the aspect ratio, beside the paper's numbers."""
     stated = data.paper["dimers"]["anisotropy"]
-    dimers = {
-        aspect: group
-        for aspect, group in by_aspect(data).items()
-        if not math.isnan(numbers(group, "a_isotropic").mean)
+    forces = {
+        one.force: {
+            aspect: group
+            for aspect, group in one.groups.items()
+            if not math.isnan(numbers(group, "a_isotropic").mean)
+        }
+        for one in shaken(data)
     }
-    if not dimers:
+    forces = {force: dimers for force, dimers in forces.items() if dimers}
+    if not forces:
         return Content()
     consistent, printed = stated["consistent_aspect_ratio"], stated["stated_aspect_ratio"]
-    ratios = {aspect: _ratios(group) for aspect, group in dimers.items()}
-    curves = [
-        points(f"a_{axis}", list(ratios), [of_axes[axis] for of_axes in ratios.values()])
-        for axis in AXES
+    rows = [
+        _our_row(force, aspect, group)
+        for force, dimers in forces.items()
+        for aspect, group in dimers.items()
     ]
     blocks: list[Block] = [
         Figure(
             "anisotropy",
             "Root mean square of the components of the vector between the two spheres of a "
-            "dimer, over what each would be if no direction was preferred. y is along gravity.",
-            [Panel("aspect ratio L/d", "a / isotropic a", curves, references=[("isotropic", 1.0)])],
+            "dimer, over what each would be if no direction was preferred, by the random force. y "
+            "is along gravity.",
+            [
+                Panel(
+                    "aspect ratio L/d",
+                    "a / isotropic a",
+                    [
+                        points(
+                            f"a_{axis}",
+                            [row.value for row in rows if row.force == force],
+                            [row.ratios[axis] for row in rows if row.force == force],
+                        )
+                        for axis in AXES
+                    ],
+                    references=[("isotropic", 1.0)],
+                    title=f"random force {as_short(force)}",
+                )
+                for force in forces
+            ],
         ),
         table(
             "Orientation of dimers in the box",
             COLUMNS,
-            [
-                *(_our_row(aspect, group, ratios[aspect]) for aspect, group in dimers.items()),
-                _row_of_paper(stated),
-            ],
+            [*rows, _row_of_paper(stated)],
             (
                 "± standard error: over the runs, or what the number of dimers leaves if that "
                 "is larger.",
@@ -174,26 +213,80 @@ def against_aspect(data: Data) -> Content:
             f"{as_text(stated['isotropic'], 4)}."
         ),
     ]
-    same = dimers.get(consistent)
-    return Content(blocks, _compared(stated, same) if same else ())
+    comparisons = [
+        one
+        for force, dimers in forces.items()
+        if consistent in dimers
+        for one in _compared(stated, dimers[consistent], f", random force {as_short(force)}")
+    ]
+    weakest = min(forces)
+    return Content(
+        blocks, comparisons, _statements([row for row in rows if row.force == weakest], weakest)
+    )
+
+
+def _statements(rows: Sequence[_Orientation], force: float) -> list[Statement]:
+    """Say whether the dimers of one random force lie as the paper's do."""
+    level = [difference(row.ratios["x"], row.ratios["z"]) for row in rows]
+    lying = [difference(row.ratios["y"], row.ratios["x"]) for row in rows]
+    if not rows or any(math.isnan(one.p) for one in (*level, *lying)):
+        return []
+    apart = adjusted([one.p for one in level])
+    down = adjusted([one.p for one in lying])
+    long = [row for row in rows if row.value >= LONG]
+    slopes = [row.ratios["y"].mean for row in long]
+    return [
+        Statement(
+            "a_x and a_z are the same: the dimers do not remember how they started.",
+            min(apart) >= SIGNIFICANT,
+            f"random force {as_short(force)}: of {len(rows)} differences "
+            f"{sum(p < SIGNIFICANT for p in apart)} are significant (Holm)",
+        ),
+        Statement(
+            "a_y is smaller: dimers lie down.",
+            all(
+                one.value < 0 and p < SIGNIFICANT
+                for row, one, p in zip(rows, lying, down, strict=True)
+                if row.value >= LONG
+            ),
+            f"a_y / isotropic: {as_text(min(slopes), 3)} to {as_text(max(slopes), 3)} from L/d = "
+            f"{as_short(LONG)} on"
+            if slopes
+            else "",
+        ),
+        Statement(
+            "They lie down more the longer they are.",
+            len(slopes) > 2
+            and float(np.polyfit([row.value for row in long], slopes, 1)[0]) < 0
+            and slopes[-1] < slopes[0],
+            f"a_y / isotropic {as_text(slopes[0], 3)} at {as_short(long[0].value)}, "
+            f"{as_text(slopes[-1], 3)} at {as_short(long[-1].value)}"
+            if slopes
+            else "",
+        ),
+    ]
 
 
 def _ratios(group: Sequence[Result]) -> Mapping[str, Sample]:
     return {axis: ratio_over_isotropic(group, axis) for axis in AXES}
 
 
-def _our_row(aspect: float, group: Sequence[Result], ratios: Mapping[str, Sample]) -> _Orientation:
+def _our_row(force: float, aspect: float, group: Sequence[Result]) -> _Orientation:
     return _Orientation(
+        force,
+        aspect,
         as_short(aspect),
         len(group),
         {axis: numbers(group, f"a_{axis}").mean for axis in AXES},
         numbers(group, "a_isotropic").mean,
-        ratios,
+        _ratios(group),
     )
 
 
 def _row_of_paper(stated: Mapping[str, Any]) -> _Orientation:
     return _Orientation(
+        math.nan,
+        math.nan,
         f"paper, printed as {stated['stated_aspect_ratio']}",
         None,
         {axis: stated[f"a_{axis}"] for axis in AXES},
@@ -210,12 +303,6 @@ def against_force(data: Data) -> Content:
     stated = data.paper["dimers"]["anisotropy"]
     aspect = results[0].setting("aspect_ratio")
     rows = _agitated_rows(results)
-    as_in_the_paper = [
-        row
-        for row in rows
-        if row.particles == data.paper["dimers"]["count"]
-        and aspect == stated["consistent_aspect_ratio"]
-    ]
     blocks: list[Block] = [
         Figure(
             "dimers-agitation",
@@ -241,36 +328,30 @@ def against_force(data: Data) -> Content:
             "lie with how ours change."
         ),
     ]
-    return Content(
-        blocks,
-        [
-            one
-            for row in as_in_the_paper
-            for one in _compared(stated, row.group, f", random force {as_short(row.force)}")
-        ],
-    )
+    return Content(blocks)
 
 
 def _agitated_rows(results: Iterable[Result]) -> list[_Agitated]:
-    """Return a row for each size and random force, both ascending."""
+    """Return a row for each size, start and random force, sizes and forces ascending."""
     return [
-        _Agitated(particles, force, group, _ratios(group))
+        _Agitated(particles, start, force, group, _ratios(group))
         for (particles, _), of_size in by_size(results).items()
-        for force, group in sorted(grouped(of_size, by_value("random_force")).items())
+        for start, of_start in grouped(of_size, lambda r: str(r.variables.get("start"))).items()
+        for force, group in sorted(grouped(of_start, by_value("random_force")).items())
     ]
 
 
 def _agitated_curves(rows: Sequence[_Agitated]) -> list[Curve]:
-    """Return a curve for each size and axis."""
-    sizes: dict[float, list[_Agitated]] = {}
+    """Return a curve for each size, start and axis."""
+    kinds: dict[tuple[float, str], list[_Agitated]] = {}
     for row in rows:
-        sizes.setdefault(row.particles, []).append(row)
+        kinds.setdefault((row.particles, row.start), []).append(row)
     return [
         points(
-            f"a_{axis}, {as_count(particles)} dimers",
-            [row.force for row in of_size],
-            [row.ratios[axis] for row in of_size],
+            f"a_{axis}, {as_count(particles)} dimers, {start} start",
+            [row.force for row in of_kind],
+            [row.ratios[axis] for row in of_kind],
         )
-        for particles, of_size in sizes.items()
+        for (particles, start), of_kind in kinds.items()
         for axis in AXES
     ]

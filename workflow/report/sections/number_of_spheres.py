@@ -7,14 +7,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...store import Result
-from ..blocks import Block, Comparison, Content, Text
+from ..blocks import Block, Comparison, Content, Statement, Text
 from ..columns import Column, difference_cell, ours_text, table
 from ..data import Data
 from ..groups import by_size, grouped, matching, nearest_size, unlike
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION
-from ..statistics import Stated
-from ..text import DASH, NOT_RUN, as_count, as_short, as_text
+from ..statistics import Stated, difference
+from ..text import DASH, NOT_RUN, as_count, as_measured, as_probability, as_short, as_text
 from .tolerance_and_force import CHANCE, NOTHING_STATED
+
+# The paper's two packing fractions from so many spheres on are 0.1 percentage points apart, and
+# their range is twice that.
+MANY, HARDLY = 10_000, 0.2
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,24 @@ def number_of_spheres(data: Data) -> Content:
             "any change from 10,000 spheres on; few spheres pack less, because the walls are near."
         ),
     ]
-    return Content(blocks, comparisons)
+    return Content(blocks, comparisons, _statements(of_paper))
+
+
+def _statements(rows: Sequence[_Row]) -> list[Statement]:
+    """Say whether the packing fraction changes from 10,000 spheres on."""
+    many = [row for row in rows if row.group and row.spheres >= MANY]
+    if len(many) < 2:
+        return []
+    apart = difference(many[-1].phi.ours, many[0].phi.ours)
+    return [
+        Statement(
+            f"From {as_count(MANY)} spheres on φ hardly depends on their number.",
+            abs(apart.value) < HARDLY,
+            f"{as_count(many[-1].spheres)} less {as_count(many[0].spheres)}: "
+            f"{as_measured(apart.value, apart.error, 2)} percentage points, "
+            f"p {as_probability(apart.p)}",
+        )
+    ]
 
 
 def _row_of_paper(data: Data, results: Sequence[Result], stated: Mapping[str, Any]) -> _Row:

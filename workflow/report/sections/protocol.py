@@ -15,14 +15,7 @@ from ..data import Data
 from ..figures import Figure, Panel, points
 from ..groups import count_of, grouped
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION
-from ..statistics import (
-    LARGE,
-    SHARE_ABOVE_LARGE,
-    Sample,
-    Stated,
-    difference_in_errors,
-    numbers,
-)
+from ..statistics import SIGNIFICANT, UNKNOWN, Difference, adjusted, difference, numbers
 from ..text import as_count, as_short, as_text
 
 # The variables that are changed, and what stands before a changed value.
@@ -38,14 +31,14 @@ class _Row:
     values : of the variables, in their order
     label : what is not as in the standard protocol
     group : the runs
-    phi_apart, z_apart : differences from the standard protocol in standard errors; NaN for itself
+    phi_apart, z_apart : differences from the standard protocol; unknown for itself
     """
 
     values: tuple[float, ...]
     label: str
     group: Sequence[Result]
-    phi_apart: float
-    z_apart: float
+    phi_apart: Difference
+    z_apart: Difference
 
 
 COLUMNS: Sequence[Column[_Row]] = (
@@ -68,7 +61,8 @@ def protocol(data: Data) -> Content:
         return Content()
     rows = _rows(results)
     apart = [one for row in rows[1:] for one in (row.phi_apart, row.z_apart)]
-    large = sum(abs(one) > LARGE for one in apart)
+    significant = sum(one.is_significant for one in apart)
+    remaining = sum(p < SIGNIFICANT for p in adjusted([one.p for one in apart]))
     return Content(
         [
             Figure(
@@ -84,12 +78,15 @@ def protocol(data: Data) -> Content:
                 rows,
                 (
                     "Mean ± standard deviation (standard error). Differences from the first row, "
-                    "in standard errors of the difference; marked: more than 2.",
+                    "in standard errors of the difference; marked: p below "
+                    f"{SIGNIFICANT} by Student's t.",
                 ),
             ),
             Text(
-                f"{large} of {len(apart)} differences are above two standard errors; by "
-                f"chance alone about {as_text(SHARE_ABOVE_LARGE * len(apart), 1)} would be."
+                f"{significant} of {len(apart)} differences are marked; chance alone would mark "
+                f"about {as_text(SIGNIFICANT * len(apart), 1)}. With Holm's correction for their "
+                f"number {remaining} remain. All rows are compared with the same first one, which "
+                "that correction allows for."
             ),
         ]
     )
@@ -112,20 +109,15 @@ def _rows(results: Sequence[Result]) -> list[_Row]:
                 values,
                 ", ".join(changed) or "standard",
                 group,
-                _apart(PACKING_FRACTION.over(group), PACKING_FRACTION.over(usual))
+                difference(PACKING_FRACTION.over(group), PACKING_FRACTION.over(usual))
                 if changed
-                else math.nan,
-                _apart(COORDINATION_NUMBER.over(group), COORDINATION_NUMBER.over(usual))
+                else UNKNOWN,
+                difference(COORDINATION_NUMBER.over(group), COORDINATION_NUMBER.over(usual))
                 if changed
-                else math.nan,
+                else UNKNOWN,
             )
         )
     return rows
-
-
-def _apart(one: Sample, other: Sample) -> float:
-    """Return the difference of two means in standard errors of the difference."""
-    return difference_in_errors(one, Stated(other.mean, other.error))
 
 
 def _panel(rows: Sequence[_Row], name: str) -> Panel:

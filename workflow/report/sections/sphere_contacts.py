@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...store import Result
-from ..blocks import Block, Cell, Comparison, Content, Text
+from ..blocks import Block, Cell, Comparison, Content, Statement, Text
 from ..columns import Column, table
+from ..curves import FloatArray
 from ..data import Data, series
 from ..figures import Figure, Panel, curve
 from ..groups import count_of, nearest_size, seed_label, unlike
 from ..quantities import COORDINATION_NUMBER
-from ..statistics import FloatArray, Stated
+from ..statistics import Stated
 from ..text import as_choice, as_count, as_runs, as_short, as_text
 
 
@@ -95,7 +97,28 @@ def sphere_contacts(data: Data) -> Content:
         COORDINATION_NUMBER.unit,
         unlike(results, 10_000),
     )
-    return Content(blocks, [comparison])
+    return Content(blocks, [comparison], _statements(runs, stated))
+
+
+def _statements(runs: Sequence[_Run], stated: Mapping[str, Any]) -> list[Statement]:
+    """Say whether our runs have the paper's distribution."""
+    tops = {int(np.argmax(run.shares)) for run in runs}
+    never = stated["z_never"]
+    spheres = sum(run.spheres for run in runs)
+    found = {contacts: sum(run.share(contacts) * run.spheres for run in runs) for contacts in never}
+    return [
+        Statement(
+            f"The most frequent coordination number is {stated['z_most_probable']}.",
+            tops == {stated["z_most_probable"]},
+            f"most frequent: {', '.join(map(str, sorted(tops)))}",
+        ),
+        Statement(
+            f"No sphere has {as_choice(never)} contacts.",
+            not any(found.values()),
+            f"of {as_count(spheres)} spheres: "
+            + ", ".join(f"{as_text(number, 1)} with {n}" for n, number in found.items()),
+        ),
+    ]
 
 
 def _with_contacts(contacts: int) -> Column[_Run]:

@@ -12,16 +12,18 @@ import numpy as np
 from lammps_inelastic.analysis import mueller_packing_fraction
 
 from ...store import Result
-from ..blocks import Content, Table, Text
+from ..blocks import Content, Statement, Table, Text
 from ..columns import Column, table
+from ..curves import MeanCurve, mean_curve, root_mean_square_difference
 from ..data import Data, profiles
 from ..figures import Curve, Figure, Panel, curve
 from ..groups import by_size, is_agitated, matching
-from ..statistics import MeanCurve, mean_curve, root_mean_square_difference
 from ..text import as_count, as_runs, as_short, as_text
 
 # Mueller's formula is for cylinders of at least so many diameters.
 NARROWEST = 2.02
+# Curves whose difference is a smaller part of their oscillation are one curve.
+COLLAPSED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +101,9 @@ def sphere_wall(data: Data) -> Content:
             Text(
                 "Paper: a damped oscillation; the curves of the three diameters collapse; "
                 "Mueller's formula for infinite width agrees, the one for finite width less so. "
-                + _verdict(means)
             ),
-        ]
+        ],
+        statements=_statements(means),
     )
 
 
@@ -159,10 +161,30 @@ def _collapse_table(means: Sequence[_Profile]) -> Table:
     )
 
 
-def _verdict(means: Sequence[_Profile]) -> str:
-    nearer = [
-        one.apart_from_mueller(None) < one.apart_from_mueller(one.width)
-        for one in means
-        if one.width >= NARROWEST
-    ]
-    return f"Ours: infinite width agrees better for {sum(nearer)} of {len(nearer)} diameters."
+def _statements(means: Sequence[_Profile]) -> list[Statement]:
+    """Say whether the curves collapse, and which of Mueller's formulas is nearer."""
+    found = []
+    pairs = list(combinations(means, 2))
+    if pairs:
+        apart = [one.apart_from(other) for one, other in pairs]
+        waves = [float(np.std(one.mean[1])) for one in means]
+        found.append(
+            Statement(
+                "The packing fraction oscillates near a wall, and the curves of several diameters "
+                "collapse.",
+                max(apart) < COLLAPSED * min(waves),
+                f"root mean square differences {as_text(min(apart), 3)} to "
+                f"{as_text(max(apart), 3)}, oscillations {as_text(min(waves), 3)}",
+            )
+        )
+    wide = [one for one in means if one.width >= NARROWEST]
+    if wide:
+        nearer = [one.apart_from_mueller(None) < one.apart_from_mueller(one.width) for one in wide]
+        found.append(
+            Statement(
+                "Mueller's formula for an infinite width agrees better than that for the width.",
+                all(nearer),
+                f"it is nearer for {sum(nearer)} of {len(nearer)} diameters",
+            )
+        )
+    return found

@@ -10,13 +10,14 @@ from lammps_inelastic.analysis.structure import Q6_OF_CRYSTALS
 from ...store import Result
 from ..blocks import Block, Cell, Content
 from ..columns import RUNS, Case, Column, table
+from ..curves import FloatArray, mean_curve
 from ..data import Data, curves_of
 from ..figures import Curve, Figure, Panel, curve
 from ..groups import by_size
 from ..quantities import CRYSTALLINE, Q4, Q6
-from ..statistics import FloatArray, mean_curve, numbers
+from ..statistics import numbers
 from ..text import as_count, as_short
-from .aspect_ratios import by_aspect
+from .aspect_ratios import shaken
 
 # A packing with a larger share of crystalline particles is not random.
 MOST_CRYSTALLINE = 0.5
@@ -106,7 +107,8 @@ def _cases(data: Data) -> list[Case]:
     ]
     dimers = [
         Case(f"dimers, L/d = {as_short(aspect)}", group)
-        for aspect, group in by_aspect(data).items()
+        for one in shaken(data)[:1]
+        for aspect, group in one.groups.items()
         if aspect in SHOWN_ASPECTS
     ]
     return [*spheres, *dimers]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...store import Result
-from ..blocks import Comparison, Content, Table
+from ..blocks import Comparison, Content, Statement, Table
 from ..columns import RUNS, RUNS_OF_PAPER, Column, table
 from ..data import Data
 from ..groups import (
@@ -21,8 +22,8 @@ from ..groups import (
     unlike,
 )
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION, compared
-from ..statistics import Stated
-from ..text import as_count, as_short
+from ..statistics import SIGNIFICANT, Stated, adjusted, difference
+from ..text import as_count, as_measured, as_probability, as_short
 
 # The paper's rows are of so many spheres and runs.
 SPHERES_OF_PAPER, RUNS_OF_EACH_ROW = 1000, 9
@@ -88,7 +89,63 @@ def tolerance_and_force(data: Data) -> Content:
             )
         )
     run = [row for row in (*of_paper, *more) if row.group]
-    return Content(tables, [one for row in run for one in (row.phi, row.z)])
+    return Content(
+        tables,
+        [one for row in run for one in (row.phi, row.z)],
+        [*_statements_on_force(more), *_statements_on_tolerance(of_paper)],
+    )
+
+
+def _statements_on_force(more: Sequence[_Row]) -> list[Statement]:
+    """Compare the rows with many seeds: with the random force, and without."""
+    shaken = next((row for row in more if row.force == "yes"), None)
+    still = next((row for row in more if row.force == "no"), None)
+    if shaken is None or still is None:
+        return []
+    phi = difference(still.phi.ours, shaken.phi.ours)
+    z = difference(still.z.ours, shaken.z.ours)
+    return [
+        Statement(
+            "The packing fraction is smaller without random force (the paper: not significantly).",
+            phi.value < 0,
+            f"by {as_measured(-phi.value, phi.error, 2)} percentage points, "
+            f"p {as_probability(phi.p)}, {len(still.group)} and {len(shaken.group)} runs",
+        ),
+        Statement(
+            "At rest, the coordination number is the same with and without random force.",
+            not z.is_significant,
+            f"without less with: {as_measured(z.value, z.error, 3)}, p {as_probability(z.p)}",
+        ),
+    ]
+
+
+def _statements_on_tolerance(rows: Sequence[_Row]) -> list[Statement]:
+    """Compare the rows of our solver with random force, one tolerance with another."""
+    known = sorted(
+        (row for row in rows if row.group and row.force == "yes" and row.solver == our_solver()),
+        key=lambda row: row.tolerance,
+    )
+    if len(known) < 3:
+        return []
+    pairs = list(itertools.combinations(known, 2))
+    phi = adjusted([difference(a.phi.ours, b.phi.ours).p for a, b in pairs])
+    tight, middle, loose = known[0], known[1], known[-1]
+    close, far = difference(tight.z.ours, middle.z.ours), difference(tight.z.ours, loose.z.ours)
+    return [
+        Statement(
+            f"From ε = {as_short(loose.tolerance)} r down the tolerance has a negligible effect on "
+            "the packing fraction.",
+            not min(phi) < SIGNIFICANT,
+            f"smallest p of {len(pairs)} differences (Holm): {as_probability(min(phi))}",
+        ),
+        Statement(
+            f"For the coordination number ε = {as_short(middle.tolerance)} r is needed.",
+            far.is_significant and not close.is_significant,
+            f"z at {as_short(tight.tolerance)} r less that at {as_short(middle.tolerance)} r: "
+            f"{as_measured(close.value, close.error, 3)}; less that at "
+            f"{as_short(loose.tolerance)} r: {as_measured(far.value, far.error, 3)}",
+        ),
+    ]
 
 
 def _table(results: Sequence[Result], rows: Sequence[_Row], paper_solver: str) -> Table:

@@ -1,0 +1,177 @@
+"""Power laws of hard packings: small gaps between particles, and weak forces on contacts.
+
+In a packing that is held by as few contacts as can hold it the density of gaps g between particles
+that nearly touch goes as g^-a, and that of forces f well below the mean as f^b (Wyart, Phys. Rev.
+Lett. 109 (2012) 125502; Charbonneau, Corwin, Parisi and Zamponi, Phys. Rev. Lett. 114 (2015)
+125504: a = 0.413 in theory; b = 0.423 for contacts whose opening moves all, 0.17 for those whose
+opening moves few particles).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from .bodies import Particles
+from .errors import InputError
+from .geometry import BoolArray, FloatArray
+from .neighbours import contacts_by_distance
+
+# Exponents beyond this are no power law of a packing.
+STEEPEST = 20.0
+# An exponent of so few values says nothing.
+FEWEST = 10
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """A density that goes as x^exponent between two bounds.
+
+    Attributes
+    ----------
+    exponent : of the density
+    error : its standard error, 1 / sqrt(Fisher information); it takes the values as independent
+    low, high : bounds of the values, in their unit
+    count : number of values between them
+    """
+
+    exponent: float
+    error: float
+    low: float
+    high: float
+    count: int
+
+
+def power_law(values: ArrayLike, low: float, high: float) -> PowerLaw:
+    """Return the power law that makes the values between two bounds most likely.
+
+    For a density C x^k on [low, high] the likelihood is largest where the mean of ln x is that of
+    the density (maximum likelihood, no bins): with y = ln(x / low), L = ln(high / low), s = k + 1,
+
+        <y> = L / (1 - exp(-s L)) - 1 / s
+
+    whose right side grows with s. Its derivative is the variance of y under the density, which is
+    the information of one value on k.
+
+    Parameters
+    ----------
+    values : (n,), > 0; those outside of the bounds are left out
+    low, high : bounds, 0 < low < high, in the unit of the values
+
+    Raises InputError for other bounds, for values that are not finite, and for fewer than ten
+    values between the bounds, or all of them at one end.
+    """
+    if not (0 < low < high < math.inf):
+        raise InputError(f"the bounds of a power law must be 0 < low < high, not {low:g}, {high:g}")
+    given = np.asarray(values, dtype=np.float64)
+    if given.ndim != 1 or not np.isfinite(given).all():
+        raise InputError("the values of a power law must have shape (n,) and be finite")
+    inside = given[(given >= low) & (given <= high)]
+    if len(inside) < FEWEST:
+        raise InputError(
+            f"{len(inside)} values between {low:g} and {high:g}: too few for a power law"
+        )
+    length = math.log(high / low)
+    mean = float(np.log(inside / low).mean())
+
+    def excess(s: float) -> float:
+        return _mean_of_logarithm(s, length) - mean
+
+    if not excess(-STEEPEST) < 0 < excess(STEEPEST):
+        raise InputError(f"the values between {low:g} and {high:g} follow no power law")
+    s = float(brentq(excess, -STEEPEST, STEEPEST, xtol=1e-12))
+    step = 1e-4
+    variance = (excess(s + step) - excess(s - step)) / (2 * step)
+    return PowerLaw(s - 1, 1 / math.sqrt(len(inside) * variance), low, high, len(inside))
+
+
+def _mean_of_logarithm(s: float, length: float) -> float:
+    """Return the mean of y in [0, length] under a density that goes as exp(s y)."""
+    t = s * length
+    # The series near zero: both terms grow without bound there, and their difference does not.
+    if abs(t) < 1e-4:
+        return length * (0.5 + t / 12)
+    return length / -math.expm1(-t) - 1 / s
+
+
+def small_gaps(
+    positions: ArrayLike,
+    radii: ArrayLike,
+    largest: float,
+    particles: Particles | None = None,
+    left_out: BoolArray | None = None,
+) -> FloatArray:
+    """Return the gaps between spheres of different particles up to a largest one, in any order.
+
+    Overlaps are among them as negative gaps. Nothing is periodic.
+
+    Parameters
+    ----------
+    positions : (n, 3), length
+    radii : (n,), length
+    largest : gap, length
+    particles : which spheres make up which particle; None: all spheres are free
+    left_out : (p,), particles whose gaps say nothing, such as rattlers, which lie about
+
+    Raises InputError as `contacts_by_distance` does.
+    """
+    near = contacts_by_distance(positions, radii, largest, particles)
+    gaps: FloatArray = near.gaps
+    if left_out is None:
+        return gaps
+    owner = np.arange(len(np.asarray(radii))) if particles is None else particles.index
+    kept = ~left_out[owner[near.sides[:, 0]]] & ~left_out[owner[near.sides[:, 1]]]
+    return gaps[kept]
+
+
+def local_ratios(forces: ArrayLike, heights: ArrayLike, layers: int = 20) -> FloatArray:
+    """Return each force over the mean of those at its height, in the order of the heights, (m,).
+
+    Under gravity the mean force grows with the depth, and a mixture of layers has more weak forces
+    than any of them. The layers hold equally many contacts.
+
+    Parameters
+    ----------
+    forces : (m,), >= 0, of contacts, force
+    heights : (m,), of their places, length
+    layers : number of layers, at least 1
+
+    Raises InputError for arrays of other shapes, and for fewer contacts than layers.
+    """
+    strength = np.asarray(forces, dtype=np.float64)
+    height = np.asarray(heights, dtype=np.float64)
+    if strength.ndim != 1 or strength.shape != height.shape:
+        raise InputError(
+            "forces and heights must have the same shape (m,), "
+            f"not {strength.shape} and {height.shape}"
+        )
+    if not 1 <= layers <= len(strength):
+        raise InputError(f"{len(strength)} contacts cannot be in {layers} layers")
+    parts = np.array_split(strength[np.argsort(height, kind="stable")], layers)
+    ratios: FloatArray = np.concatenate([part / part.mean() for part in parts])
+    return ratios
+
+
+def logarithmic_density(
+    values: ArrayLike, low: float, high: float, per_decade: int = 5
+) -> tuple[FloatArray, FloatArray]:
+    """Return the middles of bins of one width in the logarithm, and the density in each, (b,) both.
+
+    Parameters
+    ----------
+    values : (n,), those outside of the bounds are left out
+    low, high : bounds, 0 < low < high
+    per_decade : about so many bins
+
+    The densities are shares of all values given, per unit of the value.
+    """
+    given = np.asarray(values, dtype=np.float64)
+    bins = max(1, round(per_decade * math.log10(high / low)))
+    edges = np.geomspace(low, high, bins + 1)
+    counts, _ = np.histogram(given, edges)
+    middles: FloatArray = np.sqrt(edges[:-1] * edges[1:])
+    return middles, counts / (max(len(given), 1) * np.diff(edges))

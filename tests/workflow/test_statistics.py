@@ -1,0 +1,195 @@
+"""The statistics of the report: textbook cases, SciPy's tests, and cases by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from lammps_inelastic.workflow.report.curves import (
+    mean_curve,
+    mean_distribution,
+    peak,
+    root_mean_square_difference,
+)
+from lammps_inelastic.workflow.report.statistics import (
+    Sample,
+    Stated,
+    adjusted,
+    difference,
+    pooled,
+    sample,
+)
+
+# Student's own example (Biometrika 6 (1908) 20): hours of sleep gained with two soporifics.
+DEXTRO = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0]
+LAEVO = [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4]
+
+
+def test_students_sleep_data() -> None:
+    """As two samples: t = -1.8608 with 17.776 degrees of freedom, p = 0.0794, as R prints it."""
+    found = difference(sample(DEXTRO), sample(LAEVO))
+    # As many digits as R prints.
+    assert found.in_errors == pytest.approx(-1.8608, abs=5e-5)
+    assert found.freedom == pytest.approx(17.776, abs=5e-4)
+    assert found.p == pytest.approx(0.07939, abs=5e-6)
+    assert not found.is_significant
+
+
+def test_the_interval_of_the_sleep_data() -> None:
+    """The gain with the first one, 0.75 hours: 95 % from -0.5298 to 2.0298 by Student's t of 9."""
+    one = sample(DEXTRO)
+    assert one.mean == pytest.approx(0.75, rel=1e-12)  # round-off
+    # 2.262157 (tables of t, 9 degrees of freedom) times 1.789010 / sqrt(10).
+    assert one.margin == pytest.approx(2.262157 * 1.789010 / math.sqrt(10), rel=1e-6)
+    assert math.isnan(sample([1.0]).margin)
+
+
+@pytest.mark.parametrize("sizes", [(3, 3), (3, 9), (36, 4)])
+def test_differences_are_those_of_scipy(sizes: tuple[int, int]) -> None:
+    random = np.random.default_rng(sum(sizes))
+    one, other = (random.normal(i, 1 + i, size) for i, size in enumerate(sizes))
+    found = difference(sample(one), sample(other))
+    wanted = stats.ttest_ind(one, other, equal_var=False)
+    assert found.in_errors == pytest.approx(wanted.statistic, rel=1e-12)  # round-off
+    assert found.freedom == pytest.approx(wanted.df, rel=1e-12)
+    assert found.p == pytest.approx(wanted.pvalue, rel=1e-9)
+
+
+def test_against_a_number_without_scatter_it_is_the_test_of_one_sample() -> None:
+    values = [63.1, 63.9, 64.0, 63.6]
+    found = difference(sample(values), Stated(63.2))
+    wanted = stats.ttest_1samp(values, 63.2)
+    assert found.in_errors == pytest.approx(wanted.statistic, rel=1e-12)  # round-off
+    assert (found.freedom, found.p) == pytest.approx((3, wanted.pvalue), rel=1e-9)
+
+
+def test_an_error_that_is_stated_as_such_is_exactly_known() -> None:
+    """Gauss: 1.959964 standard errors are exceeded by chance in 5 %."""
+    found = difference(Sample(1.959964, 0.0, 4), Stated(0.0, 1.0))
+    assert found.freedom == math.inf
+    assert found.p == pytest.approx(0.05, rel=1e-6)
+
+
+def test_two_standard_errors_of_three_runs_mean_little() -> None:
+    """Student with two degrees of freedom: p = 1 - t / sqrt(2 + t^2), 0.184 for t = 2."""
+    found = difference(Sample(2.0, math.sqrt(3), 3), Stated(0.0))
+    assert found.in_errors == pytest.approx(2.0, rel=1e-12)  # round-off
+    assert found.p == pytest.approx(1 - 2 / math.sqrt(6), rel=1e-9)
+    assert not found.is_significant
+    # The same error, of 36 runs, would be 0.05; of two it is not told.
+    assert difference(Sample(2.0, 6.0, 36), Stated(0.0)).p == pytest.approx(0.0533, abs=5e-5)
+    assert math.isnan(difference(sample([1.0, 3.0]), Stated(0.0)).p)
+    # It is if the scatter is that of other rows, too.
+    assert difference(Sample(2.0, 1.0, 2, freedom=12), Stated(0.0)).p < 0.05
+
+
+def test_nothing_is_known_of_a_single_run_or_without_scatter() -> None:
+    for stated in (Stated(6.0), Stated(6.0, 0.05)):
+        found = difference(sample([6.1]), stated)
+        assert math.isnan(found.in_errors)
+        assert math.isnan(found.p)
+        assert not found.is_significant
+    assert math.isnan(difference(Sample(6.1, 0.0, 3), Stated(6.0)).in_errors)
+
+
+@pytest.mark.parametrize("runs", [3, 4, 36])
+def test_the_share_of_false_alarms_is_five_percent(runs: int) -> None:
+    """Of some runs beside a series of nine, as in the paper."""
+    random = np.random.default_rng(3)
+    tests = 4000
+    alarms = 0
+    for _ in range(tests):
+        ours, theirs = random.normal(0, 1, runs), random.normal(0, 1, 9)
+        stated = Stated.of_series(float(theirs.mean()), float(theirs.std(ddof=1)), 9)
+        alarms += difference(sample(ours), stated).is_significant
+    # Welch's test is approximate: 6 % for three runs. The binomial error is 0.0034.
+    assert alarms / tests == pytest.approx(0.05, abs=0.02)
+
+
+def test_holms_example() -> None:
+    """p of 0.01, 0.04, 0.03 and 0.005 become 0.03, 0.06, 0.06 and 0.02."""
+    found = adjusted([0.01, 0.04, 0.03, 0.005])
+    assert found == pytest.approx([0.03, 0.06, 0.06, 0.02], rel=1e-12)  # round-off
+    assert adjusted([0.9, 0.8]) == [1.0, 1.0]
+    with_unknown = adjusted([0.01, math.nan, 0.2])
+    assert with_unknown[0] == 0.02
+    assert math.isnan(with_unknown[1])
+    assert adjusted([]) == []
+
+
+def test_false_alarms_among_rows_that_share_runs() -> None:
+    """Twenty rows that share most of their runs: at most one report in twenty has an alarm."""
+    random = np.random.default_rng(4)
+    reports, alarms = 600, 0
+    for _ in range(reports):
+        shared = random.normal(0, 1, 9)
+        rows = [sample(np.append(shared[:-2], random.normal(0, 1, 2))) for _ in range(20)]
+        corrected = adjusted([difference(row, Stated(0.0)).p for row in rows])
+        alarms += min(corrected) < 0.05
+    # Binomial error 0.009; fewer is right, too: rows that share runs are fewer tests than rows.
+    assert alarms / reports < 0.05 + 0.02
+
+
+def test_statistics_by_hand() -> None:
+    values = sample([1.0, 2.0, 3.0, math.nan])
+    assert (values.mean, values.std, values.n) == (2.0, 1.0, 3)
+    assert values.error == 1 / math.sqrt(3)
+    x, y = np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0])
+    # The other one begins at 1 and is 0.5 higher there and at 2.
+    other = np.array([1.0, 2.0]), np.array([1.5, 2.5])
+    assert root_mean_square_difference((x, y), other) == 0.5
+    assert math.isnan(root_mean_square_difference((x, y), (x + 10, y)))
+    _, mean, error = mean_curve([(x, y), (x, y + 2)])
+    assert mean.tolist() == [1, 2, 3]
+    # Standard deviation sqrt(2), over sqrt(2).
+    assert error == pytest.approx([1, 1, 1], rel=1e-12)  # round-off
+    shares, _ = mean_distribution([np.array([0.0, 1.0]), np.array([0.0, 0.0, 1.0])])
+    assert shares.tolist() == [0, 0.5, 0.5]
+
+
+def test_peak_of_a_parabola() -> None:
+    x = [1.0, 1.3, 1.5, 2.0]
+    # Exact for a parabola, but for round-off.
+    top, error = peak(x, [-((v - 1.42) ** 2) for v in x], [0.0] * 4)
+    assert top == pytest.approx(1.42, abs=1e-9)
+    assert error == 0
+    top, error = peak([1, 2, 3], [3, 2, 1], [1, 1, 1])
+    assert top == 1
+    assert math.isnan(error)
+
+
+def test_the_error_of_a_peak() -> None:
+    """Beside what drawing the values again and again gives."""
+    x: Any = np.array([1.0, 1.2, 1.5, 1.6, 2.0])
+    errors: Any = np.array([1, 2, 1, 3, 1]) * 1e-3
+    y = -((x - 1.42) ** 2)
+    random = np.random.default_rng(1)
+    drawn = [peak(x, y + random.normal(0, errors), errors, 2) for _ in range(4000)]
+    place, error = peak(x, y, errors, 2)
+    # Of 4,000 values the standard deviation is known to 1.1 %; curved terms are smaller yet.
+    assert np.std([top for top, _ in drawn]) == pytest.approx(error, rel=0.05)
+    assert place == pytest.approx(1.42, abs=1e-9)
+
+
+def test_pooled_scatter() -> None:
+    """Of rows of few values; a row of nine has its own, a row of one gets the others'."""
+    samples = {
+        "a": sample([1.0, 3.0]),
+        "b": sample([5.0, 5.0]),
+        "c": sample([0.0] * 4 + [6.0] * 5),
+        "d": sample([7.0]),
+        "e": sample([]),
+    }
+    found = pooled(samples)
+    # (1 x 2 + 1 x 0 + 8 x 10) / 10, from the variances 2, 0 and 10.
+    std = math.sqrt(82 / 10)
+    assert [found[key].std for key in "abd"] == pytest.approx([std] * 3, rel=1e-12)
+    assert [found[key].freedom for key in "abd"] == [10] * 3
+    assert found["c"] == samples["c"]
+    assert found["d"].error == pytest.approx(std, rel=1e-12)
+    assert found["e"].n == 0
+    assert pooled({"d": samples["d"]}) == {"d": samples["d"]}

@@ -1,0 +1,128 @@
+"""Reference values of hard packings without friction, which the paper does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...store import Result
+from ..blocks import Block, Content, Text
+from ..columns import RUNS, Case, Column, table
+from ..curves import mean_curve
+from ..data import SPHERES, Data, curves_of, profiles
+from ..figures import Curve, Figure, Panel, curve
+from ..groups import grouped
+from ..quantities import (
+    COORDINATION_NUMBER,
+    EXCESS_CONTACTS,
+    GAP_EXPONENT,
+    NEIGHBOURS,
+    PACKING_FRACTION,
+    RATTLERS,
+    WEAK_FORCE_EXPONENT,
+)
+from ..text import as_short
+
+COLUMNS: Sequence[Column[Case]] = (
+    Column("packing", lambda case: case.label),
+    RUNS,
+    PACKING_FRACTION.column(),
+    COORDINATION_NUMBER.column(),
+    NEIGHBOURS.column(),
+    RATTLERS.column(),
+    EXCESS_CONTACTS.column(),
+    GAP_EXPONENT.column(),
+    WEAK_FORCE_EXPONENT.column(),
+)
+
+
+def reference(data: Data) -> Content:
+    """Show isostaticity, the power laws, the radial distribution function and wall layers."""
+    groups = grouped(data.results("reference"), _label)
+    cases = [Case(label, group) for label, group in groups.items()]
+    if not cases:
+        return Content()
+    blocks: list[Block] = [
+        table(
+            "Hard packings of 10,000 particles",
+            COLUMNS,
+            cases,
+            (
+                "Mean ± standard deviation (standard error) over the runs. φ, z, neighbours and "
+                "rattlers are those in the box. Excess: contacts, walls included, less degrees of "
+                "freedom, per 1,000 degrees, of all particles that are held: 0 is isostatic.",
+                "Exponents are those of maximum likelihood, of gaps from 0.001 to 0.1 diameters "
+                "and of forces from 0.001 to 0.3 of the mean at their height, of particles that "
+                "are held in any direction and touch no wall.",
+            ),
+        ),
+        Text(
+            "Theory of amorphous packings in many dimensions (Charbonneau, Corwin, Parisi and "
+            "Zamponi, Phys. Rev. Lett. 114 (2015) 125504): gaps g^(-0.413); forces f^0.423 where "
+            "the opening of a contact moves the whole packing, and f^0.17 where it moves few "
+            "particles, as most weak contacts do."
+        ),
+    ]
+    laws = [
+        panel
+        for panel in (
+            _panel(cases, "gaps/size", "gaps/density", "gap / d", "density"),
+            _panel(cases, "forces/local_ratio", "forces/local_density", "f / ⟨f⟩", "P(f / ⟨f⟩)"),
+        )
+        if panel is not None
+    ]
+    if laws:
+        blocks.append(
+            Figure(
+                "power-laws",
+                "Density of small gaps, and of contact forces over their mean at the same height.",
+                laws,
+            )
+        )
+    around = _curves(cases, "structure/distance", "structure/radial_distribution")
+    if around:
+        blocks.append(
+            Figure(
+                "radial",
+                "Radial distribution function of the particles' centres.",
+                [Panel("r [container widths]", "g(r)", around, references=[("no order", 1.0)])],
+            )
+        )
+    floors = [
+        curve(case.label, *mean_curve(found), kind="profile")
+        for case in cases
+        if (found := profiles(case.group))
+    ]
+    if floors:
+        blocks.append(
+            Figure(
+                "floor",
+                "Packing fraction in slabs above the floor.",
+                [Panel("height above the floor / d", "packing fraction", floors)],
+            )
+        )
+    return Content(blocks)
+
+
+def _label(result: Result) -> str:
+    if result.record["deck"] == SPHERES:
+        return "spheres"
+    return f"dimers, L/d = {as_short(result.setting('aspect_ratio'))}"
+
+
+def _curves(cases: Sequence[Case], x: str, y: str) -> list[Curve]:
+    return [
+        curve(case.label, *mean_curve(found))
+        for case in cases
+        if (found := curves_of(case.group, x, y))
+    ]
+
+
+def _panel(cases: Sequence[Case], x: str, y: str, along: str, up: str) -> Panel | None:
+    """Return a panel with two logarithmic axes; None if nothing was measured."""
+    curves = []
+    for one in _curves(cases, x, y):
+        filled = one.y > 0
+        errors = None if one.error is None else one.error[filled]
+        if filled.any():
+            curves.append(curve(one.label, one.x[filled], one.y[filled], errors))
+    return Panel(along, up, curves, log=True, log_x=True) if curves else None

@@ -1,0 +1,121 @@
+"""The angle of repose of a bed without friction: what slope is left when gravity is tilted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...store import Result
+from ..blocks import Content, Text
+from ..columns import RUNS, Column, table
+from ..data import Data
+from ..figures import Figure, Panel, points
+from ..groups import by_value, count_of, grouped
+from ..statistics import Sample, pooled, sample
+from ..text import as_count, as_mean, as_sample, as_short
+
+# A bed that was tilted by less than this may not have moved at all [degrees].
+FLOWED = 10.0
+
+
+@dataclass(frozen=True)
+class _Row:
+    """The runs of one tilt, and the angle between the surface and the horizontal, in degrees."""
+
+    angle: float
+    group: Sequence[Result]
+    slope: Sample
+
+    @property
+    def left(self) -> Sample:
+        """The angle that the surface keeps to the horizontal of the tilted gravity."""
+        return Sample(
+            self.angle - self.slope.mean, self.slope.std, self.slope.n, self.slope.freedom
+        )
+
+
+COLUMNS: Sequence[Column[_Row]] = (
+    Column("gravity tilted by", lambda row: as_short(row.angle), "°"),
+    RUNS,
+    Column("surface turned by", lambda row: as_sample(row.slope, 2), "°"),
+    Column("left", lambda row: as_sample(row.left, 2), "°"),
+)
+
+
+def repose(data: Data) -> Content:
+    """Show by how much the surface of a bed lags behind the gravity that was tilted."""
+    results = [r for r in data.results("repose") if not math.isnan(r.number("centre_x"))]
+    if not results:
+        return Content()
+    width = float(data.paper["protocol"]["container"][0])
+    groups = sorted(grouped(results, by_value("angle")).items())
+    slopes = pooled({angle: sample(_slope(r, width) for r in group) for angle, group in groups})
+    rows = [_Row(angle, group, slopes[angle]) for angle, group in groups]
+    flowed = [row.left for row in rows if row.angle > FLOWED]
+    mean = (
+        Sample(
+            sum(one.mean for one in flowed) / len(flowed),
+            flowed[0].std,
+            sum(one.n for one in flowed),
+            flowed[0].freedom,
+        )
+        if flowed
+        else Sample(math.nan, math.nan, 0)
+    )
+    return Content(
+        [
+            Figure(
+                "repose",
+                f"Angle by which the surface of a bed of {as_count(count_of(results))} spheres has "
+                "turned when gravity was tilted and the bed has come to rest.",
+                [
+                    Panel(
+                        "gravity tilted by [°]",
+                        "surface turned by [°]",
+                        [
+                            points("bed", [row.angle for row in rows], [r.slope for r in rows]),
+                            points(
+                                "a liquid",
+                                [row.angle for row in rows],
+                                [Sample(row.angle, math.nan, 1) for row in rows],
+                            ),
+                        ],
+                    )
+                ],
+            ),
+            table(
+                "Slope after a tilt",
+                COLUMNS,
+                rows,
+                (
+                    "From the mean position of all spheres: a bed between the side walls, of mean "
+                    "height H and with a plane surface of slope s, has its centre s W² / (12 H) "
+                    "off the middle.",
+                ),
+            ),
+            Text(
+                "Spheres without friction still have an angle of repose: the surface stays behind "
+                f"by {as_mean(mean, 1)}° where the bed has flowed. Peyneau and Roux (Phys. Rev. E "
+                "78 (2008) 011307) found an angle of internal friction of 5.8 ± 0.2° for "
+                "assemblies of such spheres under slow shear."
+            ),
+        ]
+    )
+
+
+def _slope(result: Result, width: float) -> float:
+    """Return the angle of the surface to the horizontal, from the mean position, in degrees.
+
+    With y = H + s (x - W/2) the centre of what lies below is at x = W/2 + s W^2 / (12 H) and at
+    y = H/2 + s^2 W^2 / (24 H), from which s and H follow.
+    """
+    off = result.number("centre_x") - width / 2
+    height = 2 * result.number("centre_y")
+    slope = 0.0
+    for _ in range(50):
+        slope = 12 * height * off / width**2
+        height = result.number("centre_y") + math.sqrt(
+            max(result.number("centre_y") ** 2 - (slope * width) ** 2 / 12, 0.0)
+        )
+    return math.degrees(math.atan(slope))
