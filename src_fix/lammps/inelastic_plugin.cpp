@@ -102,10 +102,12 @@ void lammpsplugin_init(void *lmp_pointer, void *handle, void *register_function)
   const std::string foreign = foreign_to(lmp);
   if (!foreign.empty()) {
     if (lmp->comm->me == 0)
-      lmp->error->warning(FLERR,
-                          "fix inelastic is not available: its plugin was built for LAMMPS {}. "
-                          "Install lammps-inelastic again in this environment",
-                          foreign);
+      lmp->error->warning(
+          FLERR,
+          "fix inelastic is not available: its plugin was built for LAMMPS {}. "
+          "Install lammps-inelastic again in this environment, or build the plugin for "
+          "this LAMMPS",
+          foreign);
     return;
   }
 

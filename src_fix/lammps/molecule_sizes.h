@@ -33,13 +33,15 @@ class MoleculeSizes {
     constexpr int NUMBERS = sizeof(Molecule) / sizeof(std::int64_t);
     int ranks;
     MPI_Comm_size(world, &ranks);
-    const int count = NUMBERS * static_cast<int>(mine.size());
+    static_assert(sizeof(std::int64_t) == sizeof(long long), "MPI_LONG_LONG");
+    // LAMMPS's own mpi.h, of builds without MPI, takes no constants and knows no MPI_INT64_T.
+    int count = NUMBERS * static_cast<int>(mine.size());
     std::vector<int> counts(ranks), offsets(ranks, 0);
     MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
     for (int rank = 1; rank < ranks; ++rank) offsets[rank] = offsets[rank - 1] + counts[rank - 1];
     molecules_.resize((offsets.back() + counts.back()) / NUMBERS);
-    MPI_Allgatherv(mine.data(), count, MPI_INT64_T, molecules_.data(), counts.data(),
-                   offsets.data(), MPI_INT64_T, world);
+    MPI_Allgatherv(mine.data(), count, MPI_LONG_LONG, molecules_.data(), counts.data(),
+                   offsets.data(), MPI_LONG_LONG, world);
     add_up(molecules_);
     consecutive_ = molecules_.empty() ||
         molecules_.back().id - molecules_.front().id + 1 ==
