@@ -227,6 +227,8 @@ def whole_paper() -> list[StoredStudy]:
             numbers__gap_exponent=-0.41,
             numbers__weak_force_exponent=0.15,
             gaps__size=sizes,
+            layers__height=np.arange(10) + 0.5,
+            layers__coordination_number=np.full(10, 6.0),
             gaps__density=sizes**-0.4,
             forces__local_ratio=sizes,
             forces__local_density=sizes**0.2,
@@ -459,10 +461,9 @@ def test_comparison_with_a_series(sections: dict[str, Section]) -> None:
 def test_large_difference_is_marked() -> None:
     runs = [measured(z=z, seed=seed) for seed, z in enumerate((6.9, 7.0, 7.1), 1)]
     summary = summarise(list(sections_of(study("table-1", runs)).values()))
-    # Packing fraction and z; z at rest less z while agitated is 0.4 in each run: no scatter, and
-    # no difference in standard errors.
+    # Packing fraction and z.
     assert (summary.compared, summary.significant, summary.remaining) == (2, 1, 1)
-    phi, z, _ = (row[4] for row in summary.numbers.rows)
+    phi, z = (row[4] for row in summary.numbers.rows)
     assert not phi.marked
     # (7 - 5.97) / sqrt(0.01 / 3 + (0.12 / 3)^2) = 14.7
     assert (z.text, z.marked) == ("+14.7", True)
@@ -475,9 +476,69 @@ def test_why_is_said_of_large_differences_alone() -> None:
     far = [measured(phi=0.7 + 0.001 * seed, z=5.97, seed=seed) for seed in (1, 2, 3)]
     for group, said in ((runs, False), (far, True)):
         summary = summarise(list(sections_of(study("table-1", group)).values()))
-        phi, z, _ = (row[7].text for row in summary.numbers.rows)
+        phi, z = (row[7].text for row in summary.numbers.rows)
         assert ("more seeds" in phi) == said
         assert "solver" not in z
+
+
+def statements_of(section: Section) -> dict[str, bool | None]:
+    return {one.text: one.holds for one in section.statements}
+
+
+def test_the_sentences_of_the_paper_hold_or_do_not(sections: dict[str, Section]) -> None:
+    """In the miniature of its studies, in which each is decided by numbers of a few lines above."""
+    # 10,000 and 100,000 spheres have the same packing fraction.
+    assert all(statements_of(sections["table-2"]).values())
+    # 0.4 contacts fewer with every force, which the paper has as 0.5.
+    assert list(statements_of(sections["agitated"]).values()) == [False]
+    # All runs of 13 frames are at rest from the fourth on.
+    assert list(statements_of(sections["figure-5"]).values()) == [True, True]
+    contacts = statements_of(sections["figure-13"])
+    # 9.9 contacts, 8.9 neighbours.
+    assert list(contacts.values()) == [True, True]
+    assert all("10" in text for text in contacts)
+    # 6 is the most frequent number of all particles; a dimer's should be 10.
+    assert list(statements_of(sections["figure-7"]).values()) == [True, True]
+    shares = statements_of(sections["figure-14"])
+    assert shares["The most probable number of contacts is 10."] is False
+    # Largest at 1.5, and lower at 1.6, 1.8 and 1.95.
+    assert list(statements_of(sections["figure-11"]).values()) == [True, None]
+    lying = statements_of(sections["anisotropy"])
+    # Two runs that agree exactly have the scatter that their number of dimers leaves.
+    assert lying["a_y is smaller: dimers lie down."] is True
+    # a_y is 0.8 at each aspect ratio.
+    assert lying["They lie down more the longer they are."] is False
+
+
+def test_a_curve_that_goes_on_growing_is_no_peak() -> None:
+    runs = [
+        measured(phi=0.6 + 0.1 * aspect, deck="dimers", aspect_ratio=aspect, random_force=30.0)
+        for aspect in (1.1, 1.3, 1.5, 1.7, 1.9)
+    ]
+    section = sections_of(study("dimers", runs))["figure-11"]
+    assert section.statements[0].holds is False
+
+
+def test_the_summary_counts_sentences(sections: dict[str, Section]) -> None:
+    summary = summarise(list(sections.values()))
+    said = [one.holds for section in sections.values() for one in section.statements]
+    assert (summary.held, summary.told) == (said.count(True), len(said) - said.count(None))
+    assert len(summary.statements.rows) == len(said)
+    verdicts = [row[1] for row in summary.statements.rows]
+    assert [cell.marked for cell in verdicts] == [holds is False for holds in said]
+
+
+def test_the_surface_of_a_tilted_bed(sections: dict[str, Section]) -> None:
+    """Its slope and height are those whose centre of mass the runs have."""
+    rows = rows_of(sections["repose"], "repose")
+    bed = {float(row["gravity tilted by [°]"]): row for row in rows if row["curve"] == "bed"}
+    slope = math.tan(math.radians(float(bed[4.0]["surface turned by [°]"])))
+    # y = height + slope (x - 0.5), integrated over x and below the surface.
+    x = np.linspace(0, 1, 10_001)
+    surface = slope / (12 * 0.002) + slope * (x - 0.5)
+    # The sums are off by 1e-8.
+    assert (x * surface).sum() / surface.sum() == pytest.approx(0.502, rel=1e-6)
+    assert (surface**2 / 2).sum() / surface.sum() == pytest.approx(0.5, rel=1e-6)
 
 
 def test_more_seeds_are_compared_as_well() -> None:

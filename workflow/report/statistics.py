@@ -175,13 +175,13 @@ def difference(one: Sample | Stated, other: Sample | Stated) -> Difference:
 
     The standard error is sqrt(e1^2 + e2^2), and its degrees of freedom are those of Welch
     (Biometrika 34 (1947) 28) and Satterthwaite. A number that the paper states without scatter is
-    taken as exact. Nothing is known where a mean of ours has no scatter, or one of fewer than
+    taken as exact. The error is not known where a mean of ours has no scatter, or one of fewer than
     LEAST_FREEDOM degrees of freedom, as that of two runs.
     """
     parts = []
     for mean in (one, other):
         if isinstance(mean, Sample) and not (mean.std >= 0 and mean.freedom >= LEAST_FREEDOM):
-            return UNKNOWN
+            return Difference(one.mean - other.mean, math.nan, math.nan)
         if math.isnan(mean.error):
             continue
         parts.append((mean.error**2, mean.freedom))

@@ -30,7 +30,7 @@ from ..statistics import (
     sample,
 )
 from ..text import DASH, as_count, as_mean, as_short, as_text
-from .aspect_ratios import shaken
+from .aspect_ratios import shaken, true_dimers
 
 AXES = "xyz"
 # The paper's dimers are made of spheres of this diameter.
@@ -157,7 +157,7 @@ def against_aspect(data: Data) -> Content:
     forces = {
         one.force: {
             aspect: group
-            for aspect, group in one.groups.items()
+            for aspect, group in true_dimers(one.groups).items()
             if not math.isnan(numbers(group, "a_isotropic").mean)
         }
         for one in shaken(data)

@@ -87,6 +87,29 @@ def reference(data: Data) -> Content:
                 [Panel("r [container widths]", "g(r)", around, references=[("no order", 1.0)])],
             )
         )
+    layers = _curves(cases, "layers/height", "layers/coordination_number")
+    if layers:
+        blocks.append(
+            Figure(
+                "layers",
+                "Contacts with other particles in layers above the floor, a diameter thick, of "
+                "particles between the sides of the measuring box. Near the floor the wall takes "
+                "the place of particles, and at the free surface there are fewer of them: the box "
+                "lies between, so that its mean is above twice the degrees of freedom of a "
+                "particle, while the whole packing has as many contacts as degrees of freedom.",
+                [
+                    Panel(
+                        "height above the floor / d",
+                        "contacts per particle",
+                        layers,
+                        references=[
+                            ("twice the degrees of freedom: spheres", 6.0),
+                            ("twice the degrees of freedom: dimers", 10.0),
+                        ],
+                    )
+                ],
+            )
+        )
     floors = [
         curve(case.label, *mean_curve(found), kind="profile")
         for case in cases
