@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from .files import write_text, writing
 
 
-def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None:
+def write_report(
+    files: Sequence[Path], out: Path, figures: Path | None, markdown: Path | None = None
+) -> None:
     """Write a report, and print where it is.
 
     Parameters
@@ -16,9 +19,10 @@ def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None
     files : HDF5 files of studies
     out : HTML file to write
     figures : folder for the figures and their numbers; None writes none
+    markdown : file for the tables as text; None writes none
     """
     # Drawing takes a while to import, for which the other subcommands need not wait.
-    from .report import all_sections, read_data, render
+    from .report import all_sections, read_data, render, render_markdown
     from .report.figures import Figure, Pictures
     from .report.page import summarise
 
@@ -39,4 +43,8 @@ def write_report(files: Sequence[Path], out: Path, figures: Path | None) -> None
         for figure in drawn:
             figure.write(figures)
         print(f"{len(drawn)} figures: {figures}")
+    if markdown is not None:
+        shown = "" if figures is None else os.path.relpath(figures, markdown.parent)
+        write_text(markdown, render_markdown(data, sections, shown))
+        print(f"tables: {markdown}")
     print(f"written: {out}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import io
+import itertools
 import math
 import re
 from collections.abc import Sequence
@@ -819,3 +820,25 @@ def test_dimer_is_as_long_as_it_is_said_to_be() -> None:
     assert (seen[-1] - seen[0] + 1) * (right - left) / 400 == pytest.approx(1.5, abs=0.012)
     with pytest.raises(InputError):
         draw_dimer(axis(), 2.1)
+
+
+def test_the_tables_as_text(tmp_path: Path) -> None:
+    """They hold the page's tables, and depend on the results alone."""
+    file = write(tmp_path / "all.h5", *whole_paper())
+    text = tmp_path / "texts" / "r.md"
+    arguments = ["report", str(file), "--out", str(tmp_path / "r.html"), "--markdown", str(text)]
+    assert main([*arguments, "--figures", str(tmp_path / "figures")]) == 0
+    lines = text.read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "# Does it reproduce the paper?"
+    # z of 10,000 spheres: the mean of two runs, whose error is not told.
+    assert any(line.startswith("| z, spheres | 6.00 ± 0.05 | 6.000 ± 0.000") for line in lines)
+    assert any("does not hold" in line for line in lines)
+    shown = [line for line in lines if line.startswith("![")]
+    assert shown
+    for line in shown:
+        path = line.rpartition("](")[2].removesuffix(")")
+        assert (text.parent / path).resolve().is_file(), path
+    # As many cells in each row of a table as in its head.
+    for above, line in itertools.pairwise(lines):
+        if above.startswith("|") and line.startswith("|"):
+            assert len(re.findall(r"(?<!\\)\|", above)) == len(re.findall(r"(?<!\\)\|", line))

@@ -32,10 +32,13 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="DIR",
         help="write each figure there too, as PDF and PNG, and its numbers as CSV",
     )
+    report.add_argument(
+        "--markdown", type=Path, metavar="FILE", help="write the tables there too, as text"
+    )
     report.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the page and the figures, and print where they are; 0, or a WorkflowError."""
-    write_report(options.files, options.out, options.figures)
+    write_report(options.files, options.out, options.figures, options.markdown)
     return 0

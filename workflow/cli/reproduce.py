@@ -23,7 +23,7 @@ from ..store import write_studies
 from ..study import read_study
 from .arguments import add_out, add_running, running_options
 
-STORE, REPORT, FIGURES = "paper.h5", "report.html", "figures"
+STORE, REPORT, TABLES, FIGURES = "paper.h5", "report.html", "report.md", "figures"
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -31,8 +31,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     reproduce = commands.add_parser(
         "reproduce",
         help="run the studies of the paper, and write one HDF5 file and one report",
-        description=f"Run the shipped studies, and write {STORE}, {REPORT} and the folder "
-        f"{FIGURES}. It can be interrupted at any moment: the next time does what is left.",
+        description=f"Run the shipped studies, and write {STORE}, {REPORT}, its tables as text in "
+        f"{TABLES}, and the folder {FIGURES}. It can be interrupted at any moment: the next time "
+        "does what is left.",
     )
     add_out(reproduce, "paper")
     which = reproduce.add_mutually_exclusive_group()
@@ -81,5 +82,6 @@ def run(options: argparse.Namespace) -> int:
     store = folder.root / STORE
     write_studies(store, [gather_results(study, folder) for study in studies])
     print(f"results: {store}")
-    write_report([store], folder.root / REPORT, folder.root / FIGURES)
+    root = folder.root
+    write_report([store], root / REPORT, root / FIGURES, root / TABLES)
     return 1 if failed else 0

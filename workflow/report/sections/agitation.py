@@ -32,7 +32,7 @@ class _Kind(NamedTuple):
 
     @property
     def strength(self) -> float:
-        """The square of the force times the step: a force drawn in each step shakes as much."""
+        """The square of the force times the step: so goes the energy that it feeds in."""
         return self.force**2 * self.dt
 
 
@@ -79,9 +79,11 @@ def agitation(data: Data) -> Content:
         Text(
             "Paper: with the random force the coordination number is too small by about "
             f"{as_short(STATED_DROP)}. How much it is depends on how strong the force is, which "
-            "the paper does not state. The force is drawn anew in each step, so that what it does "
-            "goes with its square times the step. While the spheres are agitated the count is made "
-            "with the larger tolerance."
+            "the paper does not state, and on the time step. The force is drawn anew in each step, "
+            "so that the energy that it feeds in goes with A² h. A contact is what has touched "
+            "within a step: shaken spheres that touch now and then do so in more of the longer "
+            "steps, and z depends on the step even where A² h is the same. While the spheres are "
+            "agitated the count is made with the larger tolerance."
         ),
     ]
     return Content(blocks, statements=_statements(rows, data))
@@ -135,8 +137,9 @@ def _statements(rows: Sequence[_Row], data: Data) -> list[Statement]:
             f"{as_short(STATED_DROP)} (of a force that is not stated).",
             min(drops) <= STATED_DROP <= max(drops),
             f"{as_count(weakest_first[0].kind.particles)} spheres: "
-            + ", ".join(
-                f"{as_mean(row.drop, 2)} at A² h = {as_short(row.kind.strength)}"
+            + "; ".join(
+                f"{as_mean(row.drop, 2)} at A = {as_short(row.kind.force)}, "
+                f"h = {as_short(row.kind.dt)}"
                 for row in weakest_first
             ),
         )
