@@ -32,6 +32,16 @@ NO_STEPS: dict[str, object] = {
     f"steps_{phase}": 0 for phase in ("agitated", "settling", "resting", "tightening", "measuring")
 }
 
+# Variables of a deck with which all of its phases are there, and none is long.
+FEW_STEPS: dict[str, object] = {
+    "steps_agitated": 100,
+    "steps_settling": 50,
+    "steps_resting": 50,
+    "steps_tightening": 5,
+    "steps_measuring": 3,
+    "dump_every": 40,
+}
+
 
 def shipped_deck(name: str) -> str:
     """Text of the installed deck inputs/NAME.in."""

