@@ -10,7 +10,7 @@ from ..columns import RUNS, Case, Column, table
 from ..curves import mean_curve
 from ..data import SPHERES, Data, curves_of, profiles
 from ..figures import Curve, Figure, Panel, curve
-from ..groups import grouped
+from ..groups import count_of, grouped
 from ..quantities import (
     COORDINATION_NUMBER,
     EXCESS_CONTACTS,
@@ -20,7 +20,7 @@ from ..quantities import (
     RATTLERS,
     WEAK_FORCE_EXPONENT,
 )
-from ..text import as_short
+from ..text import as_count, as_short
 
 COLUMNS: Sequence[Column[Case]] = (
     Column("packing", lambda case: case.label),
@@ -43,7 +43,7 @@ def reference(data: Data) -> Content:
         return Content()
     blocks: list[Block] = [
         table(
-            "Hard packings of 10,000 particles",
+            f"Hard packings of {as_count(count_of(cases[0].group))} particles",
             COLUMNS,
             cases,
             (

@@ -96,7 +96,8 @@ def repose(data: Data) -> Content:
             ),
             Text(
                 "Spheres without friction still have an angle of repose: the surface stays behind "
-                f"by {as_mean(mean, 1)}° where the bed has flowed. Peyneau and Roux (Phys. Rev. E "
+                f"by {as_mean(mean, 1)}° where the bed has flowed, an upper bound: it still creeps "
+                "when the run ends. Peyneau and Roux (Phys. Rev. E "
                 "78 (2008) 011307) found an angle of internal friction of 5.8 ± 0.2° for "
                 "assemblies of such spheres under slow shear."
             ),
