@@ -20,6 +20,7 @@ DECKS = ("spheres", "dimers", "clusters", RESPONSE, "gluey", SETTLING)
 STUDIES = (
     "table-1",
     "more-seeds",
+    "counting",
     "table-2",
     "figure-4",
     "figure-8",

@@ -47,6 +47,7 @@ ANCHORS = {
     "figure-4",
     "figure-5",
     "table-1",
+    "counting",
     "agitated",
     "table-2",
     *(f"figure-{number}" for number in range(6, 15)),
@@ -181,6 +182,11 @@ def whole_paper() -> list[StoredStudy]:
         for force in (30.0, 0.0)
         for seed in range(1, 7)
     ]
+    counting = [
+        measured(z=z, tolerance=0.005, seed=seed, solver=solver, dt_resting=step, dt_measuring=step)
+        for solver, step, z in (("apgd", 0.01, 6.2), ("apgd", 0.02, 6.4), ("uzawa", 0.01, 6.3))
+        for seed in (1, 2, 3)
+    ]
     table_2 = [measured(seed=seed) for seed in (1, 2)]
     table_2 += [measured(particles=10_000, diameter=0.052, seed=seed) for seed in (1, 2)]
     table_2.append(measured(particles=100_000, diameter=0.024, tolerance=0.005))
@@ -246,6 +252,7 @@ def whole_paper() -> list[StoredStudy]:
     return [
         study("table-1", table_1),
         study("more-seeds", more_seeds),
+        study("counting", counting),
         study("table-2", table_2),
         study("figure-4", [measured(pictures=falling)]),
         study("figure-8", [measured(pictures=("network",))]),
@@ -540,6 +547,61 @@ def test_the_surface_of_a_tilted_bed(sections: dict[str, Section]) -> None:
     # The sums are off by 1e-8.
     assert (x * surface).sum() / surface.sum() == pytest.approx(0.502, rel=1e-6)
     assert (surface**2 / 2).sum() / surface.sum() == pytest.approx(0.5, rel=1e-6)
+
+
+def test_why_contacts_at_a_loose_tolerance_differ() -> None:
+    """By runs with one time step in all phases, of the same solver."""
+    steps = {"dt": 0.01, "dt_resting": 0.02, "dt_measuring": 0.1, "tolerance": 0.005}
+    of_deck = [measured(z=7 + 0.01 * seed, seed=seed, **steps) for seed in (1, 2, 3)]
+    of_one_step = [
+        measured(z=6.17 + 0.005 * seed, seed=seed, **steps | {n: 0.01 for n in list(steps)[:3]})
+        for seed in (1, 2, 3)
+    ]
+    sections = sections_of(study("table-1", of_deck), study("counting", of_one_step))
+    z = next(one for one in sections["table-1"].comparisons if one.what.startswith("z, ε = 0.005"))
+    assert z.difference.is_significant
+    # 6.18 of both; the paper has 6.18.
+    assert "with one step throughout: 6.18 ± 0.00 with h = 0.01 (0.0 SE, p 1.00)" in z.why
+    table = sections["counting"].blocks[0]
+    assert isinstance(table, Table)
+    assert [[cell.text for cell in row][:4] for row in table.rows] == [
+        ["0.01", "0.01", "0.01", "apgd"],
+        ["0.01", "0.02", "0.1", "apgd"],
+    ]
+
+
+def test_scatter_is_no_difference_of_wall_profiles() -> None:
+    """Two runs of each size, 0.04 apart all along: their means differ, but by no more than that."""
+
+    def shifted(by: float, **of_size: Any) -> Result:
+        one = measured(**of_size)
+        one.values["profile/packing_fraction"] = one.values["profile/packing_fraction"] + by
+        return one
+
+    def verdict(of_large: tuple[float, float]) -> bool | None:
+        large = {"particles": 10_000, "diameter": 0.052}
+        runs = [shifted(by, seed=seed) for seed, by in enumerate((-0.02, 0.02))]
+        runs += [shifted(by, seed=seed, **large) for seed, by in enumerate(of_large)]
+        return statements_of(sections_of(study("table-2", runs))["figure-6"])[
+            "The packing fraction oscillates near a wall, and the curves of several diameters "
+            "collapse."
+        ]
+
+    assert verdict((-0.01, 0.03)) is True
+    assert verdict((0.08, 0.12)) is False
+
+
+def test_dimers_have_too_many_contacts_only_beyond_their_error() -> None:
+    def verdict(*z: float) -> bool | None:
+        runs = [
+            measured(z=value, deck="dimers", aspect_ratio=1.1, random_force=30.0, seed=seed)
+            for seed, value in enumerate(z)
+        ]
+        section = sections_of(study("dimers", runs))["figure-13"]
+        return next(iter(statements_of(section).values()))
+
+    assert verdict(10.20, 10.22) is True
+    assert verdict(10.3, 10.3) is False
 
 
 def test_more_seeds_are_compared_as_well() -> None:

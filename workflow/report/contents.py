@@ -16,6 +16,7 @@ from .sections import (
     agitation,
     checks,
     coming_to_rest,
+    counting,
     dimer_contacts,
     dimer_orientation,
     dimer_packing_fraction,
@@ -76,6 +77,9 @@ SECTIONS: Mapping[str, Entry] = {
         "Table 1: tolerance and random force",
         tolerance_and_force.tolerance_and_force,
         ["table-1", "more-seeds"],
+    ),
+    "counting": Entry(
+        "What counts as a contact at a loose tolerance", counting.counting, ["counting", "table-1"]
     ),
     "agitated": Entry(
         "Contacts while agitated and at rest",

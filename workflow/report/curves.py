@@ -42,6 +42,20 @@ def root_mean_square_difference(
     return float(np.sqrt(np.mean(apart**2))) if len(apart) else math.nan
 
 
+def scatter_of_difference(one: MeanCurve, other: MeanCurve) -> float:
+    """Return the root mean square difference that their standard errors alone would make.
+
+    Both are taken at the x of the first, as in `root_mean_square_difference`; a single curve, whose
+    error is not known, is taken as exact.
+    """
+    x, y, _ = one
+    own = np.zeros(len(y)) if one[2] is None else one[2]
+    theirs = np.zeros(len(other[1])) if other[2] is None else other[2]
+    square = own**2 + np.interp(x, other[0], theirs, left=np.nan, right=np.nan) ** 2
+    square = square[~np.isnan(square)]
+    return float(np.sqrt(np.mean(square))) if len(square) else math.nan
+
+
 def mean_distribution(distributions: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray | None]:
     """Return the mean share of each number and its standard error, (k,) both.
 

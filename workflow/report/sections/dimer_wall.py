@@ -75,7 +75,12 @@ def dimer_wall(data: Data) -> Content:
             ],
         )
     ]
-    rows = [row for force, of_force in means.items() for row in _rows(force, of_force)]
+    rows = [
+        row
+        for number, (force, of_force) in enumerate(means.items())
+        for row in _rows(force, of_force)
+        if row.aspect > 1 or number == 0  # the same spheres stand beside the dimers of each force
+    ]
     if rows:
         blocks.append(table("How near each curve is to that of spheres", COLUMNS, rows))
     blocks.append(

@@ -14,7 +14,12 @@ from lammps_inelastic.analysis import mueller_packing_fraction
 from ...store import Result
 from ..blocks import Content, Statement, Table, Text
 from ..columns import Column, table
-from ..curves import MeanCurve, mean_curve, root_mean_square_difference
+from ..curves import (
+    MeanCurve,
+    mean_curve,
+    root_mean_square_difference,
+    scatter_of_difference,
+)
 from ..data import Data, profiles
 from ..figures import Curve, Figure, Panel, curve
 from ..groups import by_size, is_agitated, matching
@@ -22,7 +27,8 @@ from ..text import as_count, as_runs, as_short, as_text
 
 # Mueller's formula is for cylinders of at least so many diameters.
 NARROWEST = 2.02
-# Curves whose difference is a smaller part of their oscillation are one curve.
+# Curves are one if their difference, less what the scatter of the runs makes of it, is a smaller
+# part of their oscillation.
 COLLAPSED = 0.1
 
 
@@ -45,6 +51,10 @@ class _Profile:
         """Return the root mean square difference from another profile."""
         return root_mean_square_difference(self.mean[:2], other.mean[:2])
 
+    def scatter_with(self, other: _Profile) -> float:
+        """Return the root mean square difference that the scatter of the runs alone would make."""
+        return scatter_of_difference(self.mean, other.mean)
+
     def apart_from_mueller(self, width: float | None) -> float:
         """Return the root mean square difference from Mueller's formula for a width over d.
 
@@ -63,6 +73,7 @@ PAIR_COLUMNS: Sequence[Column[tuple[_Profile, _Profile]]] = (
     Column(
         "root mean square difference in φ", lambda pair: as_text(pair[0].apart_from(pair[1]), 4)
     ),
+    Column("by scatter alone", lambda pair: as_text(pair[0].scatter_with(pair[1]), 4)),
 )
 MUELLER_COLUMNS: Sequence[Column[_Profile]] = (
     Column("curve", lambda one: one.label),
@@ -148,16 +159,11 @@ def _curves(means: Sequence[_Profile]) -> list[Curve]:
 
 
 def _collapse_table(means: Sequence[_Profile]) -> Table:
-    errors = [(one.label, error) for one in means if (error := one.mean[2]) is not None]
     return table(
         "Do the curves collapse?",
         PAIR_COLUMNS,
         combinations(means, 2),
-        [
-            f"Root mean square of the standard error of {label}: "
-            f"{as_text(float(np.sqrt(np.mean(error**2))), 4)}."
-            for label, error in errors
-        ],
+        ("By scatter alone: what the standard errors over the runs would make of it.",),
     )
 
 
@@ -166,15 +172,19 @@ def _statements(means: Sequence[_Profile]) -> list[Statement]:
     found = []
     pairs = list(combinations(means, 2))
     if pairs:
-        apart = [one.apart_from(other) for one, other in pairs]
-        waves = [float(np.std(one.mean[1])) for one in means]
+        apart = [(one.apart_from(other), one.scatter_with(other)) for one, other in pairs]
+        left = [math.sqrt(max(0.0, whole**2 - chance**2)) for whole, chance in apart]
+        wave = min(float(np.std(one.mean[1])) for one in means)
+        differences = ", ".join(
+            f"{as_text(whole, 3)} ({as_text(chance, 3)})" for whole, chance in apart
+        )
         found.append(
             Statement(
                 "The packing fraction oscillates near a wall, and the curves of several diameters "
                 "collapse.",
-                max(apart) < COLLAPSED * min(waves),
-                f"root mean square differences {as_text(min(apart), 3)} to "
-                f"{as_text(max(apart), 3)}, oscillations {as_text(min(waves), 3)}",
+                max(left) < COLLAPSED * wave,
+                f"root mean square differences (by scatter alone) {differences}; the oscillation's "
+                f"is {as_text(wave, 3)}",
             )
         )
     wide = [one for one in means if one.width >= NARROWEST]
