@@ -1,10 +1,11 @@
 """Prints the measured tables of the documentation: `make tables`.
 
 `python -m tests.tables NAME` prints one of them. `contacts` shows the coordination number of
-spheres against time step, tolerance and solver, `near` that of dimers that are almost spheres
-against the tolerance, `network` the floppy modes and states of self-stress of measured contacts,
-`start` a regular start of dimers beside a random one, `inertia` point masses beside solid spheres,
-`turning` the look at the end of the step beside a program without it, which is built for this,
+spheres against time step, tolerance and solver, `loose` the same at a loose tolerance against
+solver and accuracy, `near` that of dimers that are almost spheres against the tolerance, `network`
+the floppy modes and states of self-stress of measured contacts, `start` a regular start of dimers
+beside a random one, `inertia` point masses beside solid spheres, `turning` the look at the end of
+the step beside a program without it, which is built for this,
 `convergence` the error of exactly known motions against time step and tolerance, `rest` what motion
 is left in a bed, `gluey` how long glued packings hang that were pressed for a time, with a picture.
 Every row is nine seeds unless --seeds says otherwise; `convergence` needs none.
@@ -128,6 +129,27 @@ def contacts(seeds: int) -> Iterator[str]:
                     f"| {solver} | {timestep} | {tolerance} | {resolution:.3f} | "
                     f"{row(pour(variables, seeds, deck))} |"
                 )
+
+
+# Solver and accuracy: the fix stops at the accuracy or at the tolerance, whichever is tighter, and
+# with an accuracy of 1 at the tolerance alone.
+LOOSE = (("apgd", 0.001), ("apgd", 0.1), ("apgd", 1), ("uzawa", 1))
+
+
+def loose(seeds: int) -> Iterator[str]:
+    yield "| solver | accuracy | packing fraction % | coordination number |"
+    yield "|---|---|---|---|"
+    for solver, accuracy in LOOSE:
+        deck = shipped_deck("spheres").replace("shorten yes", f"shorten yes accuracy {accuracy}")
+        variables = {
+            "solver": solver,
+            "tolerance": 0.005,
+            "tolerance_measuring": 0.005,
+            # One time step from start to end
+            "dt_resting": 0.01,
+            "dt_measuring": 0.01,
+        }
+        yield f"| {solver} | {accuracy} | {row(pour(variables, seeds, deck))} |"
 
 
 def dimer_row(packings: list[Packing], distance: float) -> str:
@@ -387,6 +409,7 @@ def draw_gluey(path: Path, folder: Path, pressed: RunOfLog, turned: RunOfLog) ->
 TABLES = {
     "gluey": gluey,
     "contacts": contacts,
+    "loose": loose,
     "near": near,
     "network": network,
     "start": start,

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 
 from lammps_inelastic.workflow.decks import as_value, find_deck
 from lammps_inelastic.workflow.errors import WorkflowError
-from lammps_inelastic.workflow.folder import Folder
-from lammps_inelastic.workflow.gather import adopt_results, gather_results
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.shipped import (
     DECKS,
@@ -22,7 +19,6 @@ from lammps_inelastic.workflow.shipped import (
     find_stored_results,
     shipped_studies,
 )
-from lammps_inelastic.workflow.study import read_study
 
 ROOT = Path(__file__).parents[2]
 
@@ -88,17 +84,6 @@ def test_without_results_one_line_says_where_they_were_looked_for(
 def test_results_are_for_stored_ones_only(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reproduce", "--quick", "--results", "anywhere"]) == 2
     assert "only --stored and --stored-only take results" in capsys.readouterr().err
-
-
-def test_the_results_of_the_repository_say_which_code_they_are_from(tmp_path: Path) -> None:
-    """They are of the decks of version 0.1, and none is taken for one of today's decks."""
-    study = read_study(STUDIES_FOLDER / "protocol.toml")
-    folder = Folder(tmp_path / "out")
-    shutil.copytree(ROOT / "results" / study.name, tmp_path / "kept" / study.name)
-    assert adopt_results(study, folder, tmp_path / "kept") == 0
-    assert len(gather_results(study, folder).results) == 0
-    for page in ("results/README.md", "README.md"):
-        assert "version 0.1" in (ROOT / page).read_text(), page
 
 
 ROW = re.compile(r"^\| `(\w+)` \| (\S+) \| ?[^|]* \| ([^|]+) \|$", re.MULTILINE)

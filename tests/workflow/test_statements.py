@@ -12,7 +12,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-import pytest
 
 from tests.workflow.test_links import ROOT, documents
 
@@ -46,6 +45,16 @@ def standard_error(values: Any) -> float:
     return float(np.std(values, ddof=1)) / math.sqrt(len(values))
 
 
+def mean_and_error(values: Any, digits: int = 2) -> str:
+    return f"{np.mean(values):.{digits}f} ± {standard_error(values):.{digits}f}"
+
+
+def of_one_seed_each(rows: list[dict[str, Any]], count: int) -> list[dict[str, Any]]:
+    """Return the rows, of which each is a run of its own."""
+    assert len({row["seed"] for row in rows}) == len(rows) == count
+    return rows
+
+
 def test_the_packing_depends_on_the_random_force() -> None:
     """By more than three standard errors, which is no chance in one comparison (Gauss: 0.3 %)."""
     phi: dict[float, list[float]] = {0.0: [], FORCE: []}
@@ -55,99 +64,132 @@ def test_the_packing_depends_on_the_random_force() -> None:
     more = float(np.mean(phi[FORCE]) - np.mean(phi[0.0]))
     error = math.hypot(*(standard_error(values) for values in phi.values()))
     assert more > 3 * error
-    text = said()
-    assert "no trend with the force" not in text
-    assert f"denser by {more:.2f} ± {error:.2f} percentage points" in text
+    assert f"denser by {more:.2f} ± {error:.2f} percentage points" in said()
 
 
-def test_contacts_while_agitated_depend_on_the_time_step() -> None:
-    drops: dict[float, list[float]] = {}
+def drops_while_agitated() -> dict[tuple[float, float], list[float]]:
+    """Return how many contacts fewer there are than at rest, by random force and time step."""
+    drops: dict[tuple[float, float], list[float]] = {}
     for row in read("protocol"):
-        if (float(row["random_force"]), float(row["drag"])) == (FORCE, 0.5):
+        if float(row["drag"]) == 0.5:
             drop = row["coordination_number"] - row["coordination_number_agitated"]
-            drops.setdefault(float(row["dt"]), []).append(drop)
-    short, usual, long = (float(np.mean(drops[dt])) for dt in (STEP / 2, STEP, 2 * STEP))
-    wanted = f"{short:.2f}, {usual:.2f} and {long:.2f} with steps of 0.005, 0.01 and 0.02"
-    assert wanted in said()
+            drops.setdefault((float(row["random_force"]), float(row["dt"])), []).append(drop)
+    assert {len(values) for values in drops.values()} == {9}
+    return drops
+
+
+def test_contacts_while_agitated_depend_on_force_and_time_step() -> None:
+    drops = drops_while_agitated()
+    text = said()
+
+    def these(*keys: tuple[float, float]) -> str:
+        *first, last = (mean_and_error(drops[key]) for key in keys)
+        return f"{', '.join(first)} and {last}"
+
+    by_force = these((10, STEP), (FORCE, STEP), (100, STEP))
+    assert f"fewer by {by_force} for forces of 10, 30 and 100" in text
+    by_step = these((FORCE, STEP / 2), (FORCE, STEP), (FORCE, 2 * STEP))
+    assert f"for 30 by {by_step} with steps of 0.005, 0.01 and 0.02" in text
+    # The square of the force times the step is the same.
+    alike = these((42.4, STEP / 2), (FORCE, STEP), (21.2, 2 * STEP))
+    assert f"the difference is {alike} in these steps" in text
+
+
+def test_contacts_at_a_loose_tolerance_depend_on_the_count() -> None:
+    found: dict[tuple[Any, ...], list[float]] = {}
+    for row in read("counting"):
+        steps = tuple(float(row[name]) for name in ("dt", "dt_resting", "dt_measuring"))
+        key = (row["solver"], float(row["tolerance_measuring"]), steps)
+        found.setdefault(key, []).append(row["coordination_number"])
+    assert {len(values) for values in found.values()} == {9}
+    text = said()
+    of_table = {
+        solver: [
+            row["coordination_number"]
+            for row in read("table-1")
+            if (float(row["tolerance"]), row["solver"]) == (0.005, solver)
+        ]
+        for solver in ("apgd", "uzawa")
+    }
+    assert f"ours are {mean_and_error(of_table['apgd'])}, and" in text
+    assert f"Uzawa, {mean_and_error(of_table['uzawa'])}." in text
+    tight = found["apgd", 1e-5, (0.01, 0.02, 0.1)]
+    assert f"counted at 0.00001 r they have {mean_and_error(tight)}." in text
+    same = [mean_and_error(found["apgd", 0.005, (h, h, h)]) for h in (0.005, 0.01, 0.02)]
+    assert f"from start to end it is {same[0]}, {same[1]} and {same[2]} (steps" in text
+
+
+def test_how_much_single_frames_scatter_at_rest() -> None:
+    """Of the 20 frames of the phase of rest, in the mean over four runs."""
+    scatter = []
+    for path in sorted((RESULTS / "table-2").glob("spheres_particles=10000_*.h5")):
+        with h5py.File(path) as file:
+            steps = file["evolution/step"][()]
+            z = file["evolution/coordination_number"][()][(steps > 600) & (steps <= 800)]
+        assert len(z) == 20
+        scatter.append(np.std(z, ddof=1) / np.mean(z))
+    assert len(scatter) == 4
+    assert f"varies by {100 * np.mean(scatter):.2f} % from frame to frame" in said()
+
+
+def reference(deck: str, aspect_ratio: float = 1.0) -> list[dict[str, Any]]:
+    rows = [row for row in read("reference") if row["deck"] == deck]
+    if deck == "dimers":
+        rows = [row for row in rows if float(row["aspect_ratio"]) == aspect_ratio]
+    return of_one_seed_each(rows, 4)
+
+
+def test_contacts_of_the_box_and_of_the_whole_packing() -> None:
+    text = said()
+    spheres, dimers = reference("spheres"), reference("dimers", 1.5)
+    z, of_dimers = ([row["coordination_number"] for row in rows] for rows in (spheres, dimers))
+    assert f"The box has {mean_and_error(z, 3)} contacts a sphere" in text
+    assert f"and {mean_and_error(of_dimers, 3)} a dimer of L/d = 1.5" in text
+    excess, of_dimers = ([row["excess_contacts"] for row in rows] for rows in (spheres, dimers))
+    assert f"and {mean_and_error(excess)} more for each 1,000" in text
+    assert f"(dimers {mean_and_error(of_dimers)})" in text
+
+
+def test_contacts_by_layers() -> None:
+    """Of the floor, and of the last layer with half as many particles as the middle one."""
+    ends: dict[str, list[tuple[float, float]]] = {"spheres": [], "1.5": []}
+    for path in sorted((RESULTS / "reference").glob("*.h5")):
+        with h5py.File(path) as file:
+            variables = json.loads(file.attrs["record"])["stages"][0]["variables"]
+            name = str(variables.get("aspect_ratio", "spheres"))
+            if name not in ends:
+                continue
+            z = file["layers/coordination_number"][()]
+            particles = file["layers/particles"][()]
+        full = np.flatnonzero(particles >= particles[len(particles) // 2] / 2)
+        ends[name].append((z[0], z[full[-1]]))
+    floor, top = np.mean(ends["spheres"], axis=0)
+    low, high = np.mean(ends["1.5"], axis=0)
+    assert (
+        f"the layer at the floor has {floor:.1f} contacts with other spheres and the last full one "
+        f"below the free surface {top:.1f}, dimers {low:.1f} and {high:.1f}"
+    ) in said()
+
+
+def test_reference_exponents() -> None:
+    text = said()
+    spheres, dimers = reference("spheres"), reference("dimers", 1.5)
+    gaps, of_dimers = ([row["gap_exponent"] for row in rows] for rows in (spheres, dimers))
+    assert f"γ = {mean_and_error(gaps, 3)}," in text
+    assert f"L/d = 1.5 have {mean_and_error(of_dimers, 3)}." in text
+    weak = "weak_force_exponent"
+    forces, of_dimers = ([row[weak] for row in rows] for rows in (spheres, dimers))
+    assert f"exponent of weak forces is {mean_and_error(forces, 3)} (dimers " in text
+    assert f"(dimers {mean_and_error(of_dimers, 3)};" in text
 
 
 def test_nobody_has_0_or_1_contacts_in_the_measuring_box() -> None:
     """The shares are those of the box: of the other spheres the files tell nothing."""
-    runs = [row for row in read("dimers") if row["deck"] == "spheres"]
-    assert len(runs) == 2
+    runs = of_one_seed_each([row for row in read("dimers") if row["deck"] == "spheres"], 4)
     for row in runs:
         assert row["particles_in_box"] < 0.2 * row["particles"]
         assert not np.pad(row["shares"], (0, 13))[[0, 1, 11, 12]].any()
-    text = said()
-    assert "None of 10,000 spheres has" not in text
-    assert "No sphere in the measuring box has 0, 1, 11 or 12 contacts" in text
-
-
-QUANTITIES = (
-    ("packing_fraction", 100, 2, 3),
-    ("packing_fraction_with_necks", 100, 2, 3),
-    ("coordination_number", 1, 3, 4),
-    ("neighbours", 1, 3, 4),
-)
-
-
-def by_aspect_ratio(name: str, factor: float) -> dict[float, list[float]]:
-    """Return the values of a number at each aspect ratio; spheres are at 1."""
-    found: dict[float, list[float]] = {}
-    for row in read("dimers"):
-        if name in row:
-            aspect = 1.0 if row["deck"] == "spheres" else float(row["aspect_ratio"])
-            found.setdefault(aspect, []).append(factor * row[name])
-    return dict(sorted(found.items()))
-
-
-def pooled_scatter(groups: dict[float, list[float]]) -> float:
-    """Return the standard deviation that all groups share; each has two values."""
-    assert {len(values) for values in groups.values()} == {2}
-    return math.sqrt(float(np.mean([np.var(values, ddof=1) for values in groups.values()])))
-
-
-def test_errors_of_two_runs_are_pooled() -> None:
-    """Of two runs alone the scatter is near zero by chance in some rows: 0.0011 stood there."""
-    text = said()
-    cells: dict[float, list[str]] = {}
-    for name, factor, digits, more in QUANTITIES:
-        groups = by_aspect_ratio(name, factor)
-        std = pooled_scatter(groups)
-        scatter = f"± {std:.{digits}f} ({std / math.sqrt(2):.{more}f})"
-        for aspect, values in groups.items():
-            cells.setdefault(aspect, []).append(f"{np.mean(values):.{digits}f} {scatter}")
-    assert len(cells) == 12
-    for aspect, row in cells.items():
-        if aspect == 1.0:
-            # The necks are those of dimers.
-            label, row = "1 (spheres)", [row[0], "\N{EN DASH}", *row[1:]]
-        else:
-            label = f"{aspect:g}"
-        assert f"| {label} | 2 | {' | '.join(row)} |" in text
-
-
-@pytest.mark.parametrize(("reach", "points"), [(1, "three"), (2, "five")])
-def test_where_the_curve_with_necks_is_largest(reach: int, points: str) -> None:
-    """By a parabola through as many points, with the pooled error of each."""
-    groups = by_aspect_ratio("packing_fraction_with_necks", 100)
-    x = np.array(list(groups))
-    y = np.array([np.mean(values) for values in groups.values()])
-    error = pooled_scatter(groups) / math.sqrt(2)
-    middle = int(np.argmax(y))
-    near = slice(middle - reach, middle + reach + 1)
-
-    def top(values: Any) -> float:
-        a, b, _ = np.polyfit(x[near], values, 2)
-        return float(-b / (2 * a))
-
-    # The error of a function of independent values: its slopes times their errors. A step of 1e-5
-    # percentage points is small beside both; slopes by differences are known to far more digits.
-    steps = 1e-5 * np.eye(2 * reach + 1)
-    slopes = [(top(y[near] + step) - top(y[near] - step)) / 2e-5 for step in steps]
-    uncertain = error * float(np.linalg.norm(slopes))
-    words = f"through {points} points has its top at" if reach == 1 else f"through {points} at"
-    assert f"{words} {top(y[near]):.2f} ± {uncertain:.2f}" in said()
+    assert "No sphere in the measuring box has 0, 1, 11 or 12 contacts" in said()
 
 
 # The page of the fix

@@ -52,7 +52,8 @@ def reference(data: Data) -> Content:
                 "freedom, per 1,000 degrees, of all particles that are held: 0 is isostatic.",
                 "Exponents are those of maximum likelihood, of gaps from 0.001 to 0.1 diameters "
                 "and of forces from 0.001 to 0.3 of the mean at their height, of particles that "
-                "are held in any direction and touch no wall.",
+                "are held in any direction and touch no wall. Gaps of dimers that are almost "
+                "spheres follow no power: the second contact of a pair has the size of the arm.",
             ),
         ),
         Text(
