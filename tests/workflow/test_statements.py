@@ -175,7 +175,7 @@ def test_reference_exponents() -> None:
     text = said()
     spheres, dimers = reference("spheres"), reference("dimers", 1.5)
     gaps, of_dimers = ([row["gap_exponent"] for row in rows] for rows in (spheres, dimers))
-    assert f"γ = {mean_and_error(gaps, 3)}," in text
+    assert f"with a = {mean_and_error(gaps, 3)}," in text
     assert f"L/d = 1.5 have {mean_and_error(of_dimers, 3)}." in text
     weak = "weak_force_exponent"
     forces, of_dimers = ([row[weak] for row in rows] for rows in (spheres, dimers))

@@ -14,6 +14,7 @@ from lammps_inelastic.workflow.report.curves import (
     mean_distribution,
     peak,
     root_mean_square_difference,
+    scatter_of_difference,
 )
 from lammps_inelastic.workflow.report.statistics import (
     Sample,
@@ -22,6 +23,7 @@ from lammps_inelastic.workflow.report.statistics import (
     difference,
     pooled,
     sample,
+    slope,
 )
 
 # Student's own example (Biometrika 6 (1908) 20): hours of sleep gained with two soporifics.
@@ -108,6 +110,40 @@ def test_the_share_of_false_alarms_is_five_percent(runs: int) -> None:
         alarms += difference(sample(ours), stated).is_significant
     # Welch's test is approximate: 6 % for three runs. The binomial error is 0.0034.
     assert alarms / tests == pytest.approx(0.05, abs=0.02)
+
+
+def test_a_slope_is_that_of_a_fit() -> None:
+    """NumPy's; its error is that of one mean over the root of the sum of squares along x."""
+    x, y = [1.2, 1.5, 1.6, 2.0], [0.9, 0.85, 0.86, 0.7]
+    means = [Sample(value, 0.01, 1, math.inf) for value in y]
+    found = slope(x, means)
+    assert found.value == pytest.approx(np.polyfit(x, y, 1)[0], rel=1e-9)  # round-off of a fit
+    assert found.error == pytest.approx(0.01 / math.sqrt(np.var(x) * 4), rel=1e-9)
+    assert found.freedom == math.inf
+    # Of two points, or of one that has no error, nothing is told.
+    assert math.isnan(slope(x[:2], means[:2]).p)
+    assert math.isnan(slope(x, [*means[:3], sample([0.7])]).p)
+
+
+def test_slopes_by_chance_are_significant_in_five_percent() -> None:
+    random = np.random.default_rng(5)
+    tests = 3000
+    x = np.linspace(1, 2, 6)
+    alarms = sum(
+        slope(list(x), [sample(random.normal(0, 1, 4)) for _ in x]).is_significant
+        for _ in range(tests)
+    )
+    # The binomial error is 0.004; degrees of freedom after Satterthwaite are approximate.
+    assert alarms / tests == pytest.approx(0.05, abs=0.015)
+
+
+def test_the_scatter_of_two_curves_adds_in_squares() -> None:
+    x = np.linspace(0, 1, 5)
+    flat = np.zeros(5)
+    one, other = (x, flat, flat + 0.03), (x, flat, flat + 0.04)
+    assert scatter_of_difference(one, other) == pytest.approx(0.05, rel=1e-12)  # round-off
+    # A single curve has no error.
+    assert scatter_of_difference(one, (x, flat, None)) == pytest.approx(0.03, rel=1e-12)
 
 
 def test_holms_example() -> None:

@@ -193,6 +193,29 @@ def difference(one: Sample | Stated, other: Sample | Stated) -> Difference:
     return Difference(one.mean - other.mean, math.sqrt(square), freedom)
 
 
+def slope(x: Sequence[float], samples: Sequence[Sample]) -> Difference:
+    """Return the slope of the line through means at x, (k,), and its standard error.
+
+    Least squares, all means with the same weight: weights made of the errors of a few values each
+    find three times as many slopes as there should be. The degrees of freedom are those of Welch
+    and Satterthwaite. It is not known for fewer than three means, or if one has no error.
+    """
+    errors = np.array([one.error for one in samples])
+    if len(samples) < 3 or not np.all(errors > 0) or len(set(x)) < 2:
+        return UNKNOWN
+    apart = np.asarray(x) - np.mean(x)
+    parts = apart / np.sum(apart**2)
+    squares = (parts * errors) ** 2
+    freedoms = np.array([one.freedom for one in samples])
+    inverse = float(np.sum(squares**2 / freedoms))
+    square = float(np.sum(squares))
+    return Difference(
+        float(parts @ [one.mean for one in samples]),
+        math.sqrt(square),
+        square**2 / inverse if inverse > 0 else math.inf,
+    )
+
+
 def adjusted(probabilities: Sequence[float]) -> list[float]:
     """Return the probabilities of several tests, each corrected for how many there are.
 

@@ -28,8 +28,17 @@ from ..statistics import (
     difference,
     numbers,
     sample,
+    slope,
 )
-from ..text import DASH, as_count, as_mean, as_short, as_text
+from ..text import (
+    DASH,
+    as_count,
+    as_mean,
+    as_measured,
+    as_probability,
+    as_short,
+    as_text,
+)
 from .aspect_ratios import shaken, true_dimers
 
 AXES = "xyz"
@@ -234,7 +243,13 @@ def _statements(rows: Sequence[_Orientation], force: float) -> list[Statement]:
     apart = adjusted([one.p for one in level])
     down = adjusted([one.p for one in lying])
     long = [row for row in rows if row.value >= LONG]
-    slopes = [row.ratios["y"].mean for row in long]
+    a_y = [row.ratios["y"] for row in long]
+    trend = slope([row.value for row in long], a_y)
+    lie = [
+        one.value < 0 and p < SIGNIFICANT
+        for row, one, p in zip(rows, lying, down, strict=True)
+        if row.value >= LONG
+    ]
     return [
         Statement(
             "a_x and a_z are the same: the dimers do not remember how they started.",
@@ -244,24 +259,18 @@ def _statements(rows: Sequence[_Orientation], force: float) -> list[Statement]:
         ),
         Statement(
             "a_y is smaller: dimers lie down.",
-            all(
-                one.value < 0 and p < SIGNIFICANT
-                for row, one, p in zip(rows, lying, down, strict=True)
-                if row.value >= LONG
-            ),
-            f"a_y / isotropic: {as_text(min(slopes), 3)} to {as_text(max(slopes), 3)} from L/d = "
-            f"{as_short(LONG)} on"
-            if slopes
+            all(lie) if long else None,
+            f"a_y / isotropic: {as_text(min(one.mean for one in a_y), 3)} to "
+            f"{as_text(max(one.mean for one in a_y), 3)} from L/d = {as_short(LONG)} on"
+            if long
             else "",
         ),
         Statement(
             "They lie down more the longer they are.",
-            len(slopes) > 2
-            and float(np.polyfit([row.value for row in long], slopes, 1)[0]) < 0
-            and slopes[-1] < slopes[0],
-            f"a_y / isotropic {as_text(slopes[0], 3)} at {as_short(long[0].value)}, "
-            f"{as_text(slopes[-1], 3)} at {as_short(long[-1].value)}"
-            if slopes
+            trend.value < 0 if trend.is_significant else None,
+            f"a_y / isotropic goes as {as_measured(trend.value, trend.error, 3)} times L/d from "
+            f"{as_short(LONG)} on (p = {as_probability(trend.p)})"
+            if len(long) > 2
             else "",
         ),
     ]
