@@ -13,7 +13,7 @@ from ..data import RUNS_OF_TABLE_1, Data
 from ..groups import count_of, grouped, is_agitated, matching, solver_of
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION, compared
 from ..statistics import Stated
-from ..text import as_count, as_difference, as_mean, as_probability, as_short
+from ..text import as_count, as_mean, as_short
 
 STEPS = ("dt", "dt_resting", "dt_measuring")
 
@@ -102,14 +102,12 @@ def cause(data: Data, solver: str) -> str:
         f"the packings counted at {as_short(row.counted_at)} r have {as_mean(row.z.ours, 2)}"
         for row in tight
     ]
-    parts += [
-        f"with a step of {as_short(row.steps[0])} throughout it is {as_mean(row.z.ours, 2)} "
-        f"({as_difference(row.z.difference.in_errors)} SE, "
-        f"p {as_probability(row.z.difference.p)})"
-        for row in same
-        if row.solver == solver
-    ]
-    return "the way to count: " + ", ".join(parts)
+    same = [row for row in same if row.solver == solver]
+    if same:
+        steps = ", ".join(as_short(row.steps[0]) for row in same)
+        found = ", ".join(as_mean(row.z.ours, 2) for row in same)
+        parts.append(f"with one time step throughout ({steps}) it is {found}")
+    return "the way to count: " + "; ".join(parts)
 
 
 def _loosest(data: Data) -> Mapping[str, Any]:

@@ -304,7 +304,8 @@ def distributions(data: Data) -> Content:
                 f"{contacts[0]} to {contacts[1]} in most runs and most probable at "
                 f"{stated['contacts_most_probable']}, and slightly narrower for two curves, "
                 "printed as d/L = 0.4 and 0.6 (perhaps L/d 1.4 and 1.6); neighbours range from "
-                f"{neighbours[0]} to {neighbours[1]} and depend on the aspect ratio."
+                f"{neighbours[0]} to {neighbours[1]} and depend on the aspect ratio. Three "
+                "neighbours that touch it twice each can hold a dimer; few are held so."
             ),
         ],
         statements=_statements_on_distributions(weakest, stated),

@@ -11,8 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ...store import Result
 from ..blocks import Block, Comparison, Content, Statement, Text
 from ..columns import RUNS, Column, table
