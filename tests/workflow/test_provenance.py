@@ -40,6 +40,15 @@ def repository(folder: Path) -> Path:
     return folder
 
 
+def test_the_command_line_says_which_code_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    """With the words that stand in each result."""
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.startswith(f"lammps-inelastic {code()['version']} (fix {code()['sources'][:12]}, ")
+
+
 def test_a_version_holds_the_commit_and_whether_a_file_differs(tmp_path: Path) -> None:
     root = repository(tmp_path / "clone")
     commit = git(root, "rev-parse", "--short=10", "HEAD")

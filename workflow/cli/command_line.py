@@ -8,10 +8,11 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from lammps_inelastic.analysis import AnalysisError
 
+from .. import provenance
 from ..errors import INTERRUPTED, StudyError, WorkflowError
 from . import (
     collect,
@@ -82,8 +83,23 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"inelastic: {message} (see {self.prog} --help)\n")
 
 
+class _Version(argparse.Action):
+    """Print which code this is, as it stands in every result, and end."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any, **__: Any) -> NoReturn:
+        code, versions = provenance.code(), provenance.versions()
+        print(
+            f"lammps-inelastic {code['version']} (fix {code['sources'][:12]}, "
+            f"{code['compiler']}), LAMMPS {versions['lammps']}"
+        )
+        parser.exit()
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="inelastic", description="Packings of inelastic spheres with LAMMPS.")
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="print which code this is, and leave"
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for subcommand in SUBCOMMANDS:
         subcommand.add_parser(commands)
