@@ -108,10 +108,10 @@ def coming_to_rest(data: Data) -> Content:
                 f"step {stated['plateau_step']} on φ is constant within 0.1 % and z within 0.05 %. "
                 "A step of the paper's code and one of ours need not last the same time, and "
                 "nothing states how long the paper's is: the shapes can be compared, the numbers "
-                "of steps cannot. A bed of this size never stops giving way here and there, by far "
-                "less than its packing fraction tells; contacts open and close with it, and 0.05 % "
-                "of z are two contacts of the box. z is that of single frames, and until the count "
-                "it is taken with the larger ε."
+                "of steps cannot. A bed of this size still gives way here and there when the run "
+                "ends, by far less than its packing fraction tells; contacts open and close with "
+                "it, and 0.05 % of z are two contacts of the box. z is that of single frames, and "
+                "until the count it is taken with the larger ε."
             ),
             *(
                 [

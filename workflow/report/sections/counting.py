@@ -96,13 +96,12 @@ def cause(data: Data, solver: str) -> str:
     rows = _rows(data)
     if not rows:
         return "at a loose ε the count depends on how it is made: see the study counting"
-    tight = [row for row in rows if row.is_tight]
-    same = [row for row in rows if row.is_of_one_step and not row.is_tight]
     parts = [
         f"the packings counted at {as_short(row.counted_at)} r have {as_mean(row.z.ours, 2)}"
-        for row in tight
+        for row in rows
+        if row.is_tight
     ]
-    same = [row for row in same if row.solver == solver]
+    same = [r for r in rows if r.is_of_one_step and not r.is_tight and r.solver == solver]
     if same:
         steps = ", ".join(as_short(row.steps[0]) for row in same)
         found = ", ".join(as_mean(row.z.ours, 2) for row in same)

@@ -77,7 +77,7 @@ def dimer_packing_fraction(data: Data) -> Content:
 
 def _statements(curves: Sequence[Curve], stated: float) -> list[Statement]:
     """Say whether φ grows up to some aspect ratio, and falls beyond the paper's."""
-    known = [one for one in curves if len(one.x) > 4]
+    known = [one for one in curves if len(one.x) > 4 and np.sum(one.x >= stated) > 1]
     raw = [one for one in known if one.label.startswith("raw")]
     necks = [one for one in known if not one.label.startswith("raw")]
     return [
@@ -108,7 +108,7 @@ def _rises_and_falls(one: Curve, stated: float) -> bool:
         one.y[j] - one.y[i] <= 2 * math.hypot(errors[i], errors[j])
         for i, j in itertools.pairwise(beyond)
     )
-    return bool(ends and falls and len(beyond) > 1 and one.y[beyond[-1]] < best)
+    return bool(ends and falls and one.y[beyond[-1]] < best)
 
 
 def _panel(ours: Sequence[Curve], elsewhere: Mapping[str, Any]) -> Panel:

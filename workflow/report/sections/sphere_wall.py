@@ -55,6 +55,11 @@ class _Profile:
         """Return the root mean square difference that the scatter of the runs alone would make."""
         return scatter_of_difference(self.mean, other.mean)
 
+    def oscillation_beside(self, other: _Profile) -> float:
+        """Return the standard deviation of φ as far from the wall as both profiles reach."""
+        x, y, _ = self.mean
+        return float(np.std(y[x <= other.mean[0][-1]]))
+
     def apart_from_mueller(self, width: float | None) -> float:
         """Return the root mean square difference from Mueller's formula for a width over d.
 
@@ -174,7 +179,7 @@ def _statements(means: Sequence[_Profile]) -> list[Statement]:
     if pairs:
         apart = [(one.apart_from(other), one.scatter_with(other)) for one, other in pairs]
         left = [math.sqrt(max(0.0, whole**2 - chance**2)) for whole, chance in apart]
-        wave = min(float(np.std(one.mean[1])) for one in means)
+        waves = [one.oscillation_beside(other) for one, other in pairs]
         differences = ", ".join(
             f"{as_text(whole, 3)} ({as_text(chance, 3)})" for whole, chance in apart
         )
@@ -182,9 +187,9 @@ def _statements(means: Sequence[_Profile]) -> list[Statement]:
             Statement(
                 "The packing fraction oscillates near a wall, and the curves of several diameters "
                 "collapse.",
-                max(left) < COLLAPSED * wave,
-                f"root mean square differences (by scatter alone) {differences}; the oscillation's "
-                f"is {as_text(wave, 3)}",
+                all(one < COLLAPSED * wave for one, wave in zip(left, waves, strict=True)),
+                f"root mean square differences (by scatter alone) {differences}; oscillations "
+                f"{as_text(min(waves), 3)} to {as_text(max(waves), 3)}",
             )
         )
     wide = [one for one in means if one.width >= NARROWEST]
