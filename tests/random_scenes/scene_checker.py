@@ -1006,7 +1006,11 @@ class _Part:
         alone: Array,
         sizes: Array,
     ) -> None:
-        """(c) T(V+) <= T(V*) + sum lambda (max(0, -D) + EPS) / h + the work of what moves."""
+        """(c) T(V+) <= T(V*) + sum lambda (max(0, -D) + EPS) / h + the work of what moves.
+
+        With restitution also by half of lambda (n.u* - D / h) where spheres were parting: what has
+        turned past one another parts faster, u*, than its gap D has grown in a step.
+        """
         if new.bodies is not None or self.facts["warn"]:
             return
         # The velocities at the start of a run may be half way through a collision, and slow there.
@@ -1019,6 +1023,11 @@ class _Part:
         # Contacts that pull close gaps, others open overlaps.
         deep = np.maximum(0, np.where(impulse > 0, -listed["gap"], listed["gap"]))
         allowed = (np.abs(impulse) * (deep + self.eps)).sum() / new.h
+        if "law restitution" in self.facts["words"]:
+            # The normal points from j to i.
+            apart = (n[pair] * (predicted[i[pair]] - predicted[j[pair]])).sum(axis=1)
+            turned = np.where(apart > 0, apart - np.maximum(0, listed["gap"][pair]) / new.h, 0.0)
+            allowed += 0.5 * (np.maximum(0, impulse[pair]) * np.maximum(0, turned)).sum()
         for row in np.flatnonzero(~pair).tolist():
             allowed += max(0.0, impulse[row] * self.wall_motion(new, listed, row)) / new.h
         for side, sign in ((i, -1.0), (np.where(pair, j, i), 1.0)):
