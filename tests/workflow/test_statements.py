@@ -132,22 +132,24 @@ def test_how_much_single_frames_scatter_at_rest() -> None:
     assert f"varies by {100 * np.mean(scatter):.2f} % from frame to frame" in said()
 
 
-def reference(deck: str, aspect_ratio: float = 1.0) -> list[dict[str, Any]]:
-    rows = [row for row in read("reference") if row["deck"] == deck]
-    if deck == "dimers":
-        rows = [row for row in rows if float(row["aspect_ratio"]) == aspect_ratio]
-    return of_one_seed_each(rows, 4)
+def reference(name: str, digits: int) -> tuple[str, str]:
+    """Return a number of the reference packings, of spheres and of dimers of L/d = 1.5."""
+    rows = read("reference")
+    spheres = [row for row in rows if row["deck"] == "spheres"]
+    dimers = [row for row in rows if float(row.get("aspect_ratio", 0)) == 1.5]
+    of_spheres, of_dimers = (
+        mean_and_error([row[name] for row in of_one_seed_each(kind, 4)], digits)
+        for kind in (spheres, dimers)
+    )
+    return of_spheres, of_dimers
 
 
 def test_contacts_of_the_box_and_of_the_whole_packing() -> None:
-    text = said()
-    spheres, dimers = reference("spheres"), reference("dimers", 1.5)
-    z, of_dimers = ([row["coordination_number"] for row in rows] for rows in (spheres, dimers))
-    assert f"The box has {mean_and_error(z, 3)} contacts a sphere" in text
-    assert f"and {mean_and_error(of_dimers, 3)} a dimer of L/d = 1.5" in text
-    excess, of_dimers = ([row["excess_contacts"] for row in rows] for rows in (spheres, dimers))
-    assert f"and {mean_and_error(excess)} more for each 1,000" in text
-    assert f"(dimers {mean_and_error(of_dimers)})" in text
+    spheres, dimers = reference("coordination_number", 3)
+    assert f"The box has {spheres} contacts a sphere" in said()
+    assert f"and {dimers} a dimer of L/d = 1.5" in said()
+    spheres, dimers = reference("excess_contacts", 2)
+    assert f"and {spheres} more for each 1,000 of them (dimers {dimers})" in said()
 
 
 def test_contacts_by_layers() -> None:
@@ -172,15 +174,11 @@ def test_contacts_by_layers() -> None:
 
 
 def test_reference_exponents() -> None:
-    text = said()
-    spheres, dimers = reference("spheres"), reference("dimers", 1.5)
-    gaps, of_dimers = ([row["gap_exponent"] for row in rows] for rows in (spheres, dimers))
-    assert f"with a = {mean_and_error(gaps, 3)}," in text
-    assert f"L/d = 1.5 have {mean_and_error(of_dimers, 3)}." in text
-    weak = "weak_force_exponent"
-    forces, of_dimers = ([row[weak] for row in rows] for rows in (spheres, dimers))
-    assert f"exponent of weak forces is {mean_and_error(forces, 3)} (dimers " in text
-    assert f"(dimers {mean_and_error(of_dimers, 3)};" in text
+    spheres, dimers = reference("gap_exponent", 3)
+    assert f"with a = {spheres}, as" in said()
+    assert f"L/d = 1.5 have {dimers}." in said()
+    spheres, dimers = reference("weak_force_exponent", 3)
+    assert f"exponent of weak forces is {spheres} (dimers {dimers};" in said()
 
 
 def test_nobody_has_0_or_1_contacts_in_the_measuring_box() -> None:
