@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -54,19 +54,21 @@ def version_in(record: Mapping[str, Any]) -> str:
     return str(record["versions"].get(THIS, "unknown"))
 
 
-def differs(case: Case, record: Mapping[str, Any]) -> str:
+def differs(case: Case, record: Mapping[str, Any], as_good: Container[str] = ()) -> str:
     """Say in what the code of a run differs from that of today; empty if in nothing.
 
     Parameters
     ----------
     case : case as its decks are today
     record : record of a run of the case
+    as_good : hashes of the sources of fixes that are known to have the runs of today's
     """
     words = []
     if record["fingerprint"] != case.fingerprint:
         words.append("another version of the deck")
     # Runs of version 0.1 did not note the code.
-    if record.get("code", {}).get("sources") != code()["sources"]:
+    sources = record.get("code", {}).get("sources")
+    if sources != code()["sources"] and sources not in as_good:
         words.append(f"version {version_in(record)} of the fix")
     return ", ".join(words)
 

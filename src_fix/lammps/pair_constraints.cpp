@@ -270,7 +270,10 @@ long PairConstraints::relinearise()
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
     const bool too_deep = rules_.ends_too_deep(side, gap);
-    if (may_hold && step_.phase == Phase::CONTACT && !rules_.overlaps().is_bad(side.gap_now)) {
+    // A push is to move no contact, but it may turn a held pair back, and the gap that made room for its turning
+    // would be an overlap.
+    const bool follows = step_.phase == Phase::CONTACT || gap < -step_.settings.tolerance;
+    if (may_hold && follows && !rules_.overlaps().is_bad(side.gap_now)) {
       const double along = dot(&contacts.normal[3 * c], away) / norm(away);
       changed += rules_.hold(c, gap, opening(c), along);
       continue;

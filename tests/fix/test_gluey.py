@@ -301,6 +301,31 @@ def test_two_that_turn_about_one_another(across: float, tmp_path: Path, lmp: Run
     assert speeds[1:] == pytest.approx(np.full(len(speeds) - 1, across), rel=1e-5)
 
 
+def test_a_pair_that_turns_is_pushed_back(tmp_path: Path, lmp: Runner) -> None:
+    """The gap that makes room for its turning goes where a push takes the turning away."""
+    deck = deck_of(
+        [[-RADIUS - 1e-7, 0.0, 0.0], [RADIUS, 0.0, 0.0]],
+        tmp_path,
+        region="",
+        velocities=[[8.0, 0.0, 0.0], [0.0, 2.0, 0.0]],
+        box=WIDE,
+        timestep=0.03,
+    )
+    deep = 0.1
+    ahead = (
+        f"create_atoms 1 single $(x[2]) $(y[2]+{2 * RADIUS - deep}) $(z[2])\n"
+        f"group new id 3\nset group new diameter {2 * RADIUS} density 100\n"
+        "velocity new set $(vx[2]) $(vy[2]) $(vz[2])\n"
+    )
+    lmp(deck + "run 2\n" + ahead + DUMP_PARTICLES + "run 4\n")
+    frames = read_dump(tmp_path / "particles.dump")
+    apart = [np.diff(frame.positions, axis=0) for frame in frames]
+    gaps = np.linalg.norm(apart, axis=2) - 2 * RADIUS
+    assert gaps[0, 1] < -0.9 * deep
+    # Where the gap stayed, they overlapped by 518 EPS.
+    assert gaps[:, 0].min() >= -(1 + 1e-6) * EPS  # round-off
+
+
 def test_a_bed_that_is_turned_over(tmp_path: Path, lmp: Runner) -> None:
     """Spheres hang under the floor, and touch what they touched, while what pressed them lasts."""
     step, eps = 0.005, 1e-3 * RADIUS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,11 +14,13 @@ import pytest
 
 from lammps_inelastic import plugin
 from lammps_inelastic.workflow.build_version import dynamic_metadata, version_now, version_of
+from lammps_inelastic.workflow.errors import WorkflowError
 from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.gather import adopt_results
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.provenance import code, differs
 from lammps_inelastic.workflow.report.sections.provenance import codes_line
+from lammps_inelastic.workflow.same_runs import FILE, as_good_as_todays
 from lammps_inelastic.workflow.store import Result, read_result, write_result
 from lammps_inelastic.workflow.study import read_study
 from tests.workflow.study_run import run_few
@@ -157,6 +160,37 @@ def test_stored_results_of_other_code_are_not_taken(
     write_result(second, Result(result.values, {}, result.record, "{}"))
     folder = Folder(tmp_path / "third")
     assert adopt_results(study, folder, tmp_path / "kept", of_any_code=True) == 1
+
+
+def test_stored_results_of_a_fix_with_the_same_runs_are_taken(few: Path, tmp_path: Path) -> None:
+    """Only where the folder names the fix that made them, and today's among those with its runs."""
+    kept = tmp_path / "kept"
+    shutil.copytree(few / "out" / "results" / "few", kept / "few")
+    for result in (kept / "few").glob("*.h5"):
+        made_by(result, code={**code(), "sources": "earlier"})
+    study = read_study(few / "few.toml")
+    todays = code()["sources"]
+    for number, (made, same, count) in enumerate(
+        [("earlier", todays, 2), ("another", todays, 0), ("earlier", "later", 0)]
+    ):
+        (kept / FILE).write_text(f'made_by = "{made}"\nsame = ["{same}"]\n')
+        assert adopt_results(study, Folder(tmp_path / str(number)), kept) == count
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("made_by = ", "cannot be read"),
+        ('made_by = "a"', "made_by must be a hash of sources, and same a list of hashes"),
+        ('same = ["a"]', "made_by must be a hash of sources, and same a list of hashes"),
+    ],
+)
+def test_a_file_of_same_runs_that_is_not_as_it_must_be(
+    content: str, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / FILE).write_text(content)
+    with pytest.raises(WorkflowError, match=re.escape(f"{tmp_path / FILE}: {said}")):
+        as_good_as_todays(tmp_path)
 
 
 def test_a_changed_deck_is_other_code(few: Path) -> None:
