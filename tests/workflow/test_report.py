@@ -35,6 +35,7 @@ from lammps_inelastic.workflow.report.contents import all_sections
 from lammps_inelastic.workflow.report.data import Data, paper_numbers, read_data
 from lammps_inelastic.workflow.report.figures import Figure, Panel, curve
 from lammps_inelastic.workflow.report.page import render, summarise
+from lammps_inelastic.workflow.report.sections.dimer_orientation import ratio_apart
 from lammps_inelastic.workflow.report.statistics import (
     Stated,
 )
@@ -634,6 +635,23 @@ def test_orientation_of_runs_that_agree_by_chance() -> None:
     # The runs have the same a_x; 0.01 is what the number of dimers leaves of each.
     assert x.ours.error == pytest.approx(0.01 / math.sqrt(2), rel=1e-12)  # round-off
     assert x.stated.error == 0.01
+
+
+def test_components_of_the_same_dimers_are_not_independent() -> None:
+    """Of 300 runs of isotropic dimers a_x and a_z differ in as many as the level of a test says."""
+    draw = np.random.default_rng(1)
+    false = 0
+    for _ in range(300):
+        along = draw.normal(size=(400, 3))
+        squares = (along / np.linalg.norm(along, axis=1)[:, None]) ** 2
+        a = np.sqrt(squares.mean(axis=0))
+        errors = squares.std(axis=0, ddof=1) / 20 / (2 * a)
+        named = {f"numbers__a_{axis}": value for axis, value in zip("xyz", a, strict=True)}
+        named |= {f"numbers__a_{axis}_error": e for axis, e in zip("xyz", errors, strict=True)}
+        run = measured(deck="dimers", aspect_ratio=1.8, **named, numbers__a_isotropic=3**-0.5)
+        false += ratio_apart([run], "x", "z").p < 0.05
+    # 15 of 300, four binomial standard deviations of 3.8; as independent ones it would be 33.
+    assert abs(false - 15) < 15
 
 
 def test_overlap_is_compared_with_the_loosest_tolerance() -> None:

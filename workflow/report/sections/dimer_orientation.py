@@ -20,10 +20,10 @@ from ..groups import by_size, by_value, grouped
 from ..quantities import COORDINATION_NUMBER, PACKING_FRACTION
 from ..statistics import (
     SIGNIFICANT,
+    Difference,
     Sample,
     Stated,
     adjusted,
-    difference,
     numbers,
     sample,
     slope,
@@ -61,6 +61,33 @@ def ratio_over_isotropic(group: Sequence[Result], axis: str) -> Sample:
     if found.std > of_dimers:
         return found
     return Sample(found.mean, of_dimers, found.n, math.inf)
+
+
+def ratio_apart(group: Sequence[Result], axis: str, other: str) -> Difference:
+    """Return the difference of two of the ratios a_x, a_y and a_z over isotropic.
+
+    The components are not independent: their squares A_x, A_y and A_z add up to the square of the
+    distance of the two centres. Of two of them and the third, l, therefore var(A_i - A_k) =
+    2 var(A_i) + 2 var(A_k) - var(A_l). The standard error is that between the runs if it is larger.
+    """
+    (third,) = set(AXES) - {axis, other}
+    found, from_dimers = [], []
+    for result in group:
+        a = {one: result.number(f"a_{one}") for one in AXES}
+        squares = {one: (2 * a[one] * result.number(f"a_{one}_error")) ** 2 for one in AXES}
+        variance = 2 * squares[axis] + 2 * squares[other] - squares[third]
+        isotropic = result.number("a_isotropic")
+        found.append((a[axis] - a[other]) / isotropic)
+        from_dimers.append(
+            math.sqrt(max(0.0, variance)) / (a[axis] + a[other]) / isotropic
+            if not math.isnan(variance)
+            else math.nan
+        )
+    between = sample(found)
+    of_dimers = sample(from_dimers).mean
+    if between.std > of_dimers:
+        return Difference(between.mean, between.error, between.freedom)
+    return Difference(between.mean, of_dimers / math.sqrt(max(1, between.n)), math.inf)
 
 
 def _error_of_a_run(group: Sequence[Result], axis: str) -> float:
@@ -101,7 +128,7 @@ class _Orientation:
     force : largest random acceleration, per direction; NaN of the paper
     value : the aspect ratio; NaN of the paper
     aspect : the aspect ratio, with what else is to be said of it
-    runs : how many runs of ours; None for the paper
+    group : runs of ours; none for the paper
     components : a_x, a_y, a_z, length
     isotropic : each of them where no direction is preferred, length
     ratios : a_x, a_y, a_z over that; the paper's are of no runs
@@ -110,7 +137,7 @@ class _Orientation:
     force: float
     value: float
     aspect: str
-    runs: int | None
+    group: Sequence[Result]
     components: Mapping[str, float]
     isotropic: float
     ratios: Mapping[str, Sample]
@@ -142,7 +169,7 @@ def _ratio_column(axis: str) -> Column[_Orientation | _Agitated]:
 COLUMNS: Sequence[Column[_Orientation]] = (
     Column("random force", lambda row: as_short(row.force)),
     Column("L/d", lambda row: row.aspect),
-    Column("runs", lambda row: DASH if row.runs is None else row.runs),
+    Column("runs", lambda row: len(row.group) or DASH),
     *(_component_column(axis) for axis in AXES),
     Column("isotropic", lambda row: as_text(row.isotropic, 4)),
     *(_ratio_column(axis) for axis in AXES),
@@ -234,8 +261,8 @@ def against_aspect(data: Data) -> Content:
 
 def _statements(rows: Sequence[_Orientation], force: float) -> list[Statement]:
     """Say whether the dimers of one random force lie as the paper's do."""
-    level = [difference(row.ratios["x"], row.ratios["z"]) for row in rows]
-    lying = [difference(row.ratios["y"], row.ratios["x"]) for row in rows]
+    level = [ratio_apart(row.group, "x", "z") for row in rows]
+    lying = [ratio_apart(row.group, "y", "x") for row in rows]
     if not rows or any(math.isnan(one.p) for one in (*level, *lying)):
         return []
     apart = adjusted([one.p for one in level])
@@ -283,7 +310,7 @@ def _our_row(force: float, aspect: float, group: Sequence[Result]) -> _Orientati
         force,
         aspect,
         as_short(aspect),
-        len(group),
+        group,
         {axis: numbers(group, f"a_{axis}").mean for axis in AXES},
         numbers(group, "a_isotropic").mean,
         _ratios(group),
@@ -295,7 +322,7 @@ def _row_of_paper(stated: Mapping[str, Any]) -> _Orientation:
         math.nan,
         math.nan,
         f"paper, printed as {stated['stated_aspect_ratio']}",
-        None,
+        (),
         {axis: stated[f"a_{axis}"] for axis in AXES},
         stated["isotropic"],
         {axis: Sample(_stated_ratio(stated, axis), math.nan, 0) for axis in AXES},
