@@ -63,7 +63,14 @@ from .profile import (
 from .rattlers import Backbone, backbone, contacts_to_hold
 from .run_files import RunFiles, check_contacts, open_run
 from .run_log import Run, RunLog, at_steps, read_run_log
-from .scaling import PowerLaw, local_ratios, logarithmic_density, power_law, small_gaps
+from .scaling import (
+    PowerLaw,
+    binned_exponent,
+    local_ratios,
+    logarithmic_density,
+    power_law,
+    small_gaps,
+)
 from .structure import (
     BondOrder,
     RadialDistribution,
@@ -112,6 +119,7 @@ __all__ = [
     "at_steps",
     "backbone",
     "best_packing_fraction",
+    "binned_exponent",
     "bond_order",
     "check_contacts",
     "contact_counts",

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from .bodies import Particles
 from .errors import InputError
@@ -175,3 +175,33 @@ def logarithmic_density(
     counts, _ = np.histogram(given, edges)
     middles: FloatArray = np.sqrt(edges[:-1] * edges[1:])
     return middles, counts / (max(len(given), 1) * np.diff(edges))
+
+
+def binned_exponent(middles: ArrayLike, density: ArrayLike, low: float, high: float) -> float:
+    """Return the exponent of the power law that makes a binned density most likely.
+
+    It is that of `power_law` for values of which only the shares in bins are known.
+
+    Parameters
+    ----------
+    middles, density : (b,) each, as `logarithmic_density` returns them
+    low, high : the bins whose middles lie between these are used
+
+    Raises InputError for fewer than three such bins, or where all values are in one of them.
+    """
+    x, y = np.asarray(middles, dtype=np.float64), np.asarray(density, dtype=np.float64)
+    inside = (x > low) & (x < high)
+    if inside.sum() < 3 or (y[inside] > 0).sum() < 2:
+        raise InputError(f"too few bins with values between {low:g} and {high:g} for a power law")
+    ratio = x[1] / x[0]
+    # In units of the first middle, so that no power of an edge overflows.
+    edges = np.append(x[inside] / math.sqrt(ratio), x[inside][-1] * math.sqrt(ratio)) / x[0]
+    shares = y[inside] * np.diff(edges)
+
+    def unlikeliness(s: float) -> float:
+        # The integral of x^(s - 1) over a bin; s is never exactly zero.
+        parts = np.diff(edges**s) / s
+        return -float(shares @ np.log(parts / parts.sum()))
+
+    found = minimize_scalar(unlikeliness, bounds=(-STEEPEST, STEEPEST), method="bounded")
+    return float(found.x) - 1

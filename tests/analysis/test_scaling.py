@@ -9,6 +9,7 @@ import pytest
 
 from lammps_inelastic.analysis import (
     InputError,
+    binned_exponent,
     group_spheres,
     local_ratios,
     logarithmic_density,
@@ -52,6 +53,24 @@ def test_it_is_the_likeliest_exponent() -> None:
     for sign in (-1, 1):
         drop = best - likelihood(law.exponent + sign * law.error)
         assert drop == pytest.approx(0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("exponent", [-1.6, -0.413, 0.0, 0.17])
+def test_a_binned_density_has_the_exponent_of_its_values(exponent: float) -> None:
+    values = drawn(exponent, 1e-4, 1.0, 20_000)
+    middles, density = logarithmic_density(values, 1e-5, 10.0)
+    # Between edges of bins, which are at powers of ten.
+    law = power_law(values, 1e-3, 1e-1)
+    # Where in a bin a value lies is lost, which is worth less than a third of the error.
+    found = binned_exponent(middles, density, 1e-3, 1e-1)
+    assert found == pytest.approx(law.exponent, abs=0.3 * law.error)
+
+
+def test_bad_input_of_a_binned_density() -> None:
+    with pytest.raises(InputError, match=r"too few bins with values between 0\.1 and 0\.2"):
+        binned_exponent([0.1, 0.15, 0.2], [1.0, 1.0, 1.0], 0.1, 0.2)
+    with pytest.raises(InputError, match="too few bins"):
+        binned_exponent([1.0, 2.0, 4.0, 8.0], [0.0, 1.0, 0.0, 0.0], 0.5, 10.0)
 
 
 def test_bad_input_of_a_power_law() -> None:

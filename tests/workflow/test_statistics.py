@@ -12,15 +12,16 @@ from scipy import stats
 from lammps_inelastic.workflow.report.curves import (
     mean_curve,
     mean_distribution,
-    peak,
     root_mean_square_difference,
     scatter_of_difference,
+    top,
 )
 from lammps_inelastic.workflow.report.statistics import (
     Sample,
     Stated,
     adjusted,
     difference,
+    paired_difference,
     pooled,
     sample,
     slope,
@@ -39,6 +40,35 @@ def test_students_sleep_data() -> None:
     assert found.freedom == pytest.approx(17.776, abs=5e-4)
     assert found.p == pytest.approx(0.07939, abs=5e-6)
     assert not found.is_significant
+
+
+def test_students_sleep_data_in_pairs() -> None:
+    """Of the same ten patients: t = -4.0621 with 9 degrees of freedom, p = 0.002833, by R."""
+    found = paired_difference(dict(enumerate(DEXTRO)), dict(enumerate(LAEVO)))
+    # As many digits as R prints.
+    assert found.in_errors == pytest.approx(-4.0621, abs=5e-5)
+    assert found.freedom == 9
+    assert found.p == pytest.approx(0.002833, abs=5e-7)
+    # R: 95 % from -2.4598858 to -0.7001142.
+    assert found.value - found.margin == pytest.approx(-2.4598858, abs=5e-8)
+    assert found.is_within(2.46) is True
+    assert found.is_within(2.4) is None
+    assert found.is_within(0.7) is False
+    # Two pairs tell nothing, nor does a value without its like.
+    few = paired_difference({1: 0.7, 2: -1.6, 4: 1.0}, {1: 1.9, 2: 0.8, 3: 1.0})
+    assert math.isnan(few.p)
+    assert few.is_within(10) is None
+
+
+def test_a_range_of_the_paper_has_two_ends() -> None:
+    ours = Sample(10.3, 0.2, 16)
+    inside = difference(ours, Stated.of_range(10.0, 0.4))
+    assert (inside.value, inside.p) == (0.0, 1.0)
+    beyond = difference(ours, Stated.of_range(10.0, 0.2))
+    # 0.1 above the end, over 0.2 / sqrt(16); a range has no error of its own.
+    assert beyond.in_errors == pytest.approx(2.0, rel=1e-9)  # round-off
+    assert difference(ours, Stated.of_range(11.0, 0.6)).in_errors == pytest.approx(-2.0, rel=1e-9)
+    assert math.isnan(difference(Sample(10.3, math.nan, 1), Stated.of_range(10, 0.3)).p)
 
 
 def test_the_interval_of_the_sleep_data() -> None:
@@ -120,6 +150,11 @@ def test_a_slope_is_that_of_a_fit() -> None:
     assert found.value == pytest.approx(np.polyfit(x, y, 1)[0], rel=1e-9)  # round-off of a fit
     assert found.error == pytest.approx(0.01 / math.sqrt(np.var(x) * 4), rel=1e-9)
     assert found.freedom == math.inf
+    # That of a parabola, at its last place.
+    bent = slope(x, means, degree=2)
+    a, b, _ = np.polyfit(x, y, 2)
+    assert bent.value == pytest.approx(2 * a * 2.0 + b, rel=1e-9)  # round-off of a fit
+    assert math.isnan(slope(x[:3], means[:3], degree=2).p)
     # Of two points, or of one that has no error, nothing is told.
     assert math.isnan(slope(x[:2], means[:2]).p)
     assert math.isnan(slope(x, [*means[:3], sample([0.7])]).p)
@@ -187,28 +222,38 @@ def test_statistics_by_hand() -> None:
     assert shares.tolist() == [0, 0.5, 0.5]
 
 
-def test_peak_of_a_parabola() -> None:
-    x = [1.0, 1.3, 1.5, 2.0]
-    # Exact for a parabola, but for round-off.
-    top, error = peak(x, [-((v - 1.42) ** 2) for v in x], [0.0] * 4)
-    assert top == pytest.approx(1.42, abs=1e-9)
-    assert error == 0
-    top, error = peak([1, 2, 3], [3, 2, 1], [1, 1, 1])
-    assert top == 1
-    assert math.isnan(error)
-
-
-def test_the_error_of_a_peak() -> None:
-    """Beside what drawing the values again and again gives."""
-    x: Any = np.array([1.0, 1.2, 1.5, 1.6, 2.0])
-    errors: Any = np.array([1, 2, 1, 3, 1]) * 1e-3
-    y = -((x - 1.42) ** 2)
-    random = np.random.default_rng(1)
-    drawn = [peak(x, y + random.normal(0, errors), errors, 2) for _ in range(4000)]
-    place, error = peak(x, y, errors, 2)
-    # Of 4,000 values the standard deviation is known to 1.1 %; curved terms are smaller yet.
-    assert np.std([top for top, _ in drawn]) == pytest.approx(error, rel=0.05)
+def test_the_top_of_a_cubic() -> None:
+    x = [1.2, 1.3, 1.35, 1.5, 1.6]
+    # A cubic with its top at 1.42 and its lowest place at 1.9; exact but for round-off.
+    y = [-((v - 1.42) ** 2) * (2.62 - v) for v in x]
+    place, error = top(x, y, [0.01] * 5)
     assert place == pytest.approx(1.42, abs=1e-9)
+    assert error > 0
+    # No top between the ends, too few values, and values without an error.
+    for values, errors in (
+        ([1.0, 2.0, 3.0, 4.0, 5.0], [0.01] * 5),
+        (y[:4], [0.01] * 4),
+        (y, [0.01] * 4 + [math.nan]),
+    ):
+        assert all(map(math.isnan, top(x[: len(values)], values, errors)))
+
+
+def test_the_error_of_the_top() -> None:
+    """Of noisy values of a lopsided curve twice the error holds the true top as often as it says.
+
+    The curve, its noise and its places are about those of the packing fraction of dimers.
+    """
+    x: Any = np.array([1.2, 1.25, 1.3, 1.35, 1.4, 1.45, 1.5, 1.6])
+    errors: Any = np.full(len(x), 0.14)
+    y = 70 - 20 * (x - 1.36) ** 2 + 12 * (x - 1.36) ** 3
+    random = np.random.default_rng(1)
+    drawn = np.array([top(x, y + random.normal(0, errors), errors) for _ in range(2000)])
+    within = np.abs(drawn[:, 0] - 1.36) < 2 * drawn[:, 1]
+    # 95 %, less what curved terms take: with these errors a few percent.
+    assert within.mean() == pytest.approx(0.95, abs=0.05)
+    precise = np.array([top(x, y + 0.1 * random.normal(0, errors), errors) for _ in range(2000)])
+    # Of 2,000 values the standard deviation is known to 1.6 %; curved terms are smaller yet.
+    assert np.std(precise[:, 0]) == pytest.approx(0.1 * top(x, y, errors)[1], rel=0.07)
 
 
 def test_pooled_scatter() -> None:

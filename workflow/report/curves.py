@@ -69,30 +69,31 @@ def mean_distribution(distributions: Sequence[FloatArray]) -> tuple[FloatArray, 
     return mean, rows.std(axis=0, ddof=1) / math.sqrt(len(rows))
 
 
-def peak(
-    x: Sequence[float], y: Sequence[float], errors: Sequence[float], reach: int = 1
-) -> tuple[float, float]:
-    """Return where a parabola near the largest value is largest, and its standard error.
+def top(x: Sequence[float], y: Sequence[float], errors: Sequence[float]) -> tuple[float, float]:
+    """Return where a cubic through some values is largest, and the standard error of that.
 
-    The parabola is fitted to the largest value and those up to `reach` places to either side, or to
-    all values where there are no more than `reach`; the error is what the errors of these values
-    make of its top (linear propagation). The result is the x of the largest value, and NaN, if that
-    is too near to either end or the parabola has no top.
+    The cubic is that of weighted least squares; a parabola would move the top of a lopsided curve.
+    The error is what the errors of the values make of the top (linear propagation). Values are to
+    be chosen by their x: those around the largest one are near each other by chance. NaN for fewer
+    than five values, without errors, and where the cubic has no top between the first and last.
+
+    Parameters
+    ----------
+    x, y, errors : (k,) each, with the standard errors of y
     """
-    best = int(np.argmax(y))
-    if reach >= len(y):
-        near = slice(None)
-    elif reach <= best < len(y) - reach:
-        near = slice(best - reach, best + reach + 1)
-    else:
-        return float(x[best]), math.nan
-    # Places are counted from the largest value, which keeps the numbers small.
-    apart = np.asarray(x[near]) - x[best]
-    # These rows of the pseudo-inverse say how much of each value is in the coefficients a and b.
-    of_a, of_b, _ = np.linalg.pinv(np.vander(apart, 3))
-    values = np.asarray(y[near])
-    a, b = float(of_a @ values), float(of_b @ values)
-    if not a < 0:
-        return float(x[best]), math.nan
-    slope = -of_b / (2 * a) + b * of_a / (2 * a**2)
-    return float(x[best] - b / (2 * a)), float(np.linalg.norm(slope * np.asarray(errors[near])))
+    places, sigma = np.asarray(x, dtype=float), np.asarray(errors, dtype=float)
+    if len(places) < 5 or not np.all(sigma > 0):
+        return math.nan, math.nan
+    centre = float(places.mean())
+    # These rows of the weighted pseudo-inverse say how much of each value is in each coefficient.
+    shares = np.linalg.pinv(np.vander(places - centre, 4) / sigma[:, None]) / sigma
+    a, b, c, _ = shares @ np.asarray(y, dtype=float)
+    if not b**2 > 3 * a * c or a == 0:
+        return math.nan, math.nan
+    # Of the two places where the slope is zero it is the one with a negative curvature.
+    at = float((-b - math.sqrt(b**2 - 3 * a * c)) / (3 * a))
+    if not places.min() <= centre + at <= places.max():
+        return math.nan, math.nan
+    curvature = 6 * a * at + 2 * b
+    moved = -np.array([3 * at**2, 2 * at, 1.0, 0.0]) @ shares / curvature
+    return centre + at, float(np.linalg.norm(moved * sigma))

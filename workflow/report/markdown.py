@@ -41,7 +41,7 @@ def render_markdown(data: Data, sections: Sequence[Section], figures: str = "") 
 
 def _summary(summary: Summary) -> Iterator[str]:
     yield (
-        f"{summary.compared} numbers of the paper are compared with ours. {summary.remaining} "
+        f"{summary.compared} comparisons of a number of the paper with ours. {summary.remaining} "
         f"differ; {summary.significant} would if each were the only one, of which chance alone "
         f"would make about {summary.by_chance}. Of {summary.told} sentences {summary.held} hold."
     )

@@ -16,7 +16,7 @@ from .blocks import Cell, Comparison, Section, Statement, Table
 from .columns import Column, difference_cell, ours_text, table
 from .data import Data
 from .sections.provenance import codes_line, commands
-from .statistics import FEW, SIGNIFICANT, adjusted, computing_seconds
+from .statistics import SIGNIFICANT, adjusted, computing_seconds
 from .text import DASH, as_probability, as_stated, as_text, as_time
 
 TEMPLATE = "template.html.j2"
@@ -163,11 +163,10 @@ def summarise(sections: Sequence[Section]) -> Summary | None:
             COLUMNS,
             rows,
             (
-                "Ours: mean ± standard deviation (standard error); a row of fewer than "
-                f"{FEW} runs has the scatter of all rows of its table, pooled, where there are "
-                "several. SE: standard errors, sqrt(ours² + the paper's²); a ± that the paper "
-                "states as such is taken for its standard error. Where it states no scatter, ours "
-                "alone. p: how often chance alone would make a difference at least as large, by "
+                "Ours: mean ± standard deviation (standard error). SE: standard errors, sqrt(ours² "
+                "+ the paper's²). Where the paper states no scatter, ours alone; where it states a "
+                "range, ours alone beyond the range. p: how often chance alone would make a "
+                "difference at least as large, by "
                 f"Student's t (Welch). Marked: p below {SIGNIFICANT}. Rows share runs, and there "
                 "are many: a number differs only if p is below that after Holm's correction, "
                 "which holds whatever rows share.",

@@ -24,6 +24,13 @@ SIGNIFICANT = 0.05
 LEAST_FREEDOM = 2
 
 
+def margin_of(error: float, freedom: float) -> float:
+    """Return half the width of the 95 % confidence interval, by Student's t; NaN if not known."""
+    if math.isnan(error) or not freedom > 0:
+        return math.nan
+    return error * float(student.ppf(1 - SIGNIFICANT / 2, freedom))
+
+
 @dataclass(frozen=True)
 class Sample:
     """The mean of some independent values.
@@ -55,9 +62,7 @@ class Sample:
     @property
     def margin(self) -> float:
         """Half the width of the 95 % confidence interval, by Student's t; NaN if not known."""
-        if math.isnan(self.error) or self.freedom <= 0:
-            return math.nan
-        return self.error * float(student.ppf(1 - SIGNIFICANT / 2, self.freedom))
+        return margin_of(self.error, self.freedom)
 
     def scaled(self, factor: float) -> Sample:
         """Return the sample with its values multiplied by a factor, as in another unit."""
@@ -111,12 +116,19 @@ class Stated:
     value : as it is printed
     error : its standard error; NaN where the paper tells no scatter
     std, n : standard deviation and number of simulations, where the error is made of these
+    is_range : whether the error is half of a range in which all of the paper's runs lie
     """
 
     value: float
     error: float = math.nan
     std: float = math.nan
     n: int = 0
+    is_range: bool = False
+
+    @classmethod
+    def of_range(cls, value: float, reach: float) -> Stated:
+        """Return a number with a range: value - reach to value + reach."""
+        return cls(value, reach, is_range=True)
 
     @classmethod
     def of_series(cls, value: float, std: float, n: int) -> Stated:
@@ -166,6 +178,22 @@ class Difference:
         """Whether chance alone would hardly make so large a difference."""
         return self.p < SIGNIFICANT
 
+    @property
+    def margin(self) -> float:
+        """Half the width of the 95 % confidence interval, by Student's t; NaN if not known."""
+        return margin_of(self.error, self.freedom)
+
+    def is_within(self, reach: float) -> bool | None:
+        """Say whether the difference lies between -reach and reach with 95 % confidence.
+
+        False if it lies beyond with that confidence; None if neither can be said.
+        """
+        if math.isnan(self.margin):
+            return None
+        if abs(self.value) + self.margin <= reach:
+            return True
+        return False if abs(self.value) - self.margin > reach else None
+
 
 UNKNOWN = Difference(math.nan, math.nan, math.nan)
 
@@ -175,9 +203,15 @@ def difference(one: Sample | Stated, other: Sample | Stated) -> Difference:
 
     The standard error is sqrt(e1^2 + e2^2), and its degrees of freedom are those of Welch
     (Biometrika 34 (1947) 28) and Satterthwaite. A number that the paper states without scatter is
-    taken as exact. The error is not known where a mean of ours has no scatter, or one of fewer than
+    taken as exact; of one that has a range the nearer end is, and within the range the difference
+    is 0. The error is not known where a mean of ours has no scatter, or one of fewer than
     LEAST_FREEDOM degrees of freedom, as that of two runs.
     """
+    if isinstance(other, Stated) and other.is_range:
+        beyond = abs(one.mean - other.mean) - other.error
+        value = math.copysign(beyond, one.mean - other.mean) if beyond > 0 else 0.0
+        apart = difference(one, Stated(other.value))
+        return Difference(value, apart.error, apart.freedom)
     parts = []
     for mean in (one, other):
         if isinstance(mean, Sample) and not (mean.std >= 0 and mean.freedom >= LEAST_FREEDOM):
@@ -193,18 +227,30 @@ def difference(one: Sample | Stated, other: Sample | Stated) -> Difference:
     return Difference(one.mean - other.mean, math.sqrt(square), freedom)
 
 
-def slope(x: Sequence[float], samples: Sequence[Sample]) -> Difference:
-    """Return the slope of the line through means at x, (k,), and its standard error.
+def paired_difference(one: Mapping[Key, float], other: Mapping[Key, float]) -> Difference:
+    """Return the mean difference of pairs: values of the same key, as runs from the same start.
+
+    The standard error is that of the differences. It is not known for fewer than three pairs.
+    """
+    apart = sample(one[key] - other[key] for key in one if key in other)
+    known = apart.freedom >= LEAST_FREEDOM
+    return Difference(apart.mean, apart.error if known else math.nan, apart.freedom)
+
+
+def slope(x: Sequence[float], samples: Sequence[Sample], degree: int = 1) -> Difference:
+    """Return the slope, at the largest x, of the polynomial through means at x, (k,).
 
     Least squares, all means with the same weight: weights made of the errors of a few values each
     find three times as many slopes as there should be. The degrees of freedom are those of Welch
-    and Satterthwaite. It is not known for fewer than three means, or if one has no error.
+    and Satterthwaite. It is not known for fewer means than the degree and two, or if one has no
+    error.
     """
     errors = np.array([one.error for one in samples])
-    if len(samples) < 3 or not np.all(errors > 0) or len(set(x)) < 2:
+    if len(samples) < degree + 2 or not np.all(errors > 0) or len(set(x)) <= degree:
         return UNKNOWN
-    apart = np.asarray(x) - np.mean(x)
-    parts = apart / np.sum(apart**2)
+    apart = np.asarray(x) - np.max(x)
+    # The last but one coefficient is the slope where `apart` is zero.
+    parts = np.linalg.pinv(np.vander(apart, degree + 1))[-2]
     squares = (parts * errors) ** 2
     freedoms = np.array([one.freedom for one in samples])
     inverse = float(np.sum(squares**2 / freedoms))

@@ -13,7 +13,7 @@ from ..columns import RUNS, Column, table
 from ..data import SPHERES, Data, deck_defaults
 from ..groups import count_of, grouped, is_agitated, our_solver, solver_of
 from ..quantities import AGITATED_COORDINATION_NUMBER, COORDINATION_NUMBER
-from ..statistics import Sample, sample
+from ..statistics import SIGNIFICANT, Sample, Stated, adjusted, difference, sample
 from ..text import as_count, as_mean, as_sample, as_short
 
 # The paper says that the coordination number is too small by about so much.
@@ -128,14 +128,17 @@ def _statements(rows: Sequence[_Row], data: Data) -> list[Statement]:
     ]
     fewest = [row for row in known if row.kind.particles == min(r.kind.particles for r in known)]
     weakest_first = sorted(fewest, key=lambda row: row.kind.strength)
-    drops = [row.drop.mean for row in weakest_first]
-    if len(drops) < 2:
+    apart = [difference(row.drop, Stated(0.0)) for row in weakest_first]
+    corrected = adjusted([one.p for one in apart])
+    if not apart:
         return []
+    fewer = all(one.value > 0 for one in apart)
+    sure = all(p < SIGNIFICANT for p in corrected)
     return [
         Statement(
-            "With the random force the coordination number is too small by about "
-            f"{as_short(STATED_DROP)} (of a force that is not stated).",
-            min(drops) <= STATED_DROP <= max(drops),
+            "With the random force the coordination number is too small (the paper: by about "
+            f"{as_short(STATED_DROP)}, of a force that is not stated).",
+            fewer if sure else None,
             f"{as_count(weakest_first[0].kind.particles)} spheres: "
             + "; ".join(
                 f"{as_mean(row.drop, 2)} at A = {as_short(row.kind.force)}, "

@@ -9,17 +9,30 @@ from dataclasses import dataclass
 from ...store import Result
 from ..columns import RUNS, Column
 from ..data import SPHERES, Data
-from ..figures import Curve, Kind, points
+from ..figures import Curve, points
 from ..groups import grouped
-from ..quantities import Quantity
+from ..quantities import (
+    COORDINATION_NUMBER,
+    COORDINATION_NUMBER_WITHOUT_RATTLERS,
+    NEIGHBOURS,
+    Quantity,
+)
 from ..statistics import FEW, Sample, pooled_numbers
 from ..text import DASH, as_short
 
 # This note stands below tables with few runs a row.
-POOLED = (
+_FEW_RUNS = (
     "Mean ± standard deviation (standard error); the standard deviation of rows of fewer than "
-    f"{FEW} runs is that of all rows, pooled."
+    f"{FEW} runs is that of all rows"
 )
+POOLED = f"{_FEW_RUNS}, pooled."
+# Contacts of dimers below this aspect ratio come in pairs that lie close together: they scatter as
+# those of spheres do, which is less than half of what those of longer dimers do.
+LONG = 1.1
+POOLED_BY_KIND = (
+    f"{_FEW_RUNS} of their kind, pooled: spheres, dimers below L/d = {LONG}, longer ones."
+)
+BY_KIND = (COORDINATION_NUMBER, COORDINATION_NUMBER_WITHOUT_RATTLERS, NEIGHBOURS)
 ByAspect = Mapping[float, Sequence[Result]]
 
 
@@ -90,26 +103,45 @@ def _aspect(result: Result) -> float:
     return 1.0 if result.record["deck"] == SPHERES else result.setting("aspect_ratio")
 
 
+def samples_of(
+    forces: Sequence[Shaken], quantity: Quantity
+) -> Mapping[tuple[float, float], Sample]:
+    """Return a number as it is shown, by force and aspect ratio, with the scatter of all, pooled.
+
+    That of contacts and neighbours is pooled by kind: see LONG.
+    """
+    by_kind: dict[str, dict[tuple[float, float], Sequence[Result]]] = {}
+    for number, one in enumerate(forces):
+        for aspect, group in one.groups.items():
+            # The same spheres are in the groups of each force.
+            if aspect > 1 or number == 0:
+                kind = _kind(aspect) if quantity in BY_KIND else ""
+                by_kind.setdefault(kind, {})[one.force, aspect] = group
+    found = {
+        key: one.scaled(quantity.factor)
+        for groups in by_kind.values()
+        for key, one in pooled_numbers(groups, quantity.name).items()
+    }
+    spheres = next((one for (_, aspect), one in found.items() if aspect == 1), None)
+    if spheres is not None:
+        found |= {(one.force, 1.0): spheres for one in forces}
+    return found
+
+
+def _kind(aspect: float) -> str:
+    if aspect == 1:
+        return "spheres"
+    return "long" if aspect >= LONG else "short"
+
+
 def rows_of(forces: Sequence[Shaken], quantities: Sequence[Quantity]) -> list[Row]:
-    """Return a row for each force and aspect ratio, spheres once; the scatter is that of all."""
-    groups = {
-        (one.force, aspect): group
+    """Return a row for each force and aspect ratio, spheres once; see `samples_of`."""
+    found = {quantity.name: samples_of(forces, quantity) for quantity in quantities}
+    return [
+        Row(aspect, one.force, group, {name: of[one.force, aspect] for name, of in found.items()})
         for number, one in enumerate(forces)
         for aspect, group in one.groups.items()
         if aspect > 1 or number == 0
-    }
-    found = {quantity.name: pooled_numbers(groups, quantity.name) for quantity in quantities}
-    return [
-        Row(
-            aspect,
-            force,
-            group,
-            {
-                quantity.name: found[quantity.name][force, aspect].scaled(quantity.factor)
-                for quantity in quantities
-            },
-        )
-        for (force, aspect), group in groups.items()
     ]
 
 
@@ -135,9 +167,21 @@ def cell_of(aspect: float) -> str:
 
 
 def against_aspect(
-    label: str, groups: ByAspect, quantity: Quantity, kind: Kind = "points"
-) -> Curve:
-    """Return a number, as it is stored, against the aspect ratio, where it is known."""
-    found = pooled_numbers(groups, quantity.name)
-    known = {aspect: one for aspect, one in found.items() if one.n}
-    return points(label, list(known), known.values(), kind)
+    forces: Sequence[Shaken], quantity: Quantity, names: str = "{name}, {force}"
+) -> list[Curve]:
+    """Return for each force the curve of a number, as it is shown, where it is known.
+
+    Parameters
+    ----------
+    forces : whose runs, spheres at an aspect ratio of 1
+    quantity : the number
+    names : of the curves, with the places {name} and {force}
+    """
+    found = samples_of(forces, quantity)
+    curves = []
+    for one in forces:
+        known = {a: found[one.force, a] for a in one.groups if found[one.force, a].n}
+        if known:
+            label = names.format(name=quantity.heading, force=one.label)
+            curves.append(points(label, list(known), known.values()))
+    return curves

@@ -9,8 +9,16 @@ from typing import Any
 from ...store import Result
 from ..blocks import Comparison, Content, Text
 from ..columns import RUNS, Column, table
-from ..data import RUNS_OF_TABLE_1, Data
-from ..groups import count_of, grouped, is_agitated, matching, solver_of
+from ..data import RUNS_OF_TABLE_1, SPHERES, Data, deck_defaults
+from ..groups import (
+    by_value,
+    count_of,
+    grouped,
+    is_agitated,
+    matching,
+    our_solver,
+    solver_of,
+)
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION, compared
 from ..statistics import Stated
 from ..text import as_count, as_mean, as_short
@@ -107,6 +115,27 @@ def cause(data: Data, solver: str) -> str:
         found = ", ".join(as_mean(row.z.ours, 2) for row in same)
         parts.append(f"with one time step throughout ({steps}) it is {found}")
     return "the way to count: " + "; ".join(parts)
+
+
+def counted_at_its_own(data: Data) -> dict[float, list[Result]]:
+    """Return the agitated runs of our solver whose contacts are counted at their own tolerance.
+
+    They are those with the time steps of the deck, by tolerance.
+    """
+    runs = {
+        result.case: result
+        for study in ("table-1", "counting")
+        for result in data.results(study)
+        if is_agitated(result) and solver_of(result) == our_solver()
+    }
+    usual = tuple(deck_defaults(SPHERES)[name] for name in STEPS)
+    own = [
+        r
+        for r in runs.values()
+        if r.setting("tolerance_measuring") == r.setting("tolerance")
+        and tuple(map(r.setting, STEPS)) == usual
+    ]
+    return grouped(own, by_value("tolerance"))
 
 
 def _loosest(data: Data) -> Mapping[str, Any]:

@@ -23,11 +23,11 @@ from ..quantities import (
     NEIGHBOURS,
     RATTLERS,
 )
-from ..statistics import Stated, numbers
-from ..text import DASH, as_sample, as_short, as_text
+from ..statistics import SIGNIFICANT, Sample, Stated, adjusted, difference, numbers, sample
+from ..text import DASH, as_mean, as_sample, as_short, as_text
 from .aspect_ratios import (
     HEAD,
-    POOLED,
+    POOLED_BY_KIND,
     Row,
     Shaken,
     against_aspect,
@@ -40,6 +40,8 @@ from .aspect_ratios import (
 # So small a share of the particles outside of a range is not seen in a plot of shares.
 RARE = 0.001
 
+# The paper's two narrower distributions are perhaps those of these aspect ratios.
+NARROW = 1.4, 1.6
 SHOWN = (COORDINATION_NUMBER, NEIGHBOURS, COORDINATION_NUMBER_WITHOUT_RATTLERS)
 
 
@@ -84,7 +86,7 @@ def contacts_and_neighbours(data: Data) -> Content:
         return Content()
     stated = data.paper["dimers"]
     per_particle = stated["contacts_per_particle"]
-    of_paper = Stated(per_particle["value"], per_particle["tolerance"])
+    of_paper = Stated.of_range(per_particle["value"], per_particle["tolerance"])
     paper_range = f"{as_short(of_paper.value)} ± {as_short(of_paper.error)}"
     rows = rows_of(forces, SHOWN)
     most = max((row.numbers[NEIGHBOURS.name].mean for row in rows), default=math.nan)
@@ -101,10 +103,11 @@ def contacts_and_neighbours(data: Data) -> Content:
             _columns(of_paper),
             rows,
             (
-                f"{POOLED} Marked: outside {paper_range} by more than the 95 % margin of ours. "
-                "Near L/d = 1 the two contacts of a dimer with a neighbour lie close together, and "
-                "only a tolerance well below ε = 0.005 (L/d - 1) r tells both.",
-                "Rattlers: particles that carry nothing.",
+                f"{POOLED_BY_KIND} Marked: outside {paper_range} by more than the 95 % margin of "
+                "ours. Near L/d = 1 the two contacts of a dimer with a neighbour lie close to one "
+                "another, and only a tolerance well below ε = 0.005 (L/d - 1) r tells both.",
+                "Rattlers: particles with fewer contacts than hold them in any direction (4 a "
+                "sphere, 6 a dimer), taken out again and again.",
             ),
         ),
         Text(
@@ -127,9 +130,9 @@ def _panel(forces: Sequence[Shaken], of_paper: Stated, paper_range: str) -> Pane
         "aspect ratio L/d",
         "number per particle",
         [
-            against_aspect(f"{quantity.heading}, {one.label}", one.groups, quantity)
-            for one in forces
+            one
             for quantity in (COORDINATION_NUMBER, NEIGHBOURS)
+            for one in against_aspect(forces, quantity)
         ],
         bounds=(
             f"paper: {paper_range}",
@@ -144,15 +147,22 @@ def _compared(dimers: Sequence[Row], of_paper: Stated, particles: int) -> list[C
     runs = [result for row in dimers for result in row.group]
     if not runs:
         return []
-    aspects = len({row.aspect for row in dimers})
+    of_aspect: dict[float, list[float]] = {}
+    for row in dimers:
+        of_aspect.setdefault(row.aspect, []).append(row.numbers[COORDINATION_NUMBER.name].mean)
+    means = [sample(values).mean for values in of_aspect.values()]
     return [
         Comparison(
-            f"z of dimers, mean over {aspects} aspect ratios",
+            f"z of dimers, mean over {len(means)} aspect ratios",
             of_paper,
-            COORDINATION_NUMBER.over(runs),
+            sample(means),
             COORDINATION_NUMBER.decimals,
             COORDINATION_NUMBER.unit,
-            unlike(runs, particles),
+            "; ".join(
+                text
+                for text in (unlike(runs, particles), "the scatter is that of aspect ratios")
+                if text
+            ),
         )
     ]
 
@@ -216,8 +226,26 @@ class _Distribution:
     @property
     def width(self) -> float:
         """The standard deviation of the number."""
+        return math.sqrt(self._moment(2))
+
+    def error_of_width(self, particles: float) -> float:
+        """Return the standard error of the width, of so many particles: that of a sample."""
+        spread = self._moment(4) / self._moment(2) ** 2 - 1 if self._moment(2) else 0.0
+        return self.width * math.sqrt(max(spread, 0.0) / (4 * particles))
+
+    def _moment(self, order: int) -> float:
         centre = float((self.counts * self.shares).sum())
-        return math.sqrt(float(((self.counts - centre) ** 2 * self.shares).sum()))
+        return float(((self.counts - centre) ** order * self.shares).sum())
+
+    def may_be_most_probable(self, number: int, particles: float) -> bool:
+        """Say whether a number is the most probable one, or as good as that.
+
+        Of so many particles the share of the most probable one is larger by at most two standard
+        errors of the difference, sqrt((p + q - (p - q)^2) / particles).
+        """
+        p = float(self.shares.max())
+        q = float(self.shares[number]) if number < len(self.shares) else 0.0
+        return p - q <= 2 * math.sqrt((p + q - (p - q) ** 2) / particles)
 
     @property
     def outside(self) -> float:
@@ -240,6 +268,17 @@ class _Curves:
     aspect: float
     group: Sequence[Result]
     distributions: Mapping[str, _Distribution]
+
+    @property
+    def particles(self) -> float:
+        """The number of particles in the box, of all runs."""
+        return sum(max(1.0, result.number("particles_in_box")) for result in self.group)
+
+    @property
+    def width(self) -> Sample:
+        """The width of the distribution of contacts; its error is that of so many particles."""
+        of_contacts = self.distributions["contacts"]
+        return Sample(of_contacts.width, of_contacts.error_of_width(self.particles), 1, math.inf)
 
 
 def _distribution_columns(name: str, stated: tuple[int, int]) -> list[Column[_Curves]]:
@@ -331,23 +370,43 @@ def _statements_on_distributions(
         )
     probable = stated["contacts_most_probable"]
     tops = {int(np.argmax(row.distributions["contacts"].shares)) for row in dimers}
-    widths = {row.aspect: row.distributions["contacts"].width for row in dimers}
-    narrow = sorted(widths, key=lambda aspect: widths[aspect])[:2]
+    likely = [
+        row.distributions["contacts"].may_be_most_probable(probable, row.particles)
+        for row in dimers
+    ]
     return [
         Statement(
             f"The most probable number of contacts is {probable}.",
-            tops == {probable},
-            f"most probable: {', '.join(map(str, sorted(tops)))}",
+            all(likely),
+            f"as probable as any other number, within two standard errors, in {sum(likely)} of "
+            f"{len(likely)} curves; largest shares at {', '.join(map(str, sorted(tops)))}",
         ),
         *found,
-        Statement(
-            "The distribution of contacts is slightly narrower for two aspect ratios, printed as "
-            "d/L = 0.4 and 0.6 (perhaps L/d = 1.4 and 1.6).",
-            set(narrow) == {1.4, 1.6} if {1.4, 1.6} <= set(widths) else None,
-            "standard deviation: "
-            + ", ".join(f"{as_text(w, 2)} at {as_short(a)}" for a, w in widths.items()),
-        ),
+        _statement_on_widths(dimers),
     ]
+
+
+def _statement_on_widths(dimers: Sequence[_Curves]) -> Statement:
+    """Say whether the two distributions that the paper calls narrower are so."""
+    widths = {row.aspect: row.width for row in dimers}
+    narrow = [one for aspect, one in widths.items() if aspect in NARROW]
+    others = [one for aspect, one in widths.items() if aspect not in NARROW]
+    apart = [difference(other, one) for other in others for one in narrow]
+    holds: bool | None = None
+    if len(narrow) == len(NARROW) and apart:
+        corrected = adjusted([one.p for one in apart])
+        sure = [p < SIGNIFICANT for p in corrected]
+        if any(s and one.value < 0 for s, one in zip(sure, apart, strict=True)):
+            holds = False
+        elif all(sure):
+            holds = True
+    return Statement(
+        "The distribution of contacts is slightly narrower for two aspect ratios, printed as "
+        "d/L = 0.4 and 0.6 (perhaps L/d = 1.4 and 1.6).",
+        holds,
+        "standard deviation: "
+        + ", ".join(f"{as_mean(w, 2)} at {as_short(a)}" for a, w in widths.items()),
+    )
 
 
 def _distributions(

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..blocks import Content, Statement, Text
 from ..columns import Column, table
-from ..curves import peak
+from ..curves import top
 from ..data import Data
 from ..figures import Curve, Figure, Panel, curve
 from ..groups import count_of
 from ..quantities import PACKING_FRACTION, PACKING_FRACTION_WITH_NECKS, Quantity
-from ..text import as_count, as_measured, as_sample, as_short, as_text
+from ..statistics import Difference
+from ..text import as_count, as_measured, as_sample, as_short
 from .aspect_ratios import HEAD, POOLED, Row, against_aspect, rows_of, shaken
 
+# Dimers are densest between these aspect ratios, whatever shakes them.
+AROUND = 1.2, 1.6
+# The paper says "about", with one decimal.
+ABOUT = 0.1
 QUANTITIES = (PACKING_FRACTION, PACKING_FRACTION_WITH_NECKS)
 
 
@@ -37,15 +41,12 @@ def dimer_packing_fraction(data: Data) -> Content:
     forces = shaken(data)
     if not forces:
         return Content()
-    curves = [
-        against_aspect(f"{name}, {one.label}", one.groups, quantity)
-        for one in forces
-        for name, quantity in zip(("raw", "with necks"), QUANTITIES, strict=True)
-    ]
-    curves = [one for one in curves if len(one.x)]
+    raw = against_aspect(forces, PACKING_FRACTION, "raw, {force}")
+    necks = against_aspect(forces, PACKING_FRACTION_WITH_NECKS, "with necks, {force}")
+    curves = [*raw, *necks]
     elsewhere = data.paper["elsewhere"]
     stated = data.paper["dimers"]["phi_peak_at_aspect_ratio"]
-    said = "; ".join(_largest(one) for one in curves if len(one.x) > 4)
+    said = "; ".join(f"{_top(one)} ({one.label})" for one in curves if _is_known(one))
     particles = count_of(list(forces[0].groups.values())[-1])
     return Content(
         [
@@ -66,49 +67,64 @@ def dimer_packing_fraction(data: Data) -> Content:
             ),
             Text(
                 f"Paper: φ grows, and falls above about L/d = {stated}; the curve with necks looks "
-                f"alike and lies higher. Ours: {said or 'too few aspect ratios'}. "
+                f"alike and lies higher. Ours is largest, by a cubic through L/d = "
+                f"{as_short(AROUND[0])} to {as_short(AROUND[1])}, at "
+                f"{said or 'a place that too few aspect ratios tell'}. "
                 f"Elsewhere: {elsewhere['baule2013']['source']}; "
                 f"{elsewhere['donev2004']['source']}."
             ),
         ],
-        statements=_statements(curves, stated),
+        statements=_statements(raw, necks, stated),
     )
 
 
-def _statements(curves: Sequence[Curve], stated: float) -> list[Statement]:
-    """Say whether φ grows up to some aspect ratio, and falls beyond the paper's."""
-    known = [one for one in curves if len(one.x) > 4 and np.sum(one.x >= stated) > 1]
-    raw = [one for one in known if one.label.startswith("raw")]
-    necks = [one for one in known if not one.label.startswith("raw")]
+def _statements(raw: Sequence[Curve], necks: Sequence[Curve], stated: float) -> list[Statement]:
+    """Say whether φ grows up to about the paper's aspect ratio and falls from there."""
+    said = f"The packing fraction grows with L/d and falls above about {as_short(stated)}."
+    alike = "With the volume of the necks the curve is qualitatively the same."
     return [
-        Statement(
-            f"The packing fraction grows with L/d and falls above about {as_short(stated)}.",
-            all(_rises_and_falls(one, stated) for one in raw) if raw else None,
-            "; ".join(f"{one.label}: largest at {_top(one, 2)}" for one in raw),
-        ),
-        Statement(
-            "With the volume of the necks the curve is qualitatively the same.",
-            all(_rises_and_falls(one, stated) for one in necks) if necks else None,
-            "; ".join(f"{one.label}: largest at {_top(one, 2)}" for one in necks),
-        ),
+        Statement(said, _all(_turns_at(one, stated) for one in raw), _tops(raw)),
+        Statement(alike, _all(_rises_and_falls(one, stated) for one in necks), _tops(necks)),
     ]
 
 
-def _rises_and_falls(one: Curve, stated: float) -> bool:
-    """Say whether a curve is larger near the stated place than at either end, and falls beyond it.
+def _all(verdicts: Iterable[bool | None]) -> bool | None:
+    """Say whether all hold: not known if one is not, and none is known to be false."""
+    found = list(verdicts)
+    if False in found:
+        return False
+    return None if None in found or not found else True
 
-    It falls if each value there is below the one before, or above it by no more than two standard
-    errors of their difference.
-    """
-    best = float(one.y.max())
-    ends = 0 < int(np.argmax(one.y)) < len(one.y) - 1
-    errors = np.zeros(len(one.y)) if one.error is None else np.nan_to_num(one.error)
-    beyond = np.flatnonzero(one.x >= stated)
-    falls = all(
-        one.y[j] - one.y[i] <= 2 * math.hypot(errors[i], errors[j])
-        for i, j in itertools.pairwise(beyond)
-    )
-    return bool(ends and falls and one.y[beyond[-1]] < best)
+
+def _is_known(one: Curve) -> bool:
+    return not math.isnan(_place(one)[0])
+
+
+def _rises_and_falls(one: Curve, stated: float) -> bool | None:
+    """Say whether a curve has a top; not known where little was run beyond the paper's place."""
+    if _is_known(one):
+        return True
+    enough = len(one.x) > 4 and np.sum(one.x >= stated) > 1
+    return False if enough and np.argmax(one.y) in (0, len(one.y) - 1) else None
+
+
+def _turns_at(one: Curve, stated: float) -> bool | None:
+    """Say whether a curve has its top where the paper says, which is as good as its one decimal."""
+    if not _is_known(one):
+        return _rises_and_falls(one, stated)
+    place, error = _place(one)
+    return Difference(place - stated, error, math.inf).is_within(ABOUT)
+
+
+def _place(one: Curve) -> tuple[float, float]:
+    """Return where a curve is largest, and the standard error of that; see `top`."""
+    near = (one.x >= AROUND[0]) & (one.x <= AROUND[1])
+    errors = np.full(len(one.x), math.nan) if one.error is None else one.error
+    return top(one.x[near].tolist(), one.y[near].tolist(), errors[near].tolist())
+
+
+def _tops(curves: Sequence[Curve]) -> str:
+    return "; ".join(f"{one.label}: largest at {_top(one)}" for one in curves if _is_known(one))
 
 
 def _panel(ours: Sequence[Curve], elsewhere: Mapping[str, Any]) -> Panel:
@@ -117,31 +133,22 @@ def _panel(ours: Sequence[Curve], elsewhere: Mapping[str, Any]) -> Panel:
     of_ellipsoids = curve(
         "ellipsoids (Donev 2004)",
         [ellipsoids["ellipsoids_peak_aspect_ratio"]],
-        [ellipsoids["ellipsoids_largest_phi"]],
+        [PACKING_FRACTION.factor * ellipsoids["ellipsoids_largest_phi"]],
         kind="apart",
     )
     return Panel(
         "aspect ratio L/d",
-        "packing fraction",
+        "packing fraction [%]",
         [*ours, of_ellipsoids],
         references=[
-            ("dimers, theory", theory["dimers_largest_phi"]),
-            ("spherocylinders, theory", theory["spherocylinders_largest_phi"]),
+            (name, PACKING_FRACTION.factor * theory[f"{key}_largest_phi"])
+            for name, key in (
+                ("dimers, theory", "dimers"),
+                ("spherocylinders, theory", "spherocylinders"),
+            )
         ],
     )
 
 
-def _largest(one: Curve) -> str:
-    """Say where a curve is largest: at one of its points, and by two parabolas."""
-    return (
-        f"{one.label}, largest φ at L/d = {as_short(float(one.x[np.argmax(one.y)]))} "
-        f"({as_text(100 * float(one.y.max()), 2)} %), by a parabola through it and one "
-        f"neighbour to either side at {_top(one, 1)}, through two at {_top(one, 2)}"
-    )
-
-
-def _top(one: Curve, reach: int) -> str:
-    """Write where a curve is largest, with its standard error; see `peak`."""
-    errors = [math.nan] * len(one.x) if one.error is None else one.error.tolist()
-    place, error = peak(one.x.tolist(), one.y.tolist(), errors, reach)
-    return as_measured(place, error, 2)
+def _top(one: Curve) -> str:
+    return as_measured(*_place(one), 2)

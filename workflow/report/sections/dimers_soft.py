@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ...store import Result
 from ..blocks import Content, Text
 from ..columns import RUNS, Column, table
-from ..curves import peak
+from ..curves import top
 from ..data import Data
 from ..figures import Curve, Figure, Panel, points
 from ..groups import by_value, count_of, grouped
@@ -78,7 +78,7 @@ def dimers_soft(data: Data) -> Content:
             Text(
                 "Kurban and Baule (arXiv:2111.03538) poured dimers without friction in LAMMPS with "
                 f"soft contacts, and found the densest at L/d = {as_short(low)} to "
-                f"{as_short(high)}. A parabola through all points is highest at "
+                f"{as_short(high)}. A cubic through all points is highest at "
                 + "; ".join(f"{_top(one)} ({one.label})" for one in curves)
                 + "".join(
                     f"; {_top_of_shaken(one.label, curve)}"
@@ -97,7 +97,8 @@ def _near(groups: ByAspect, aspects: Sequence[float]) -> Curve | None:
     if len(same) < 3:
         return None
     found = pooled_numbers(same, PACKING_FRACTION.name)
-    return points("", list(found), [one.scaled(100) for one in found.values()])
+    factor = PACKING_FRACTION.factor
+    return points("", list(found), [one.scaled(factor) for one in found.values()])
 
 
 def _top_of_shaken(label: str, one: Curve) -> str:
@@ -105,9 +106,7 @@ def _top_of_shaken(label: str, one: Curve) -> str:
 
 
 def _top(one: Curve) -> str:
-    """Write where a parabola through all points is largest, with its standard error."""
-    if len(one.x) < 3:
-        return "too few aspect ratios"
+    """Write where a cubic through all points is largest, with its standard error."""
     errors = [math.nan] * len(one.x) if one.error is None else one.error.tolist()
-    place, error = peak(one.x.tolist(), one.y.tolist(), errors, reach=len(one.x))
-    return as_measured(place, error, 2)
+    place, error = top(one.x.tolist(), one.y.tolist(), errors)
+    return "a place that cannot be told" if math.isnan(place) else as_measured(place, error, 2)

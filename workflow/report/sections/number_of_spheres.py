@@ -73,7 +73,7 @@ def number_of_spheres(data: Data) -> Content:
         comparisons.append(
             Comparison(
                 "φ in bulk, spheres",
-                Stated(whole["value"], whole["tolerance"]),
+                Stated.of_range(whole["value"], whole["tolerance"]),
                 PACKING_FRACTION.over(bulk),
                 PACKING_FRACTION.decimals,
                 PACKING_FRACTION.unit,
@@ -108,7 +108,7 @@ def _statements(rows: Sequence[_Row]) -> list[Statement]:
     return [
         Statement(
             f"From {as_count(MANY)} spheres on φ hardly depends on their number.",
-            abs(apart.value) < HARDLY,
+            apart.is_within(HARDLY),
             f"{as_count(many[-1].spheres)} less {as_count(many[0].spheres)}: "
             f"{as_measured(apart.value, apart.error, 2)} percentage points, "
             f"p {as_probability(apart.p)}",

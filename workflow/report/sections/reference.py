@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lammps_inelastic.analysis import InputError, binned_exponent
 
 from ...store import Result
 from ..blocks import Block, Content, Text
@@ -20,7 +24,8 @@ from ..quantities import (
     RATTLERS,
     WEAK_FORCE_EXPONENT,
 )
-from ..text import as_count, as_short
+from ..statistics import Sample, sample
+from ..text import as_count, as_sample, as_short
 
 COLUMNS: Sequence[Column[Case]] = (
     Column("packing", lambda case: case.label),
@@ -32,6 +37,46 @@ COLUMNS: Sequence[Column[Case]] = (
     EXCESS_CONTACTS.column(),
     GAP_EXPONENT.column(),
     WEAK_FORCE_EXPONENT.column(),
+)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Part of the range of a power law: bins with middles between two bounds."""
+
+    heading: str
+    x: str
+    y: str
+    low: float
+    high: float
+
+    def column(self) -> Column[Case]:
+        """Return a column with the exponent of this part."""
+        return Column(self.heading, lambda case: as_sample(self.over(case.group), 3))
+
+    def over(self, results: Sequence[Result]) -> Sample:
+        """Return mean and scatter of the exponent over the runs."""
+        return sample(self.of(result) for result in results)
+
+    def of(self, result: Result) -> float:
+        """Return the exponent of one run; NaN where there are too few values."""
+        if self.x not in result.values:
+            return math.nan
+        try:
+            return binned_exponent(
+                result.values[self.x], result.values[self.y], self.low, self.high
+            )
+        except InputError:
+            return math.nan
+
+
+GAPS, FORCES = ("gaps/size", "gaps/density"), ("forces/local_ratio", "forces/local_density")
+# Halves of the ranges of the fits, at bins of the stored densities.
+PARTS = (
+    _Part("gaps of 0.001 to 0.01 d", *GAPS, 1e-3, 1.1e-2),
+    _Part("gaps of 0.01 to 0.1 d", *GAPS, 1.1e-2, 1e-1),
+    _Part("forces of 0.001 to 0.02", *FORCES, 1e-3, 1.77e-2),
+    _Part("forces of 0.02 to 0.3", *FORCES, 1.77e-2, 0.3),
 )
 
 
@@ -56,6 +101,15 @@ def reference(data: Data) -> Content:
                 "spheres follow no power: the second contact of a pair has the size of the arm.",
             ),
         ),
+        table(
+            "Exponents of parts of the range",
+            (Column("packing", lambda case: case.label), RUNS, *(one.column() for one in PARTS)),
+            cases,
+            (
+                "By maximum likelihood from the stored densities. Forces are over their mean at "
+                "the same height. Where two parts have one exponent, the law is a power.",
+            ),
+        ),
         Text(
             "Theory of amorphous packings in many dimensions (Charbonneau, Corwin, Parisi and "
             "Zamponi, Phys. Rev. Lett. 114 (2015) 125504): gaps g^(-0.413); forces f^0.423 where "
@@ -66,8 +120,8 @@ def reference(data: Data) -> Content:
     laws = [
         panel
         for panel in (
-            _panel(cases, "gaps/size", "gaps/density", "gap / d", "density"),
-            _panel(cases, "forces/local_ratio", "forces/local_density", "f / ⟨f⟩", "P(f / ⟨f⟩)"),
+            _panel(cases, *GAPS, "gap / d", "density"),
+            _panel(cases, *FORCES, "f / ⟨f⟩", "P(f / ⟨f⟩)"),
         )
         if panel is not None
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ...store import Result
 from ..blocks import Content, Text
@@ -50,19 +51,17 @@ def repose(data: Data) -> Content:
         return Content()
     width = float(data.paper["protocol"]["container"][0])
     groups = sorted(grouped(results, by_value("angle")).items())
-    slopes = pooled({angle: sample(_slope(r, width) for r in group) for angle, group in groups})
+    turned = {angle: sample(_turned(r, width) for r in group) for angle, group in groups}
+    # Where the bed flows the slopes of two runs differ by ten times as much.
+    slopes = {
+        angle: one
+        for flows in (False, True)
+        for angle, one in pooled(
+            {angle: one for angle, one in turned.items() if (angle > FLOWED) == flows}
+        ).items()
+    }
     rows = [_Row(angle, group, slopes[angle]) for angle, group in groups]
-    flowed = [row.left for row in rows if row.angle > FLOWED]
-    mean = (
-        Sample(
-            sum(one.mean for one in flowed) / len(flowed),
-            flowed[0].std,
-            sum(one.n for one in flowed),
-            flowed[0].freedom,
-        )
-        if flowed
-        else Sample(math.nan, math.nan, 0)
-    )
+    mean = _left_where_it_flowed(results, width)
     return Content(
         [
             Figure(
@@ -91,18 +90,37 @@ def repose(data: Data) -> Content:
                 (
                     "From the mean position of all spheres: a bed between the side walls, of mean "
                     "height H and with a plane surface of slope s, has its centre s W² / (12 H) "
-                    "off the middle.",
+                    "off the middle; the slope before the tilt is taken off. Mean ± standard "
+                    f"deviation (standard error), pooled below and above {as_short(FLOWED)}°.",
                 ),
             ),
             Text(
                 "Spheres without friction still have an angle of repose: the surface stays behind "
-                f"by {as_mean(mean, 1)}° where the bed has flowed, an upper bound: it still creeps "
-                "when the run ends. Peyneau and Roux (Phys. Rev. E "
+                f"by {as_mean(mean, 1)}° where the bed has flowed ({mean.n} beds), an upper bound: "
+                "it still creeps when the run ends. Peyneau and Roux (Phys. Rev. E "
                 "78 (2008) 011307) found an angle of internal friction of 5.8 ± 0.2° for "
                 "assemblies of such spheres under slow shear."
             ),
         ]
     )
+
+
+def _left_where_it_flowed(results: Sequence[Result], width: float) -> Sample:
+    """Return the angle that is left, in the mean over the tilts at which each bed has flowed.
+
+    The tilts of one bed begin with the same packing: they are one value.
+    """
+    beds: dict[Any, list[float]] = {}
+    for result in results:
+        angle = result.setting("angle")
+        if angle > FLOWED:
+            beds.setdefault(result.variables.get("seed"), []).append(angle - _turned(result, width))
+    return sample(sum(left) / len(left) for left in beds.values())
+
+
+def _turned(result: Result, width: float) -> float:
+    """Return the angle by which the surface has turned, in degrees."""
+    return _slope(result, width) - (0.0 if result.before is None else _slope(result.before, width))
 
 
 def _slope(result: Result, width: float) -> float:

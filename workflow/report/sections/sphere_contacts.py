@@ -91,7 +91,7 @@ def sphere_contacts(data: Data) -> Content:
     ]
     comparison = Comparison(
         "z, spheres",
-        Stated(z["value"], z["tolerance"]),
+        Stated.of_range(z["value"], z["tolerance"]),
         COORDINATION_NUMBER.over(results),
         COORDINATION_NUMBER.decimals,
         COORDINATION_NUMBER.unit,
