@@ -6,7 +6,7 @@
 # make bench     set up, measure speed and accuracy (an hour and more; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
-# make clean     remove what these made
+# make clean     remove the environment, build and out; results of hours stay (paper, benchmark, and studies of one's own)
 
 PYTHON ?= python3
 VENV := .venv

@@ -40,7 +40,10 @@ def add_out(parser: argparse.ArgumentParser, default: str = "studies", what: str
 def add_running(parser: argparse.ArgumentParser) -> None:
     """Add how cases are run."""
     parser.add_argument(
-        "--at-once", type=whole_number, default=None, help="cases at a time (default: all cores)"
+        "--at-once",
+        type=whole_number,
+        default=None,
+        help="cases at a time (default: the number of cores over that of --ranks, at least 1)",
     )
     parser.add_argument(
         "--ranks", type=whole_number, default=1, help="MPI ranks of each (default: 1)"

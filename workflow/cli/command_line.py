@@ -96,7 +96,10 @@ class _Version(argparse.Action):
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="inelastic", description="Packings of inelastic spheres with LAMMPS.")
+    parser = _Parser(
+        prog="inelastic",
+        description="Packings of hard spheres, and of rigid bodies of them, with LAMMPS.",
+    )
     parser.add_argument(
         "--version", action=_Version, nargs=0, help="print which code this is, and leave"
     )
