@@ -57,7 +57,12 @@ SCHEMA: Mapping[str, Entry] = {
     "numbers/particles_with_0_or_1_contacts": _number(
         "1", "in the box, mean over the contact frames"
     ),
-    "numbers/rattlers": _number("1", "share of the particles in the box that carry nothing"),
+    "numbers/rattlers": _number(
+        "1",
+        "share of the particles in the box with fewer contacts, walls included, than hold them in "
+        "any direction (4 a sphere, 6 a dimer, 7 a larger body); contacts with such particles do "
+        "not count",
+    ),
     "numbers/coordination_number_without_rattlers": _number("1", "of the others, among themselves"),
     "numbers/resolution": _number(
         "1", "eps / (g h^2) while contacts are counted; at most 0.01 for a good count"
@@ -142,9 +147,13 @@ SCHEMA: Mapping[str, Entry] = {
     ),
     "evolution/packing_fraction": Entry("(f,)", "1", "in the box"),
     "evolution/coordination_number": Entry("(f,)", "1", "in the box; NaN while it is empty"),
-    "evolution/centre_height": Entry("(f,)", "length", "mean y of all particles"),
+    "evolution/centre_height": Entry(
+        "(f,)", "length", "of the centre of mass: mean y of the spheres, weighted by r^3"
+    ),
     "evolution/kinetic_energy": Entry(
-        "(f,)", "length^2/time^2", "mean of v^2 / 2 over the spheres"
+        "(f,)",
+        "length^2/time^2",
+        "kinetic energy over mass: mean of v^2 / 2 over the spheres, weighted by r^3",
     ),
     "profile/distance": Entry("(s,)", "length", "middle of each slab from the wall"),
     "profile/packing_fraction": Entry("(s,)", "1", "in each slab, exact"),
