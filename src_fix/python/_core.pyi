@@ -3,10 +3,21 @@
 There are n particles and m contacts. ``first`` and ``second`` (m,) int64 are indices of particles;
 ``second`` is -1 for a wall. ``normal`` (m, 3) are unit vectors that point from the second side to
 the first. ``gap`` (m,) [length] is negative for an overlap. ``inverse_mass`` (n,) [1 / mass] is
-zero for a frozen particle. All arrays but those of indices are float64, and all are C-contiguous.
-The functions raise TypeError for arrays of another dimension. They raise ValueError for wrong
-lengths, indices out of range, numbers that are not finite, negative masses, normals that have not
-length 1, a contact of a particle with itself, and contacts between two sides that cannot move.
+zero for a frozen particle. Arrays of other real types, orders and strides are converted to float64
+or int64, C-contiguous; of a number in an array of indices only the whole part is taken.
+
+The functions raise TypeError for arrays of another shape than is said here, for complex ones and
+for lists. They raise ValueError
+
+- for arrays of wrong lengths, and for numbers that are not finite;
+- for negative inverse masses, negative compliances and positive least impulses;
+- for a time step or a tolerance that is not finite and above 0, for an accuracy that is below 0, 1
+  or above, for another solver, and for a negative number of iterations;
+- for a contact with indices out of range, of a particle with itself, with a normal that has not
+  length 1, and between two sides that cannot move;
+- with bodies: if some of their four arguments are missing, for a body's number out of range, a body
+  without a particle, an inverse inertia that is not symmetric and positive semi-definite, and a
+  contact between two particles of one body.
 
 Particles may be in b rigid bodies. Four more arguments describe the bodies; either all are given
 or none. ``body`` (n,) int64 names each particle's body, 0 ... b - 1, or is -1 for a free particle;
@@ -14,8 +25,7 @@ a body has at least one particle. ``arm`` (n, 3) [length] points from the body's
 the particle and is not read for free particles. ``body_inverse_mass`` (b,) has the unit [1 /
 mass]. ``body_inverse_inertia`` (b, 3, 3) [1 / (mass length^2)] is symmetric and positive semi-
 definite; for point masses on a line it is the pseudo-inverse of the inertia. The ``inverse_mass``
-of particles in bodies is not read. A contact between two particles of one body is a ValueError
-too.
+of particles in bodies is not read.
 """
 
 import numpy as np
@@ -36,15 +46,26 @@ class Projection:
 
     @property
     def converged(self) -> bool:
-        """Whether the residuals that the solver looks at are within the tolerance."""
+        """Whether the residuals that the solver looks at are within the tolerance.
+
+        These are both, and of "uzawa" the feasibility alone.
+        """
 
     @property
     def feasibility(self) -> float:
-        """The largest overlap that is left at the end of the step [length]."""
+        """The most that is lacking of a gap at the end of the step [length]; 0 if nothing is.
+
+        Of rigid contacts that is the largest overlap. Of springs the impulse times the compliance
+        is added to the gap first. Contacts with a least impulse below 0 whose impulse is above it
+        hold, and their gaps count as well.
+        """
 
     @property
     def complementarity(self) -> float:
-        """The largest gap that is left where an impulse acts [length]."""
+        """The largest gap that is left where an impulse is above its least one [length].
+
+        The least impulse is 0, if no other is given. The gap of a spring is that of feasibility.
+        """
 
 def project(
     predicted_velocity: NDArray[np.float64],
@@ -70,8 +91,9 @@ def project(
     """Project ``predicted_velocity`` (n, 3) onto the velocities that keep every contact apart.
 
     The solver stops when both residuals, or with "uzawa" the feasibility alone, are within
-    ``tolerance`` [length] and within what the ``accuracy`` A, a fraction, asks for: A max(m/10, r),
-    with m and r as on the page of fix inelastic (what each tolerance bounds); 0 asks for nothing.
+    ``tolerance`` [length] and within what the ``accuracy`` A, at least 0 and below 1, asks for: A
+    max(m/10, r), with m and r as on the page of fix inelastic (what each tolerance bounds), but not
+    less than round-off; 0 asks for nothing.
     It gives up after ``max_iterations``, or earlier if the tolerance is out of reach; ``converged``
     is then False. ``impulse`` (m,) is a first guess for "apgd". ``compliance`` (m,) [time / mass],
     not negative, makes contacts springs; without it all are rigid. ``least_impulse`` (m,)
@@ -97,7 +119,7 @@ def residual(
 ) -> tuple[float, float]:
     """Return the feasibility and the complementarity [length] of given impulses.
 
-    Of a contact with a compliance the impulse times the compliance is added to the gap.
+    Both are as in ``Projection``. They are infinite where a number of the result is not finite.
     """
 
 def largest_eigenvalue(
@@ -118,4 +140,7 @@ def largest_eigenvalue(
     """
 
 def uniform_vector(seed: int, particle: int, step: int) -> tuple[float, float, float]:
-    """Return the three numbers, uniform in [-1, 1], of one particle in ``fix random/force``."""
+    """Return the three numbers, uniform in [-1, 1], of one particle in ``fix random/force``.
+
+    The seed has 32 bits, the other two 64; a number below 0 or beyond is a TypeError.
+    """
