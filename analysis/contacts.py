@@ -56,7 +56,12 @@ class ContactFrame:
 
 
 def iterate_contact_frames(path: str | PathLike[str]) -> Iterator[ContactFrame]:
-    """Read the frames of a contact dump one by one; at least one frame must be there."""
+    """Read the frames of a contact dump one by one; at least one frame must be there.
+
+    Raises DumpError with the file and, where it can be told, the line: for a file that cannot be
+    read or is empty, for a frame that is cut off or lacks a column, and for rows that cannot be
+    contacts.
+    """
     file = Path(path)
     line = 1
     with open_dump(file) as dump:

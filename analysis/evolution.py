@@ -136,7 +136,8 @@ def plateau(
     band : largest distance from the final mean, relative to it
     last : share of the values, the last ones, whose mean is the final mean; at least one value
 
-    Raises InputError for arrays of other shapes, and where the last values are not finite.
+    Raises InputError for arrays of other shapes, where the last values are not finite, for a band
+    that is not positive, and for a share outside of (0, 1].
     """
     when, series = np.asarray(steps, dtype=np.int64), np.asarray(values, dtype=np.float64)
     if when.ndim != 1 or len(when) == 0 or when.shape != series.shape:

@@ -23,14 +23,16 @@ if TYPE_CHECKING:
 class ForceDistribution:
     """The probability density P(f / <f>) of the strengths f of some contacts.
 
+    There are b bins: as many as were asked for, or twice as many where some forces pull.
+
     Attributes
     ----------
-    edges : (bins + 1,), of the bins, in mean forces
-    density : (bins,), share of all contacts per unit of f / <f>; its integral is below 1 if some
-        are stronger than the last edge
-    standard_errors : (bins,), of `density`, sqrt(n) / (N width) for n of N contacts in a bin; it
-        takes contacts as independent
-    mean : <f>, force
+    edges : (b + 1,), of the bins, in mean forces; from 0, or from below 0 where some forces pull
+    density : (b,), share of all contacts per unit of f / <f>; its integral is below 1 if some are
+        beyond the outermost edges
+    standard_errors : (b,), of `density`, sqrt(n) / (N width) for n of N contacts in a bin; it takes
+        contacts as independent
+    mean : <f>, the mean of |f|, force
     contacts : N, number of contacts
     """
 

@@ -140,7 +140,8 @@ def local_ratios(forces: ArrayLike, heights: ArrayLike, layers: int = 20) -> Flo
     heights : (m,), of their places, length
     layers : number of layers, at least 1
 
-    Raises InputError for arrays of other shapes, and for fewer contacts than layers.
+    Raises InputError for arrays of other shapes, for forces that pull (< 0) or are not finite, for
+    fewer contacts than layers, and for a layer in which all forces are 0.
     """
     strength = np.asarray(forces, dtype=np.float64)
     height = np.asarray(heights, dtype=np.float64)
@@ -149,9 +150,14 @@ def local_ratios(forces: ArrayLike, heights: ArrayLike, layers: int = 20) -> Flo
             "forces and heights must have the same shape (m,), "
             f"not {strength.shape} and {height.shape}"
         )
+    # This condition is written so that NaN fails too.
+    if not ((strength >= 0) & (strength < np.inf)).all():
+        raise InputError("forces must be finite and not below 0: none of the contacts may pull")
     if not 1 <= layers <= len(strength):
         raise InputError(f"{len(strength)} contacts cannot be in {layers} layers")
     parts = np.array_split(strength[np.argsort(height, kind="stable")], layers)
+    if not all(part.any() for part in parts):
+        raise InputError("all forces of a layer are 0: it has no mean to compare with")
     ratios: FloatArray = np.concatenate([part / part.mean() for part in parts])
     return ratios
 

@@ -134,7 +134,8 @@ def radial_distribution(
     largest : upper edge of the last shell, length
     bins : number of shells of the same thickness, from 0
 
-    Raises InputError for a box that is too near to the outermost centres or holds none.
+    Raises InputError for a box that is too near to the outermost centres or holds none, for less
+    than one shell, and for a largest radius that is not positive and finite.
     """
     # freud takes half a second to import, which most uses need not wait for.
     import freud
