@@ -115,3 +115,8 @@ def test_the_density_in_logarithmic_bins() -> None:
     # The fewest values in a bin are 1,900: 2.3 %, and 4 standard errors.
     assert density == pytest.approx(wanted, rel=0.1)
     assert (density * np.diff(np.geomspace(1e-3, 1, 31))).sum() == pytest.approx(1, rel=1e-12)
+
+
+def test_contacts_that_pull_have_no_local_ratios() -> None:
+    with pytest.raises(InputError, match="none of the contacts may pull"):
+        local_ratios([-1.0, 2.0], [1.0, 2.0], 1)
