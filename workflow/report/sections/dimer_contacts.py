@@ -37,9 +37,6 @@ from .aspect_ratios import (
     shaken,
 )
 
-# So small a share of the particles outside of a range is not seen in a plot of shares.
-RARE = 0.001
-
 # The paper's two narrower distributions are perhaps those of these aspect ratios.
 NARROW = 1.4, 1.6
 SHOWN = (COORDINATION_NUMBER, NEIGHBOURS, COORDINATION_NUMBER_WITHOUT_RATTLERS)
@@ -360,12 +357,19 @@ def _statements_on_distributions(
     found = []
     for name in ("contacts", "neighbours"):
         low, high = stated[f"{name}_range"]
+        of_runs = [
+            _Distribution(shares, None, (low, high))
+            for row in dimers
+            for shares in arrays_of(row.group, f"distribution/{name}")
+        ]
+        within = sum(one.outside == 0 for one in of_runs)
         outside = max(row.distributions[name].outside for row in dimers)
         found.append(
             Statement(
                 f"The number of {name} ranges from {low} to {high} (in most runs).",
-                outside < RARE,
-                f"at most {as_text(100 * outside, 2)} % of the dimers of an L/d lie outside",
+                within > len(of_runs) / 2,
+                f"in {within} of {len(of_runs)} runs; at most {as_text(100 * outside, 2)} % of the "
+                "dimers of an L/d lie outside",
             )
         )
     probable = stated["contacts_most_probable"]
