@@ -348,6 +348,14 @@ def test_where_dimers_are_densest() -> None:
     ) in said()
 
 
+def test_how_far_dimers_lie_down() -> None:
+    a_y: dict[float, list[float]] = {}
+    for row in shaken_by(FORCE):
+        a_y.setdefault(float(row["aspect_ratio"]), []).append(row["a_y"] / row["a_isotropic"])
+    at = {aspect: f"{np.mean(values):.2f}" for aspect, values in a_y.items()}
+    assert f"falls from {at[1.2]} at L/d = 1.2 to {at[1.8]} at 1.8, and is {at[2.0]} at 2" in said()
+
+
 def test_how_many_contacts_a_dimer_has() -> None:
     rows = [row for row in read("dimers") if row["deck"] == "dimers"]
     means: dict[tuple[float, float], list[float]] = {}
