@@ -339,9 +339,14 @@ def shaken_by(force: float) -> list[dict[str, Any]]:
 def test_where_dimers_are_densest() -> None:
     raw = [densest(shaken_by(force), "packing_fraction") for force in (FORCE, 200)]
     necks = [densest(shaken_by(force), "packing_fraction_with_necks") for force in (FORCE, 200)]
-    poured = [r for r in read("dimers-soft") if r["contacts"] == "hard"]
-    unshaken = densest(poured, "packing_fraction")
-    assert f"Poured without any force they are densest at {unshaken} " in said()
+    hard, soft = (
+        densest([r for r in read("dimers-soft") if r["contacts"] == contacts], "packing_fraction")
+        for contacts in ("hard", "soft")
+    )
+    assert (
+        f"Poured without any force they are densest at {hard} (hard contacts), and from the same "
+        f"starts at {soft} with LAMMPS's soft ones."
+    ) in said()
     assert (
         f"densest at L/d = {raw[0]} when a force of 30 has shaken them, and at {raw[1]} with a "
         f"force of 200; with the volume of the necks at {necks[0]} and {necks[1]}"
