@@ -33,6 +33,7 @@ def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the plugin of the commit that made the results."""
     content = tomllib.loads((RESULTS / FILE).read_text())
     if code()["sources"] == content["made_by"]:
+        # There is no other fix to compare with: after a release whose results are all run again.
         pytest.skip("the results are of this fix")
     assert content["made_by"] in as_good_as_todays(RESULTS)
     folder = tmp_path_factory.mktemp("earlier")

@@ -120,6 +120,7 @@ def _statements_on_force(more: Sequence[_Row]) -> list[Statement]:
     z = _of_pairs(still.group, shaken.group, COORDINATION_NUMBER)
     # What the paper could tell: two standard errors of the difference of its two numbers.
     reach = 2 * math.hypot(still.z.stated.error, shaken.z.stated.error)
+    same = z.is_within(reach)
     return [
         Statement(
             "The packing fraction is smaller without random force (the paper: not significantly).",
@@ -130,13 +131,10 @@ def _statements_on_force(more: Sequence[_Row]) -> list[Statement]:
         ),
         Statement(
             "At rest, the coordination number is the same with and without random force.",
-            z.is_within(reach),
+            same,
             f"without less with, in pairs from the same start: {as_measured(z.value, z.error, 3)} "
-            f"(p {as_probability(z.p)}), within the ± {as_text(reach, 2)} that the paper's own "
-            "errors leave"
-            if z.is_within(reach)
-            else f"without less with, in pairs from the same start: "
-            f"{as_measured(z.value, z.error, 3)}, p {as_probability(z.p)}",
+            f"(p {as_probability(z.p)})"
+            + (f", within the ± {as_text(reach, 2)} of the paper's own errors" if same else ""),
         ),
     ]
 
