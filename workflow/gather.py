@@ -11,7 +11,7 @@ from .files import whole
 from .finished import other_run
 from .folder import Folder
 from .provenance import differs
-from .same_runs import as_good_as_todays
+from .same_runs import same_runs
 from .store import StoredStudy, origin_of, read_result
 from .study import Study
 
@@ -50,13 +50,13 @@ def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool 
     study : study whose results they are
     folder : folder in which studies run, to which the results go
     source : folder of the results that were kept, with a folder for each study; its file
-        `same_runs.toml` may tell which other fixes have today's runs
+        `same_runs.toml` may tell which other fixes and decks have today's runs
     of_any_code : whether results of other versions of the fix or of the decks are taken, too
 
     Raises WorkflowError if that file is not as it must be.
     """
     count = other = 0
-    as_good = as_good_as_todays(source)
+    same = same_runs(source)
     for case in study.cases:
         kept, target = source / study.name / f"{case.name}.h5", folder.result(study, case)
         if folder.is_measured(study, case) or not kept.is_file():
@@ -67,7 +67,7 @@ def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool 
             print(f"not taken: {error}")
             continue
         fits = outputs == study.outputs.measured and case.is_of(record)
-        if not fits or (not of_any_code and differs(case, record, as_good)):
+        if not fits or (not of_any_code and differs(case, record, same)):
             other += 1
             continue
         for line in folder.set_aside(study, case):

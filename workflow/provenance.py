@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -14,9 +14,11 @@ from typing import Any
 from lammps_inelastic import plugin
 
 from .build_version import version_now
+from .same_runs import SameRuns
 from .study import Case
 
 THIS = "lammps-inelastic"
+NOTHING_ELSE = SameRuns()
 PACKAGES = (THIS, "lammps", "mpi4py", "MDAnalysis", "numpy", "scipy", "h5py")
 
 
@@ -54,21 +56,24 @@ def version_in(record: Mapping[str, Any]) -> str:
     return str(record["versions"].get(THIS, "unknown"))
 
 
-def differs(case: Case, record: Mapping[str, Any], as_good: Container[str] = ()) -> str:
+def differs(case: Case, record: Mapping[str, Any], same: SameRuns = NOTHING_ELSE) -> str:
     """Say in what the code of a run differs from that of today; empty if in nothing.
 
     Parameters
     ----------
     case : case as its decks are today
     record : record of a run of the case
-    as_good : hashes of the sources of fixes that are known to have the runs of today's
+    same : other code that is known to have the runs of today's
     """
     words = []
-    if record["fingerprint"] != case.fingerprint:
+    fingerprints = str(record["fingerprint"]).split("+")
+    if len(fingerprints) != len(case.stages) or not all(
+        same.has_deck(stage.deck.name, fingerprint, stage.deck.fingerprint)
+        for stage, fingerprint in zip(case.stages, fingerprints, strict=True)
+    ):
         words.append("another version of the deck")
     # Runs of version 0.1 did not note the code.
-    sources = record.get("code", {}).get("sources")
-    if sources != code()["sources"] and sources not in as_good:
+    if not same.has_fix(record.get("code", {}).get("sources"), code()["sources"]):
         words.append(f"version {version_in(record)} of the fix")
     return ", ".join(words)
 

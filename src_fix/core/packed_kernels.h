@@ -40,7 +40,7 @@ template <typename Real> struct Pass {
       *normal;               // the fourth number: the gap that the first impulses end the step with
   const Real *diagonal;      // of A
   const Real *compliance;    // 0 for rigid constraints
-  const Real *least;         // the change that leaves no impulse
+  const Real *least;         // the change that leaves the least impulse
   const Vector<Real> *velocity;    // per particle: change of velocity of the present changes
   Real *unbound;               // the present changes before projection; replaced by the next ones
   Real *change_before;         // the changes before; replaced by the present ones

@@ -145,7 +145,7 @@ class Solver {
   GapOperator &gap_operator() { return gap_operator_; }
 
  protected:
-  // Judges the impulses of the problem, of which negative ones become 0, and sets the diagonal. The
+  // Judges the impulses of the problem, of which those below the least become that, and sets the diagonal. The
   // operator must be prepared for the problem. Collective.
   Guess judge_first_guess(ContactProblem &problem, Host &host);
 

@@ -1,7 +1,7 @@
 // Uzawa's algorithm, the solver of the paper (Faure, Lefebvre-Lepot and Semin, ESAIM: Proceedings
 // 28 (2009) 13): projected gradient on the dual problem of contact_problem.h with a fixed step,
 //
-//   lambda <- max(0, lambda - w(lambda) / L)
+//   lambda <- max(l, lambda - w(lambda) / L),   l the least impulses
 //
 // from lambda = 0. L is the largest eigenvalue of A, from a power iteration whose products with A
 // are not counted among the iterations. The solver stops on feasibility alone.

@@ -3,6 +3,7 @@
 #include "ghost_exchange.h"
 
 #include "atom.h"
+#include "error.h"
 #include "memory.h"
 
 #include <algorithm>
@@ -128,15 +129,14 @@ bool AtomState::is_pushed(int i) const
       (step_.has_bodies && momenta_.has_held(i));
 }
 
-// The layout is: this size; where it is more than 1, the number of contacts that the law remembers and what it
-// remembers of them; where there is more, the push.
+// The layout is: this size; with a law, what it remembers of contacts, without one, if there is more, a 0; the
+// push, if there is one.
 int AtomState::restart_size(int i, bool writes) const
 {
   if (!writes) return 0;
-  const int contacts = has_law() ? law_memory_.number_of_entries(i) : 0;
-  const bool pushed = is_pushed(i);
-  if (contacts == 0 && !pushed) return 1;
-  return 1 + LawMemory::packed_size(contacts) + (pushed ? push_size() : 0);
+  const int push = is_pushed(i) ? push_size() : 0;
+  if (has_law()) return 1 + LawMemory::packed_size(law_memory_.number_of_entries(i)) + push;
+  return push > 0 ? 2 + push : 1;
 }
 
 int AtomState::largest_restart_size() const
@@ -160,17 +160,23 @@ int AtomState::pack_restart(int i, double *buffer, bool writes) const
   return size;
 }
 
-void AtomState::unpack_restart(int i, int nth, bool law)
+void AtomState::unpack_restart(int i, int nth, bool written, bool same_law)
 {
   const double *in = atom->extra[i];
   for (int k = 0; k < nth; ++k) in += static_cast<int>(*in);
   const double *const end = in + static_cast<int>(*in);
   if (++in >= end) return;
-  if (law) {
-    law_memory_.forget(i);
+  if (same_law) {
     in += law_memory_.unpack(i, in);
+    if (law_memory_.owner(i) != atom->tag[i])
+      error->one(
+          FLERR,
+          "Fix inelastic: LAMMPS gives atom {} what the restart file holds of contacts of atom "
+          "{}: define the fix after read_restart before atoms are deleted, or their order or "
+          "IDs change",
+          atom->tag[i], law_memory_.owner(i));
   } else
-    in += LawMemory::packed_size(static_cast<int>(*in));
+    in += written ? LawMemory::size_of_packed(in) : 1;
   if (in == end) return;
   // A velocity that was set since is all momentum.
   if (!std::equal(in, in + 3, atom->v[i])) return;

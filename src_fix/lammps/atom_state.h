@@ -64,8 +64,9 @@ class AtomState : protected Pointers {
   int restart_size(int i, bool writes) const;
   int largest_restart_size() const;
   int pack_restart(int i, double *buffer, bool writes) const;
-  // `law` tells whether what the file holds of contacts is that of the law of this run.
-  void unpack_restart(int i, int nth, bool law);
+  // `written` tells whether a run with a law has written the file, and `same_law` whether it is that of this
+  // run. Errors: LAMMPS gives the atom what belongs to another one.
+  void unpack_restart(int i, int nth, bool written, bool same_law);
 
   double memory_usage() const;    // [numbers] per atom
 

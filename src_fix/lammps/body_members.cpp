@@ -33,7 +33,7 @@ BodyMembers::BodyMembers(LAMMPS *lmp, Step &step, inelastic::Host &host) :
 {
 }
 
-void BodyMembers::begin_run()
+void BodyMembers::find_fix()
 {
   const std::string &fix_id = step_.settings.rigid_fix;
   fix_ = modify->get_fix_by_id(fix_id);
@@ -42,7 +42,6 @@ void BodyMembers::begin_run()
       !utils::strmatch(fix_->style, "^rigid/small/omp$"))
     error->all(FLERR, "Fix inelastic rigid: fix {} is of style {}, and must be rigid/small", fix_id,
                fix_->style);
-  first_of_run_ = true;
 }
 
 void BodyMembers::count_spheres()
@@ -71,6 +70,15 @@ void BodyMembers::count_spheres()
                  "belong to a body",
                  molecule.id);
   }
+  const auto &all = molecules_.all();
+  const bool none_inside = std::all_of(all.begin(), all.end(), [](const auto &molecule) {
+    return molecule.outside > 0;
+  });
+  if (!all.empty() && none_inside)
+    error->all(FLERR,
+               "Fix inelastic rigid: no body of fix {} is in the fix's group: leave out rigid, or "
+               "give fix inelastic a group that holds the bodies",
+               step_.settings.rigid_fix);
   last_sphere_.assign(molecules_.all().size(), NONE);
   check_hidden_pairs();
 }

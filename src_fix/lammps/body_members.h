@@ -22,14 +22,15 @@ class BodyMembers : protected Pointers {
  public:
   BodyMembers(class LAMMPS *lmp, Step &step, inelastic::Host &host);
 
-  // Finds the fix. Errors: there is none, or another style than rigid/small.
-  void begin_run();
+  // Errors: there is no such fix, or it has another style than rigid/small.
+  void find_fix();
+  // At the start of a run: the next call of find() counts the bodies afresh.
+  void begin_run() { first_of_run_ = true; }
   Fix *fix() const { return fix_; }
 
   // Puts the bodies into the step's problem, all particles of the group: to be called when atoms or
   // ghosts have changed. Collective. Returns what is wrong on this rank, empty if nothing is: a body of
   // which it sees a part only. Errors: a body that is not all in the group, or holds frozen spheres.
-  // The first call of a run counts the bodies afresh.
   std::string find();
 
   // The first call of a run checks this when the bodies were measured. Errors: ghosts that do not reach far

@@ -23,11 +23,10 @@ ContactOutput::~ContactOutput()
   memory->destroy(local_);
 }
 
-void ContactOutput::begin_run(int number_of_walls)
+void ContactOutput::set_walls(int number_of_walls)
 {
   wall_force_.assign(3 * static_cast<std::size_t>(number_of_walls), 0.0);
   wall_force_total_ = wall_force_;
-  wall_force_step_ = -1;
 }
 
 void ContactOutput::take(const inelastic::ProjectionResult &result, long shortened_steps,

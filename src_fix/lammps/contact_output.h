@@ -47,7 +47,8 @@ class ContactOutput : protected Pointers {
     VECTOR_SIZE
   };
 
-  void begin_run(int number_of_walls);
+  // Once, when the fix is defined.
+  void set_walls(int number_of_walls);
 
   // LAMMPS says which virial it wants in this step, and where it is to be added.
   struct VirialTarget {

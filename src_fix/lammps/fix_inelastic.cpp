@@ -8,7 +8,6 @@
 #include "error.h"
 #include "force.h"
 #include "group.h"
-#include "memory.h"
 #include "modify.h"
 #include "neighbor.h"
 #include "pair.h"
@@ -23,12 +22,13 @@ using namespace FixConst;
 
 namespace {
 
-constexpr int MAX_ROUNDS = 100;          // of adding constraints; a handful is usual
-constexpr double SIMILAR_RADII = 1.1;    // up to here one cutoff for all pairs wastes little
+constexpr int MAX_ROUNDS = 100;    // of adding constraints; a handful is usual
 std::string first_word(const std::string &words)
 { return words.substr(0, words.find(' ')); }
 
-constexpr double LAYOUT = -2.0;    // of what restart files hold; earlier files begin with a time
+// Of what restart files hold. Files of version 0.1 begin with a time, those of its successors, before the
+// release of the next version, with the other number.
+constexpr double LAYOUT = -3.0, EARLIER_LAYOUT = -2.0;
 
 // What LAMMPS has read from a restart file for fixes that are not yet defined is hidden in its class.
 struct FromRestart : Modify {
@@ -54,6 +54,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
 {
   if (bodies_) movers_.push_back(bodies_.get());
   constraints_.walls().init();
+  output_.set_walls(constraints_.walls().number_of_walls());
   if (!atom->radius_flag)
     error->all(FLERR, "Fix inelastic needs spheres with a radius: use atom_style sphere");
   if (!atom->tag_enable) error->all(FLERR, "Fix inelastic needs atom IDs: use atom_modify id yes");
@@ -117,11 +118,25 @@ FixInelastic::~FixInelastic()
 {
   if (copymode) return;
   // LAMMPS is ending where there is no update any more.
-  if (update) length_.restore();
+  if (update) {
+    length_.restore();
+    warn_of_lost_memory();
+  }
   atom->delete_callback(id, Atom::GROW);
   atom->delete_callback(id, Atom::RESTART);
   // The output owns them.
   array_atom = array_local = nullptr;
+}
+
+void FixInelastic::warn_of_lost_memory() const
+{
+  const double contacts = output_.vector(ContactOutput::HELD_CONTACTS);
+  if (contacts > 0.0 && comm->me == 0)
+    error->warning(
+        FLERR,
+        "Fix inelastic: with fix {} ends what law {} remembers of {:.0f} contacts: a fix "
+        "that is defined anew begins without it",
+        id, settings_.law_words, contacts);
 }
 
 int FixInelastic::setmask()
@@ -143,10 +158,44 @@ int FixInelastic::modify_param(int narg, char **arg)
    the start of a run
 ------------------------------------------------------------------------- */
 
+// LAMMPS calls this for write_restart, write_data and balance, too, after which `run pre no` goes on as if
+// nothing had been: what begins a run is in begin_run().
 void FixInelastic::init()
 {
-  check_group();
   check_run();
+  check_scene();
+  check_.check_other_fixes();
+  if (laws_.has_law()) laws_.follow_ids(atom, world);
+  state_.measure_messages(ranks_);
+  maxexchange = state_.exchange_size();
+  // With newton off LAMMPS makes its buffers for reverse communication as large as the pair style
+  // needs them, whatever fixes need.
+  if (!force->newton && force->pair)
+    force->pair->comm_reverse_off = std::max(force->pair->comm_reverse_off, comm_reverse);
+  // With equal radii the pair style's own list serves, and no second one is built. A list that is of another
+  // kind than the last one is empty until a run is set up.
+  constexpr int NO_RUN = 0;
+  if (update->whichflag != NO_RUN) length_.choose_list();
+  neighbor->add_request(this,
+                        length_.has_one_cutoff() ? NeighConst::REQ_DEFAULT : NeighConst::REQ_SIZE);
+}
+
+// LAMMPS sets the run up: the list is new, and no step has been made.
+void FixInelastic::begin_run()
+{
+  constraints_.walls().warn();
+  check_.begin_run();
+  constraints_.begin_run(length_.smallest_radius());
+  length_.begin_run();
+  constraints_.overlaps().begin_run();
+  begin_summary();
+}
+
+// What the fix was given when it was defined, and may be gone or changed since, also where no run is set up
+// (`run pre no`). Collective.
+void FixInelastic::check_scene()
+{
+  check_group();
   RegionWalls &walls = constraints_.walls();
   const int walls_before = walls.number_of_walls();
   walls.init();
@@ -156,25 +205,29 @@ void FixInelastic::init()
         "Fix inelastic: its regions have {} walls, and had {} when the fix was defined: define "
         "fix {} again after its regions",
         walls.number_of_walls(), walls_before, id);
-  walls.warn();
-  check_.begin_run();
-  state_.measure_messages(ranks_);
-  maxexchange = state_.exchange_size();
-  // With newton off LAMMPS makes its buffers for reverse communication as large as the pair style
-  // needs them, whatever fixes need.
-  if (!force->newton && force->pair)
-    force->pair->comm_reverse_off = std::max(force->pair->comm_reverse_off, comm_reverse);
-  if (bodies_) bodies_->begin_run();
-  output_.begin_run(walls.number_of_walls());
+  find_frozen();
+  if (bodies_) bodies_->find_fix();
+  length_.measure_radii();
+}
 
-  const double smallest_radius = measure_radii();
-  constraints_.begin_run(smallest_radius);
-  // With equal radii the pair style's own list serves, and no second one is built.
-  const bool one_cutoff = step_.largest_radius <= SIMILAR_RADII * smallest_radius;
-  neighbor->add_request(this, one_cutoff ? NeighConst::REQ_DEFAULT : NeighConst::REQ_SIZE);
-  length_.begin_run(one_cutoff);
-  constraints_.overlaps().begin_run();
-  begin_summary();
+// Groups can be deleted, and their numbers be given to other ones.
+void FixInelastic::find_frozen()
+{
+  if (settings_.frozen_group.empty()) return;
+  const int frozen = group->find(settings_.frozen_group);
+  if (frozen < 0)
+    error->all(FLERR, "Fix inelastic: its frozen group {} does not exist any more",
+               settings_.frozen_group);
+  settings_.frozen_bit = group->bitmask[frozen];
+  bigint outside = 0, all_outside = 0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if ((atom->mask[i] & settings_.frozen_bit) && !(atom->mask[i] & groupbit)) ++outside;
+  MPI_Allreduce(&outside, &all_outside, 1, MPI_LMP_BIGINT, MPI_SUM, world);
+  if (all_outside > 0)
+    error->all(FLERR,
+               "Fix inelastic: spheres, {} of the frozen group {}, are not in group {}, whose "
+               "contacts the fix makes: others would pass through them",
+               all_outside, settings_.frozen_group, group->names[igroup]);
 }
 
 void FixInelastic::check_group() const
@@ -206,35 +259,15 @@ void FixInelastic::check_run() const
     error->all(FLERR, "Fix inelastic needs a timestep greater than 0, not {}", update->dt);
 }
 
-// Sets the largest radius of the step and returns the smallest one.
-double FixInelastic::measure_radii()
-{
-  double radii[2] = {0.0, -EXTREME};
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!step_.in_group(atom, i)) continue;
-    radii[0] = std::max(radii[0], atom->radius[i]);
-    radii[1] = std::max(radii[1], -atom->radius[i]);
-  }
-  ranks_.reduce(nullptr, 0, radii, 2);
-  step_.largest_radius = radii[0];
-  const double smallest_radius = -radii[1];
-  if (step_.largest_radius > 0.0 && !(smallest_radius > 0.0))
-    error->all(FLERR, "Fix inelastic: an atom of group {} has no radius: set its diameter",
-               group->names[igroup]);
-  if (step_.largest_radius > 0.0 && settings_.tolerance >= smallest_radius)
-    error->all(
-        FLERR,
-        "Fix inelastic: the tolerance {:.4g}, the largest overlap allowed, must be below the "
-        "smallest radius of group {}, {:.4g}",
-        settings_.tolerance, group->names[igroup], smallest_radius);
-  return smallest_radius;
-}
-
 void FixInelastic::init_list(int, NeighList *list)
 { constraints_.use(list); }
 
 void FixInelastic::setup_post_neighbor()
-{ post_neighbor(); }
+{
+  begin_run();
+  if (bodies_) bodies_->begin_run();
+  post_neighbor();
+}
 
 void FixInelastic::post_neighbor()
 {
@@ -248,8 +281,8 @@ void FixInelastic::post_neighbor()
 void FixInelastic::setup(int vflag)
 {
   check_.set_up();
-  // Without diameters a run sets up bodies of point masses, and does no more.
-  if (bodies_ && step_.largest_radius == 0.0) return;
+  // Without diameters `run 0` sets up bodies of point masses, and does no more.
+  if (bodies_ && step_.largest_radius == 0.0 && update->nsteps == 0) return;
   if (bodies_) {
     bodies_->measure();
     ranks_.fail_together(bodies_->disagreement());
@@ -305,6 +338,13 @@ void FixInelastic::advance(int vflag, Kick kick)
 {
   const PhaseClock::Within within(clock_, PhaseClock::CHECK);
   v_init(vflag);
+  if (check_.goes_on_without_setup()) check_scene();
+  if (step_.has_bodies && step_.largest_radius == 0.0)
+    error->all(
+        FLERR,
+        "Fix inelastic: no atom of group {} has a radius: set diameters before a run of more "
+        "than 0 steps",
+        group->names[igroup]);
   length_.restore();
   step_.kick = kick;
   check_.before_step();
@@ -486,8 +526,9 @@ int FixInelastic::pack_restart(int i, double *buffer)
 
 void FixInelastic::unpack_restart(int i, int nth)
 {
+  const bool written = !law_in_restart_.empty();
   const bool same_law = first_word(law_in_restart_) == first_word(settings_.law_words);
-  state_.unpack_restart(i, nth, laws_.has_law() && same_law);
+  state_.unpack_restart(i, nth, written, laws_.has_law() && same_law);
 }
 
 int FixInelastic::size_restart(int i)
@@ -515,11 +556,16 @@ void FixInelastic::restart(char *buffer)
 {
   double numbers[4];
   std::memcpy(numbers, buffer, sizeof(double));
-  const bool earlier = numbers[0] != LAYOUT;
+  const bool earlier = numbers[0] != LAYOUT && numbers[0] != EARLIER_LAYOUT;
   std::memcpy(numbers + (earlier ? 1 : 0), buffer, (earlier ? 2 : 4) * sizeof(double));
-  if (update->dt == numbers[1] && numbers[1] != numbers[2]) length_.set_timestep(numbers[2]);
+  if (update->dt == numbers[1] && numbers[1] != numbers[2])
+    length_.set_regular_timestep(numbers[2]);
   if (earlier) return;
   law_in_restart_.assign(buffer + sizeof(numbers), static_cast<std::size_t>(numbers[3]));
+  if (numbers[0] == EARLIER_LAYOUT && !law_in_restart_.empty())
+    error->all(FLERR,
+               "Fix inelastic: the restart file is of an earlier development version, and what its "
+               "contacts remember cannot be read: make it again with this version");
   const bool same_law = first_word(law_in_restart_) == first_word(settings_.law_words);
   if (law_in_restart_.empty() || same_law || comm->me != 0) return;
   error->warning(FLERR,

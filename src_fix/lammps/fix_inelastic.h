@@ -105,7 +105,10 @@ class FixInelastic : public Fix {
 
   void announce_to_lammps();
   void find_lost_memory() const;
-  double measure_radii();
+  void warn_of_lost_memory() const;
+  void begin_run();
+  void check_scene();
+  void find_frozen();
   void check_group() const;
   void check_run() const;
   void check_volume();

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <set>
 
 using namespace LAMMPS_NS;
 
@@ -36,6 +37,7 @@ class Reader {
   void read_keywords();
 
  private:
+  void refuse_twice(const std::string &keyword);
   void read_regions(const char *first);
   void read_rigid(const char *fix_id);
   void read_law(const std::string &name);
@@ -49,6 +51,7 @@ class Reader {
   int narg_;
   char **arg_;
   int at_ = 4;
+  std::set<std::string> given_;    // keywords
   Settings &settings_;
 };
 
@@ -62,6 +65,7 @@ void Reader::read_keywords()
                "maxiter, frozen, record or shorten",
                keyword);
     if (at_ + 2 > narg_) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error_);
+    refuse_twice(keyword);
     const char *const value = arg_[at_ + 1];
     at_ += 2;
     if (keyword == "region")
@@ -83,6 +87,14 @@ void Reader::read_keywords()
     else
       settings_.shorten = utils::logical(FLERR, value, false, lmp_) == 1;
   }
+}
+
+// Regions add up, and read_law() knows better what to say of two laws.
+void Reader::refuse_twice(const std::string &keyword)
+{
+  if (keyword == "region" || keyword == "law") return;
+  if (!given_.insert(keyword).second)
+    error_at(error_, FLERR, at_, "Fix inelastic: keyword {} is given twice", keyword);
 }
 
 void Reader::read_regions(const char *first)
@@ -149,6 +161,7 @@ void Reader::read_frozen(const char *group_id)
   const int frozen_group = lmp_->group->find(group_id);
   if (frozen_group < 0)
     error_at(error_, FLERR, at_ - 1, "Fix inelastic frozen group {} does not exist", group_id);
+  settings_.frozen_group = group_id;
   settings_.frozen_bit = lmp_->group->bitmask[frozen_group];
 }
 

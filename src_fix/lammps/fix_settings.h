@@ -32,6 +32,7 @@ struct Settings {
   bool shorten = false;
   // The group of the fix, and the group of spheres that nothing moves (0 = none).
   int group_bit = 0;
+  std::string frozen_group;    // empty: there is none
   int frozen_bit = 0;
   // Regions whose surfaces are walls, in the order in which the walls are numbered.
   std::vector<std::string> regions;

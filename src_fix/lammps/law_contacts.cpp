@@ -110,10 +110,40 @@ bool LawContacts::is_pushed_apart(std::size_t c) const
   return gap > REGULAR_OVERLAP * step_.settings.tolerance;
 }
 
+// Both atoms of a contact remember it: a partner that remembers nothing is another one with the same ID.
+void LawContacts::follow_ids(const Atom *atom, MPI_Comm world)
+{
+  std::vector<tagint> mine;    // the IDs then and now of each atom, one after the other
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (memory_.number_of_entries(i) > 0) {
+      mine.push_back(memory_.owner(i));
+      mine.push_back(atom->tag[i]);
+    }
+  int ranks;
+  MPI_Comm_size(world, &ranks);
+  // LAMMPS's own mpi.h, of builds without MPI, takes no constants.
+  int count = static_cast<int>(mine.size());
+  std::vector<int> counts(ranks), offsets(ranks, 0);
+  MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+  for (int rank = 1; rank < ranks; ++rank) offsets[rank] = offsets[rank - 1] + counts[rank - 1];
+  std::vector<tagint> all(offsets.back() + counts.back());
+  MPI_Allgatherv(mine.data(), count, MPI_LMP_TAGINT, all.data(), counts.data(), offsets.data(),
+                 MPI_LMP_TAGINT, world);
+  std::unordered_map<tagint, tagint> id_now;
+  for (std::size_t k = 0; k < all.size(); k += 2) id_now[all[k]] = all[k + 1];
+  for (int i = 0; i < atom->nlocal; ++i) {
+    memory_.rename_partners(i, id_now);
+    memory_.set_owner(i, atom->tag[i]);
+  }
+}
+
 void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
-  for (int i = 0; i < step_.problem.particles; ++i) memory_.forget(i);
+  for (int i = 0; i < step_.problem.particles; ++i) {
+    memory_.forget(i);
+    memory_.set_owner(i, atom->tag[i]);
+  }
   int last = -1;
   for (std::size_t c = 0; c < step_.sides.size(); ++c) {
     const Side &side = step_.sides[c];

@@ -8,6 +8,8 @@
 #include "law_memory.h"
 #include "step.h"
 
+#include <mpi.h>
+
 namespace LAMMPS_NS {
 
 class GhostExchange;
@@ -32,6 +34,10 @@ class LawContacts {
 
   // Gives the law the impulses of a step that is solved.
   void take_impulses();
+
+  // Before a run, or a restart file: follows the atoms whose IDs have changed since the law remembered them, and forgets
+  // those that are gone. Collective.
+  void follow_ids(const Atom *atom, MPI_Comm world);
 
   // Keeps what the law remembers with the atoms, those of other ranks included. Collective.
   void remember(const Atom *atom, GhostExchange &ranks);

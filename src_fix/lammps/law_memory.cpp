@@ -16,6 +16,7 @@ constexpr double SAME_SIDE =
 void LawMemory::resize(int atoms)
 {
   entries_.resize(atoms);
+  owner_.resize(atoms, 0);
   sent_.resize(atoms, 0);
 }
 
@@ -46,9 +47,24 @@ bool LawMemory::remembers_wall(int atom) const
   });
 }
 
+void LawMemory::rename_partners(int atom, const std::unordered_map<tagint, tagint> &id_now)
+{
+  std::vector<Entry> known;
+  for (Entry entry : entries_[atom]) {
+    if (entry.partner > 0) {
+      const auto now = id_now.find(entry.partner);
+      if (now == id_now.end()) continue;
+      entry.partner = now->second;
+    }
+    known.push_back(entry);
+  }
+  entries_[atom] = std::move(known);
+}
+
 int LawMemory::pack(int atom, int begin, int end, double *buffer) const
 {
   double *out = buffer;
+  *out++ = static_cast<double>(owner_[atom]);
   *out++ = end - begin;
   for (int k = begin; k < end; ++k) {
     const Entry &entry = entries_[atom][k];
@@ -70,6 +86,7 @@ int LawMemory::pack(int atom, double *buffer) const
 int LawMemory::unpack(int atom, const double *buffer)
 {
   const double *in = buffer;
+  owner_[atom] = static_cast<tagint>(*in++);
   const int count = static_cast<int>(*in++);
   for (int k = 0; k < count; ++k) {
     Entry entry;

@@ -10,6 +10,7 @@
 #include "lmptype.h"
 
 #include <array>
+#include <unordered_map>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -30,7 +31,20 @@ class LawMemory {
   void resize(int atoms);
   void forget(int atom);
   void remember(int atom, const Entry &entry) { entries_[atom].push_back(entry); }
-  void copy(int from, int to) { entries_[to] = entries_[from]; }
+  void copy(int from, int to)
+  {
+    entries_[to] = entries_[from];
+    owner_[to] = owner_[from];
+  }
+
+  // Partners are known by the IDs that atoms have when they remember: commands between runs can give them
+  // others (delete_atoms does). Therefore an atom keeps the one that it had.
+  void set_owner(int atom, tagint id) { owner_[atom] = id; }
+  tagint owner(int atom) const { return owner_[atom]; }
+
+  // Gives the partners of an atom the IDs that they have now. What is remembered of partners that are not
+  // there is forgotten.
+  void rename_partners(int atom, const std::unordered_map<tagint, tagint> &id_now);
 
   // Returns the contact with a partner that lies on the side of the normal; nullptr if there is none. (Two
   // contacts with one partner are on different sides: through two periodic boundaries, or in the tip of a
@@ -42,10 +56,11 @@ class LawMemory {
 
   int number_of_entries(int atom) const { return static_cast<int>(entries_[atom].size()); }
 
-  // Buffer layout: number of entries, then the numbers of each.
+  // Buffer layout: the owner's ID, number of entries, then the numbers of each.
   static constexpr int ENTRY_SIZE = 9 + inelastic::ContactLaw::MOST_REMEMBERED;
-  static constexpr int packed_size(int entries) { return 1 + ENTRY_SIZE * entries; }
-  int packed_size_of(int atom) const { return packed_size(number_of_entries(atom)); }
+  static constexpr int packed_size(int entries) { return 2 + ENTRY_SIZE * entries; }
+  static int size_of_packed(const double *buffer)
+  { return packed_size(static_cast<int>(buffer[1])); }
   int pack(int atom, double *buffer) const;
   // Adds what is in the buffer to what the atom has. Returns how many numbers it read.
   int unpack(int atom, const double *buffer);
@@ -60,6 +75,7 @@ class LawMemory {
   int pack(int atom, int begin, int end, double *buffer) const;
 
   std::vector<std::vector<Entry>> entries_;
+  std::vector<tagint> owner_;
   std::vector<int> sent_;    // so many entries of an atom were in a message
 };
 

@@ -34,9 +34,13 @@ MotionCheck::MotionCheck(LAMMPS *lmp, const Fix *fix, Step &step, GhostExchange 
 {
 }
 
+void MotionCheck::check_other_fixes() const
+{ scene_.check(step_.settings.shorten); }
+
 void MotionCheck::begin_run()
 {
-  scene_.init({step_.settings.group_bit, step_.settings.frozen_bit, bodies_ != nullptr});
+  scene_.warn_of_hidden_pairs(
+      {step_.settings.group_bit, step_.settings.frozen_bit, bodies_ != nullptr});
   step_.continues = false;
 }
 

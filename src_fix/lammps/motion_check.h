@@ -24,12 +24,17 @@ class MotionCheck : protected Pointers {
   MotionCheck(class LAMMPS *lmp, const Fix *fix, Step &step, GhostExchange &ranks, AtomState &state,
               RigidMotion *bodies);
 
-  // At the start of a run. Errors and warnings of scene_check.h.
+  // Errors of scene_check.h.
+  void check_other_fixes() const;
+  // At the start of a run. Warnings of scene_check.h.
   void begin_run();
   // At the start of a run, when its box is set up.
   void set_up();
   // `pushing`: the last step pushed spheres apart, and the run's end has taken that out of velocities.
   void end_run(bool pushing);
+
+  // Tells whether the next step is the first of a run that is not set up (`run pre no`).
+  bool goes_on_without_setup() const { return step_.continues && !goes_on_; }
 
   // Before a step. Errors: velocities or forces that are no numbers, a box that has changed, atoms that
   // did not move as predicted. Collective.

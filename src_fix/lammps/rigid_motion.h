@@ -34,6 +34,7 @@ class RigidMotion final : public Mover, protected Pointers {
  public:
   RigidMotion(class LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state);
 
+  void find_fix() { members_.find_fix(); }
   void begin_run() { members_.begin_run(); }
   Fix *fix() const { return members_.fix(); }
 

@@ -22,7 +22,7 @@ bool SceneCheck::changes_periods(const Fix *fix) const
   return (fix->box_change & matters) != 0;
 }
 
-void SceneCheck::init(const Group &group) const
+void SceneCheck::check(bool shorten) const
 {
   // LAMMPS accepts neigh_modify include and comm_modify group for the group of atom_modify first alone.
   if (neighbor->includegroup)
@@ -30,7 +30,7 @@ void SceneCheck::init(const Group &group) const
         FLERR,
         "Fix inelastic does not work with neigh_modify include {}, which keeps pairs of other "
         "spheres out of the neighbour list: leave it out",
-        this->group->names[neighbor->includegroup]);
+        group->names[neighbor->includegroup]);
   if (atom->firstgroupname)
     error->all(
         FLERR,
@@ -49,8 +49,15 @@ void SceneCheck::init(const Group &group) const
           "Fix inelastic: fix {} ({}) changes diameters during a run, and the contacts do not "
           "follow them: use many short runs and change the diameters between them (adapt 0)",
           fix->id, fix->style);
+    const std::string style = fix->style;
+    if (shorten && (style == "move" || style == "pour" || style == "plumed"))
+      error->all(
+          FLERR,
+          "Fix inelastic: fix {} ({}) refuses every change of the time step, and shorten yes "
+          "changes it: leave out shorten, or this fix (frozen spheres also move by fix nve, "
+          "and fix deposit pours, too)",
+          fix->id, fix->style);
   }
-  warn_of_hidden_pairs(group);
 }
 
 // Collective.

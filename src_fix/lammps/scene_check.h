@@ -23,9 +23,12 @@ class SceneCheck : protected Pointers {
     bool bodies;       // the keyword rigid is given
   };
 
-  // At the start of a run. Errors: settings that keep spheres out of the neighbour list or ghosts away,
-  // and fixes that will change the box or radii. Warnings: settings that keep pairs apart. Collective.
-  void init(const Group &group) const;
+  // Errors: settings that keep spheres out of the neighbour list or ghosts away, and fixes that will change
+  // the box or radii, or do not bear that the time step is shortened.
+  void check(bool shorten) const;
+
+  // At the start of a run. Warnings: settings that keep pairs apart. Collective.
+  void warn_of_hidden_pairs(const Group &group) const;
 
   // Remembers the box as it is at the start of a run.
   void remember_box();
@@ -41,7 +44,6 @@ class SceneCheck : protected Pointers {
   std::vector<double> box() const;
 
   bool changes_periods(const Fix *fix) const;
-  void warn_of_hidden_pairs(const Group &group) const;
   template <typename One, typename Other>
   bool hides(const Group &group, One &&on_one_side, Other &&on_the_other) const;
   void warn_of_hidden(const std::string &what) const;

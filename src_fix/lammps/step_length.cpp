@@ -8,6 +8,7 @@
 #include "error.h"
 #include "fix.h"
 #include "force.h"
+#include "group.h"
 #include "modify.h"
 #include "neighbor.h"
 #include "output.h"
@@ -24,7 +25,8 @@ using inelastic::norm;
 
 namespace {
 
-constexpr double SHORTEST_STEP = 1.0e-6;    // of the regular one: below, something else is wrong
+constexpr double BELOW_ONE = 1.0 - 1.0e-12;    // by the round-off of a sum of a cutoff and a skin
+constexpr double SHORTEST_STEP = 1.0e-6;       // of the regular one: below, something else is wrong
 constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
 // An overlap of two spheres is not known better than this part of the largest coordinate. Each of the
 // three coordinates of either is rounded by up to half of the machine epsilon.
@@ -37,16 +39,48 @@ constexpr double MOST_STRAYED = 0.5;
 
 StepLength::StepLength(LAMMPS *lmp, Step &step, GhostExchange &ranks) :
     Pointers(lmp), step_(step), ranks_(ranks)
-{
-}
+{ step_.regular_timestep = update->dt; }
 
 /* ----------------------------------------------------------------------
    the neighbour list's reach
 ------------------------------------------------------------------------- */
 
-void StepLength::begin_run(bool one_cutoff)
+void StepLength::measure_radii()
 {
-  one_cutoff_ = one_cutoff;
+  double radii[2] = {0.0, -EXTREME};
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!step_.in_group(atom, i)) continue;
+    radii[0] = std::max(radii[0], atom->radius[i]);
+    radii[1] = std::max(radii[1], -atom->radius[i]);
+  }
+  ranks_.reduce(nullptr, 0, radii, 2);
+  step_.largest_radius = radii[0];
+  smallest_radius_ = -radii[1];
+  if (step_.largest_radius > 0.0 && !(smallest_radius_ > 0.0))
+    error->all(FLERR, "Fix inelastic: an atom of group {} has no radius: set its diameter",
+               name_of_group());
+  if (step_.largest_radius > 0.0 && step_.settings.tolerance >= smallest_radius_)
+    error->all(
+        FLERR,
+        "Fix inelastic: the tolerance {:.4g}, the largest overlap allowed, must be below the "
+        "smallest radius of group {}, {:.4g}",
+        step_.settings.tolerance, name_of_group(), smallest_radius_);
+}
+
+const char *StepLength::name_of_group() const
+{
+  const int *const bits = group->bitmask;
+  return group->names[std::find(bits, bits + group->ngroup, step_.settings.group_bit) - bits];
+}
+
+void StepLength::choose_list()
+{
+  constexpr double SIMILAR = 1.1;
+  one_cutoff_ = step_.largest_radius <= SIMILAR * smallest_radius_;
+}
+
+void StepLength::begin_run()
+{
   restore();
   step_.regular_timestep = update->dt;
 }
@@ -58,31 +92,61 @@ void StepLength::list_built()
   radius_at_build_.assign(atom->radius, atom->radius + atom->nlocal);
   for (int i = 0; i < atom->nlocal; ++i) std::copy_n(x[i], 3, &position_at_build_[3 * i]);
 
-  double largest[2] = {0.0, 0.0};
+  measure_radii();
+  double largest = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!step_.in_group(atom, i)) continue;
-    largest[0] = std::max(largest[0], atom->radius[i]);
-    for (int d = 0; d < 3; ++d) largest[1] = std::max(largest[1], std::abs(x[i][d]));
+    for (int d = 0; d < 3; ++d) largest = std::max(largest, std::abs(x[i][d]));
   }
-  ranks_.reduce(nullptr, 0, largest, 2);
-  step_.largest_radius = largest[0];
+  ranks_.reduce(nullptr, 0, &largest, 1);
   const double tolerance = step_.settings.tolerance;
-  const double resolution = POSITIONS_RESOLVED * (largest[1] + step_.largest_radius);
+  const double resolution = POSITIONS_RESOLVED * (largest + step_.largest_radius);
   if (tolerance < resolution)
     error->all(FLERR,
                "Fix inelastic: the tolerance {:.4g} is below the round-off of positions: with "
                "coordinates of up to {:.4g} give at least {:.2g}",
-               tolerance, largest[1], 1.05 * resolution);
+               tolerance, largest, 1.05 * resolution);
+  check_reach();
+  // With neighbor multi pairs are looked for as far as the pair style reaches for their types.
+  if (neighbor->style == Neighbor::MULTI || neighbor->style == Neighbor::MULTI_OLD)
+    check_reach_of_types();
+  measure_farthest();
+  list_reach_ = one_cutoff_ ? neighbor->cutneighmin - 2.0 * step_.largest_radius : neighbor->skin;
+}
+
+void StepLength::check_reach() const
+{
   const double widest = 2.0 * step_.largest_radius + neighbor->skin;
   const double listed = one_cutoff_ ? neighbor->cutneighmin : neighbor->cutneighmax;
-  if (listed < widest * (1.0 - 1.0e-12))
+  if (listed < widest * BELOW_ONE)
     error->all(
         FLERR,
         "Fix inelastic: the neighbour list reaches {:.6g} between centres but needs {:.6g}: give "
         "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
         listed, widest, 2.0 * step_.largest_radius);
-  measure_farthest();
-  list_reach_ = one_cutoff_ ? listed - 2.0 * step_.largest_radius : neighbor->skin;
+}
+
+void StepLength::check_reach_of_types() const
+{
+  std::vector<double> mine(atom->ntypes + 1, 0.0), radius(mine.size());
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (step_.in_group(atom, i))
+      mine[atom->type[i]] = std::max(mine[atom->type[i]], atom->radius[i]);
+  MPI_Allreduce(mine.data(), radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE, MPI_MAX,
+                world);
+  for (int one = 1; one <= atom->ntypes; ++one)
+    for (int other = one; other <= atom->ntypes; ++other) {
+      if (radius[one] == 0.0 || radius[other] == 0.0) continue;
+      const double sum = radius[one] + radius[other];
+      const double listed = std::sqrt(neighbor->cutneighsq[one][other]);
+      if (listed < (sum + neighbor->skin) * BELOW_ONE)
+        error->all(
+            FLERR,
+            "Fix inelastic: with neighbor multi the neighbour list reaches {:.6g} between "
+            "centres of atom types {} and {} but needs {:.6g}: give pair_style zero a cutoff "
+            "of at least {:.6g} for them",
+            listed, one, other, sum + neighbor->skin, sum);
+    }
 }
 
 // A motion that all share costs no reach, but takes atoms away from their rank and their box. LAMMPS
@@ -275,6 +339,12 @@ void StepLength::restore()
 {
   if (shortened_ && update->dt != step_.regular_timestep) set_timestep(step_.regular_timestep);
   shortened_ = false;
+}
+
+void StepLength::set_regular_timestep(double timestep)
+{
+  set_timestep(timestep);
+  step_.regular_timestep = timestep;
 }
 
 bool StepLength::is_shortened() const

@@ -20,12 +20,21 @@ class StepLength : protected Pointers {
  public:
   StepLength(class LAMMPS *lmp, Step &step, GhostExchange &ranks);
 
-  // At the start of a run. `one_cutoff`: the neighbour list is by one cutoff for all pairs, not by their
-  // radii.
-  void begin_run(bool one_cutoff);
+  // Finds the largest and smallest radius of the group. Errors: no radius, or one within the tolerance.
+  // Collective.
+  void measure_radii();
+  double smallest_radius() const { return smallest_radius_; }    // [length]
+  // Chooses the kind of neighbour list for a run: by one cutoff for all pairs, if radii are so similar that this
+  // wastes little, or by the radii of each pair.
+  void choose_list();
+  bool has_one_cutoff() const { return one_cutoff_; }
 
-  // The neighbour list is new: takes the positions, and how far the list reaches. Errors: a tolerance
-  // below the round-off of positions, and a list that is too short for the spheres.
+  // At the start of a run.
+  void begin_run();
+
+  // The neighbour list is new: takes the positions, and how far the list reaches. Errors: those of
+  // measure_radii(), a tolerance below the round-off of positions, and a list that is too short for the
+  // spheres. Collective.
   void list_built();
 
   // At the start of a step: a time step that was shortened is the regular one again. Collective.
@@ -52,12 +61,16 @@ class StepLength : protected Pointers {
   // The timestep command, also where no run is set up after it (run pre no).
   void timestep_was_set();
   bool is_shortened() const;
-  void set_timestep(double timestep);
+  void set_regular_timestep(double timestep);
 
   double reach() const { return list_reach_; }    // [length]
   long shortened_steps() const { return shortened_steps_; }
 
  private:
+  const char *name_of_group() const;
+  void check_reach() const;
+  void check_reach_of_types() const;
+  void set_timestep(double timestep);
   void measure_farthest();
   double part_of_farthest();
   double spread(const double *values);
@@ -67,6 +80,7 @@ class StepLength : protected Pointers {
 
   Step &step_;
   GhostExchange &ranks_;
+  double smallest_radius_ = 0.0;    // [length] in the group, on all ranks
   bool one_cutoff_ = true;
   double list_reach_ = 0.0;    // [length] the gap beyond which a pair may lack in a new list
   double spread_at_start_ =

@@ -56,13 +56,14 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
 }
 
 bool WallConstraints::is_periodic() const
-{ return !domain->triclinic && (domain->xperiodic || domain->yperiodic || domain->zperiodic); }
+{ return domain->xperiodic || domain->yperiodic || domain->zperiodic; }
 
 // Moves a point beyond a periodic boundary to the other side. Tells whether it was beyond one. (LAMMPS
 // shows the walls of a region only at that side of the boundary where they are.)
 bool WallConstraints::wrap(RegionWalls::Viewpoint &from) const
 {
   if (!is_periodic()) return false;
+  if (domain->triclinic) return wrap_tilted(from);
   bool wrapped = false;
   for (int d = 0; d < 3; ++d) {
     const double beyond =
@@ -74,6 +75,23 @@ bool WallConstraints::wrap(RegionWalls::Viewpoint &from) const
     wrapped = true;
   }
   return wrapped;
+}
+
+// The same in a box whose periods are not at right angles.
+bool WallConstraints::wrap_tilted(RegionWalls::Viewpoint &from) const
+{
+  double of_box[3], widths[3] = {0.0, 0.0, 0.0};
+  domain->x2lamda(from.where, of_box);
+  for (int d = 0; d < 3; ++d)
+    if (domain->periodicity[d] && (of_box[d] < 0.0 || of_box[d] > 1.0))
+      widths[d] = std::floor(of_box[d]);
+  if (widths[0] == 0.0 && widths[1] == 0.0 && widths[2] == 0.0) return false;
+  const double *const h = domain->h;
+  from.image[0] = h[0] * widths[0] + h[5] * widths[1] + h[4] * widths[2];
+  from.image[1] = h[1] * widths[1] + h[3] * widths[2];
+  from.image[2] = h[2] * widths[2];
+  for (int d = 0; d < 3; ++d) from.where[d] -= from.image[d];
+  return true;
 }
 
 // Points where the step takes those atoms for which the constraint of a wall may be inexact. A

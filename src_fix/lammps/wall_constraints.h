@@ -56,6 +56,7 @@ class WallConstraints : protected Pointers {
   // Tells whether only walls without exact constraints can be met at the end of a step.
   bool only_inexact() const { return !bodies_ && !is_periodic() && !step_.settings.law; }
   bool wrap(RegionWalls::Viewpoint &) const;
+  bool wrap_tilted(RegionWalls::Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
   const Viewpoints &viewpoints(const double *velocity, double beyond);

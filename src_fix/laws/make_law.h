@@ -11,9 +11,6 @@ struct NamedLaw {
   MakeLaw make;
 };
 
-// Returns all laws: those of this folder, then those that were added.
-const std::vector<NamedLaw> &known_laws();
-
 // Adds a law, or replaces one that was added before. Returns what is wrong: the name is that of a law of this
 // folder; otherwise an empty text.
 std::string add_law(const std::string &name, MakeLaw make);

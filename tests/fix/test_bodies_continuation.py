@@ -105,6 +105,16 @@ def test_two_runs(
     assert_same(last_positions(tmp_path), undisturbed[inertia])
 
 
+@pytest.mark.parametrize("inertia", INERTIAS)
+def test_a_restart_file_before_run_pre_no(inertia: str, tmp_path: Path, lmp: Runner) -> None:
+    """LAMMPS initialises all fixes to write it; the momenta of bodies are carried on."""
+    whole = cloud(tmp_path / "whole", inertia) + DUMP_LAST + f"run {STEPS}\n"
+    lmp(whole, into="whole")
+    parts = "run 20\nwrite_restart a.restart\nrun 80 pre no\n"
+    lmp(cloud(tmp_path, inertia) + DUMP_LAST + parts)
+    assert (last_positions(tmp_path) == last_positions(tmp_path / "whole")).all()
+
+
 def reordered(deck: str, order: str) -> str:
     """Return the deck with its fixes in another order, named by initials."""
     pull = next(line for line in deck.splitlines() if line.startswith("fix gravity"))

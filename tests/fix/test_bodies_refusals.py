@@ -100,6 +100,11 @@ LINES = {
         "group some id 2:100\nfix contact some inelastic",
         ["molecule 1", "group", "partly"],
     ),
+    "no body in the group": (
+        "fix contact all inelastic",
+        "group loose subtract all bodies\nfix contact loose inelastic",
+        ["no body of fix bodies is in the fix's group"],
+    ),
     "two fixes move the bodies": (
         "thermo 1\n",
         "fix again bodies nve\nthermo 1\n",
@@ -179,6 +184,17 @@ def with_molecule(folder: Path, molecule: int) -> str:
     last = f" 1.0 {BODIES.molecules.max()}\n"
     data.write_text(changed(data.read_text(), last, f" 1.0 {molecule}\n"))
     return text
+
+
+def test_bodies_without_diameters(tmp_path: Path, lmp: Runner, refused: Refused) -> None:
+    """A run of no steps may set up the bodies of point masses; in others they would not touch."""
+    text = deck(tmp_path, "point")
+    # The recipe of the page without its fix adapt, which gives the diameters back.
+    text = re.sub(r"(?m)^(fix grow|unfix grow|run 0|group size).*\n", "", text)
+    text = changed(text, "set group bodies diameter 0", "set group all diameter 0")
+    lmp(text + "run 0\n")
+    assert "set diameters before a run of more than 0 steps" in refused(text + "run 5\n")
+    assert "set diameters before a run" in refused(text + "run 0\nrun 5 pre no\n")
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

@@ -191,6 +191,71 @@ def test_a_restart_file_of_a_restart_file(tmp_path: Path, lmp: Runner) -> None:
     assert abs(steps_held(result) - 20) <= 1
 
 
+def hanging_pair(folder: Path) -> str:
+    """Return two spheres below the ceiling, and a loose one with the first ID."""
+    points = [[3.0, 3.0, 0.0], [0.0, 10 - RADIUS, 0.0], [0.0, 10 - 3 * RADIUS, 0.0]]
+    box = ((-5.0, 5.0), (0.0, 10.0), (-5.0, 5.0))
+    groups = "group loose id 1\ngroup pair id 2 3\n" + PULL.replace("pull all", "pull pair")
+    return deck_of(points, folder, box=box, timestep=0.01, fixes=groups)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("written", [False, True])
+@pytest.mark.parametrize("change", ["delete_atoms group loose", "reset_atoms id sort yes"])
+def test_ids_that_change(
+    change: str, written: bool, ranks: int, tmp_path: Path, lmp: Runner
+) -> None:
+    """The pair goes on hanging when its spheres get other IDs, also from a restart file then."""
+    deck = hanging_pair(tmp_path)
+    pressed = pull(1.0) + f"run 50\n{change}\n"
+    hanging = pull(-1.0) + "run 30\n"
+    if written:
+        lmp(deck + pressed + "write_restart half.restart\n", ranks=ranks)
+        again = deck.replace("read_data spheres.data", "read_restart half.restart")
+        again = again.replace("group loose id 1\ngroup pair id 2 3\n", "")
+        result = lmp(again + hanging, ranks=ranks)
+    else:
+        result = lmp(deck + pressed + hanging, ranks=ranks)
+    assert (result.thermo[HELD] == 2).all()
+
+
+def test_atoms_deleted_before_the_fix(
+    tmp_path: Path, lmp: Runner, refused: Callable[..., str]
+) -> None:
+    """LAMMPS gives a fix what a restart file holds for it by the places of atoms in its arrays."""
+    deck = hanging_pair(tmp_path)
+    lmp(deck + pull(1.0) + "run 50\nwrite_restart half.restart\n")
+    groups = "group loose id 1\ngroup pair id 2 3\n"
+    deck = deck.replace("read_data spheres.data", "read_restart half.restart")
+    line = refused(deck.replace(groups, "group loose id 1\ndelete_atoms group loose\n"))
+    assert "define the fix after read_restart before atoms are deleted" in line
+
+
+def test_a_partner_that_is_gone(tmp_path: Path, lmp: Runner) -> None:
+    """What was stored with it is not that of another sphere with its ID in its place."""
+    box = ((-5.0, 5.0), (0.0, 10.0), (-5.0, 5.0))
+    points = [[0.0, 10 - RADIUS, 0.0], [0.0, 10 - 3 * RADIUS, 0.0]]
+    deck = deck_of(points, tmp_path, box=box, timestep=0.01)
+    change = f"""
+group lower id 2
+delete_atoms group lower compress no
+create_atoms 1 single 0 {10 - 3 * RADIUS} 0
+set atom 2 diameter {2 * RADIUS} density 1
+"""
+    result = lmp(deck + pull(1.0) + "run 50\n" + change + pull(-1.0) + "run 30\n")
+    assert result.thermo[HELD][-1] == 1
+
+
+def test_defined_again(tmp_path: Path, lmp: Runner) -> None:
+    """The stores go with the fix, and the user is told."""
+    deck = deck_of([0.0, RADIUS, 0.0], tmp_path, box=((-5.0, 5.0), (0.0, 20.0), (-5.0, 5.0)))
+    again = f"fix contact all inelastic {EPS} region container law gluey\n"
+    result = lmp(deck + pull(-1.0) + "run 5\n" + again + pull(1.0) + "run 5\n")
+    told = [line for line in result.warnings if "remembers of 1 contacts" in line]
+    assert len(told) == 1
+    assert result.thermo[HELD][-1] == 0
+
+
 def test_restarted_without_its_memory(
     tmp_path: Path, lmp: Runner, refused: Callable[..., str]
 ) -> None:

@@ -468,6 +468,41 @@ def test_an_obstacle_behind_a_periodic_boundary(speed: float, tmp_path: Path, lm
     assert farthest >= 0.1 - RADIUS - 2 * EPS  # it has met the post
 
 
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_an_obstacle_behind_a_tilted_boundary(along: str, tmp_path: Path, lmp: Runner) -> None:
+    """The period along y of a triclinic box also shifts along x, here by 0.5."""
+    # The image of the obstacle that the sphere meets head-on lies beyond the boundary.
+    start, rock, image = {
+        "x": ((3.8, 2.0), (0.95, 2.0), (4.95, 2.0)),
+        "y": ((2.0, 3.8), (1.5, 0.7), (2.0, 4.7)),
+    }[along]
+    deck = f"""
+units lj
+atom_style sphere
+region space prism 0 4 0 4 0 4 0.5 0 0
+create_box 1 space
+create_atoms 1 single {start[0]} {start[1]} 2
+set group all diameter {2 * RADIUS} density 1
+velocity all set {int(along == "x")} {int(along == "y")} 0
+pair_style zero {2 * RADIUS}
+pair_coeff * *
+neighbor 0.3 bin
+timestep 0.01
+region rock sphere {rock[0]} {rock[1]} 2 0.5 side out
+fix contact all inelastic {EPS} region rock
+fix motion all nve
+dump particles all custom 1 particles.dump id xu yu
+dump_modify particles format float %.17g
+"""
+    lmp(deck + "run 120\n")
+    path = np.array(
+        [[frame["xu"][0], frame["yu"][0]] for frame in read_dump(tmp_path / "particles.dump")]
+    )
+    distance = np.linalg.norm(path - image, axis=1)
+    assert distance.min() >= 0.5 + RADIUS - EPS * SLACK
+    assert distance.min() <= 0.5 + RADIUS + EPS  # it has met the obstacle
+
+
 def test_a_floor_that_leaves_is_seen_where_it_stands(tmp_path: Path, lmp: Runner) -> None:
     """The overlap that is reported is that of now, however fast the floor falls away."""
     deck = moving_scene(

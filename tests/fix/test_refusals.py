@@ -81,7 +81,18 @@ def test_the_scene_itself_runs(tmp_path: Path, lmp: Runner) -> None:
         ("fix contact all inelastic 1e-5 record a*.npz", ["record FILE every N"]),
         ("fix contact all inelastic 1e-5 record a*.npz every 0", ["every", "at least 1"]),
         ("fix contact all inelastic 1e-5 record a.npz every 1", ["a.npz", "*"]),
+        ("fix contact all inelastic 1e-5 frozen all frozen all", ["frozen", "given twice"]),
+        ("fix contact all inelastic 1e-5 maxiter 9 warn maxiter 8", ["maxiter", "given twice"]),
         ("fix contact nobody inelastic 1e-5", ["nobody"]),
+        (
+            "group one id 1\ngroup two id 2\nfix contact one inelastic 1e-5 frozen two",
+            ["1 of the frozen group two", "not in group one"],
+        ),
+        (
+            "group two id 2\nfix two two move linear 1 0 0\n"
+            "fix contact all inelastic 1e-5 frozen two shorten yes",
+            ["fix two (move)", "leave out shorten"],
+        ),
         (
             "fix contact all inelastic 1e-5\nfix contact2 all inelastic 1e-5",
             ["More than one fix inelastic"],
@@ -325,6 +336,28 @@ def test_a_free_fall_with_shortened_steps_takes_its_time(tmp_path: Path, lmp: Ru
     y = np.array([frame["y"][0] for frame in read_dump(tmp_path / "particles.dump")])
     # Velocity-Verlet with steps that change is exact to first order in a step at worst.
     assert y == pytest.approx(1.8 - 9.81 * time**2 / 2, abs=9.81 * time[-1] * 0.005)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_types_whose_cutoff_is_too_short(
+    ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
+) -> None:
+    """With neighbor multi LAMMPS looks for pairs as far as the cutoffs of their types reach."""
+    text = scene(
+        [[0.2, RADIUS, 0.2], [0.2, 5 * RADIUS, 0.2], [0.7, 0.5, 0.7]],
+        [RADIUS, RADIUS, 2 * RADIUS],
+        tmp_path,
+        tolerance=EPS,
+    ).replace(
+        "read_data spheres.data", "read_data spheres.data extra/atom/types 1\nset atom 3 type 2"
+    )
+    text = re.sub(r"(?m)^neighbor (\S+) bin", r"neighbor \1 multi", text)
+    assert "multi" in text
+    short = f"pair_coeff 1 1 {0.5 * RADIUS}\n"
+    error = refused(text + short + "run 2\n", ranks=ranks)
+    assert "atom types 1 and 1" in error
+    assert f"a cutoff of at least {2 * RADIUS:g}" in error
+    lmp(text + f"pair_coeff 1 1 {2 * RADIUS}\nrun 2\n", ranks=ranks)
 
 
 @pytest.mark.parametrize("what", ["wrong side", "far outside", "on the wall", "moved away"])

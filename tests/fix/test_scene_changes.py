@@ -14,7 +14,9 @@ from tests.fix.lammps_run import Run, Runner
 from tests.fix.scenes import (
     DUMP_CONTACTS,
     DUMP_PARTICLES,
+    GRAVITY,
     deepest_pair,
+    mass,
     random_points,
     read_dump,
     scene,
@@ -410,6 +412,58 @@ def test_run_every_after_a_shortened_step(tmp_path: Path, lmp: Runner) -> None:
     assert (tmp_path / "particles.dump").read_bytes() == first
 
 
+BETWEEN = ["write_restart a.restart", "write_data a.data", "balance 1.0 shift x 5 1.1"]
+
+
+@pytest.mark.parametrize("between", BETWEEN)
+def test_commands_before_run_pre_no(between: str, tmp_path: Path, lmp: Runner) -> None:
+    """LAMMPS initialises all fixes for these, and sets no run up after them."""
+    lmp(falling(tmp_path / "whole") + DUMP_PARTICLES + "run 7\n", into="whole")
+    parts = f"run 3\n{between}\nrun 4 pre no\n"
+    lmp(falling(tmp_path) + DUMP_PARTICLES + parts)
+    expected = read_dump(tmp_path / "whole" / "particles.dump")
+    for frame, other in zip(read_dump(tmp_path / "particles.dump"), expected, strict=True):
+        # The round-off of where LAMMPS's list was built.
+        assert frame.rows == pytest.approx(other.rows, abs=1e-12)
+
+
+@pytest.mark.parametrize("between", BETWEEN)
+def test_wall_forces_stay_until_the_next_step(between: str, tmp_path: Path, lmp: Runner) -> None:
+    """They are 0 before the first."""
+    text = scene([0.5, RADIUS, 0.5], RADIUS, tmp_path, tolerance=EPS)
+    show = 'print "FORCE $(f_contact[3][2]:%.6f)"\n'
+    weight = -GRAVITY * float(mass(RADIUS))
+    screen = lmp(text + show + f"run 10\n{between}\n" + show).screen
+    first, second = re.findall(r"(?m)^FORCE (\S+)", screen)
+    assert float(first) == 0.0
+    # The force of a contact at rest, to the digits that are printed.
+    assert float(second) == pytest.approx(weight, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("region container delete", "region container does not exist"),
+        ("fix_modify contact tolerance 5", "must be below the smallest radius"),
+        ("unfix motion\ngroup still delete", "frozen group still does not exist any more"),
+    ],
+)
+def test_changes_before_run_pre_no(
+    change: str, words: str, tmp_path: Path, refused: Refused
+) -> None:
+    """What a set-up would refuse is refused without one."""
+    text = scene(
+        [[0.5, RADIUS, 0.5], [0.2, 0.5, 0.2]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        fixes="group still id 2\ngroup moving subtract all still",
+        motion="fix motion moving nve",
+        options="region container frozen still",
+    )
+    assert words in refused(text + f"run 5\n{change}\nrun 5 pre no\n")
+
+
 @pytest.mark.parametrize(
     "after",
     [
@@ -447,6 +501,36 @@ def test_restart_files_tell_the_regular_time_step(
     result = lmp(first + write + "clear\n" + again + "velocity all set 0 0 0\nrun 2\n")
     assert result.runs[0]["Dt"][-1] < 0.01
     assert (result.thermo["Dt"] == 0.01).all()
+
+
+def test_a_frozen_group_whose_number_another_one_has(tmp_path: Path, refused: Refused) -> None:
+    """Groups are known by their names: the new one would freeze what is in it."""
+    text = scene(
+        [[0.5, RADIUS, 0.5], [0.2, 0.5, 0.2]],
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        fixes="group still id 2",
+        options="region container frozen still",
+    )
+    error = refused(text + "run 0\ngroup still delete\ngroup other id 1\nrun 1\n")
+    assert "frozen group still does not exist any more" in error, error
+
+
+@pytest.mark.parametrize("diameter", [0.0, EPS])
+def test_spheres_made_too_small_during_a_run(
+    diameter: float, tmp_path: Path, refused: Refused
+) -> None:
+    """The set-up of a run refuses such radii at once."""
+    text = scene([0.5, RADIUS, 0.5], RADIUS, tmp_path, tolerance=EPS)
+    (tmp_path / "small.mol").write_text(
+        f"# a sphere\n\n1 atoms\n\nCoords\n\n1 0 0 0\n\nTypes\n\n1 1\n\nDiameters\n\n1 {diameter}\n"
+        "\nMasses\n\n1 1e-9\n"
+    )
+    text += "region top block 0.1 0.9 3 4 0.1 0.9\nmolecule small small.mol\n"
+    text += "fix feed all deposit 1 0 5 7 mol small region top id max\n"
+    error = refused(text + "run 20\n")
+    assert ("has no radius" if diameter == 0 else "below the smallest radius") in error, error
 
 
 def test_run_pre_no_in_a_bad_start(tmp_path: Path, refused: Refused) -> None:

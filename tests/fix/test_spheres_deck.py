@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -72,3 +73,56 @@ def test_spheres_that_fit_exactly(seed: int, lmp: Runner) -> None:
     steps = {"steps_agitated": 20, "steps_settling": 1500, "dump_every": 500}
     result = lmp(deck, variables={"particles": 30, "diameter": 0.2, "seed": seed, **steps})
     assert result.runs[-1]["overlap"].max() <= 0.00001 * 0.1 * (1 + 1e-6)  # round-off
+
+
+def start_file(box: tuple[float, float], x: float) -> str:
+    """Return a data file of two spheres that overlap and rise, in a box of this width."""
+    low, high = box
+    return f"""# spheres
+
+2 atoms
+1 atom types
+
+{low} {high} xlo xhi
+0 5 ylo yhi
+{low} {high} zlo zhi
+
+Atoms # sphere
+
+1 1 0.2 1 {x} 1 0.5
+2 1 0.2 1 {x} 1.1 0.5
+
+Velocities
+
+1 0 10 0 0 0 0
+2 0 10 0 0 0 0
+"""
+
+
+def test_a_start_that_moves_in_a_larger_box(lmp: Runner, tmp_path: Path) -> None:
+    """Spheres start at rest, where they are pushed to, and the box is the container."""
+    deck = (files("lammps_inelastic.inputs") / "spheres.in").read_text()
+    (tmp_path / "start.data").write_text(start_file((-1, 2), 0.5))
+    few = {name: 2 for name in VARIABLES} | {"diameter": 0.2, "start": "start.data"}
+    lmp(deck, variables=few)
+    first = read_particle_frame(tmp_path / "out" / "particles.lammpsdump", 0)
+    # Half of the overlap on each side, within the tolerance; 1e-12 for round-off.
+    middle = first.positions.mean(axis=0)
+    assert middle == pytest.approx([0.5, 1.05, 0.5], abs=1e-12)
+    assert np.ptp(first.positions[:, 1]) == pytest.approx(0.2, abs=2 * 0.0005 * 0.1)
+    assert first.box.tolist() == [[0, 1], [0, 5], [0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("box", "x", "named"),
+    [
+        ((0.1, 1), 0.5, "the box of start.data must hold the container"),
+        ((-1, 2), 1.5, "every sphere in start.data must have its centre in the container"),
+    ],
+)
+def test_a_start_that_does_not_fit(
+    box: tuple[float, float], x: float, named: str, tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    deck = (files("lammps_inelastic.inputs") / "spheres.in").read_text()
+    (tmp_path / "start.data").write_text(start_file(box, x))
+    assert named in refused(deck, variables={"diameter": 0.2, "start": "start.data"})

@@ -1,4 +1,4 @@
-"""The stored results are of an earlier fix: today's must make the same runs, to the last bit."""
+"""The stored results are of an earlier fix and decks: today's make the same runs, to the bit."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from lammps_inelastic.workflow.decks import Deck
 from lammps_inelastic.workflow.provenance import code
-from lammps_inelastic.workflow.same_runs import FILE, as_good_as_todays
+from lammps_inelastic.workflow.same_runs import FILE
 from tests import building
 from tests.benchmark.earlier import check_out
 from tests.pouring import FEW_STEPS, NO_STEPS, run_deck, shipped_deck
@@ -28,17 +29,44 @@ POURED: dict[str, tuple[str, dict[str, object]]] = {
 }
 
 
+class Code:
+    """A fix and its decks: today's, or those of the commit that made the results.
+
+    Attributes
+    ----------
+    plugin : folder of the fix; None for the one that is installed
+    """
+
+    def __init__(self, plugin: Path | None, decks: Path | None) -> None:
+        self.plugin = plugin
+        self._decks = decks
+
+    def run(self, folder: Path, name: str, variables: dict[str, object]) -> None:
+        """Run one of the decks in a folder."""
+        deck = (
+            shipped_deck(name) if self._decks is None else (self._decks / f"{name}.in").read_text()
+        )
+        run_deck(folder, deck, variables, self.plugin)
+
+
+TODAYS = Code(None, None)
+
+
 @pytest.fixture(scope="module")
-def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the plugin of the commit that made the results."""
+def earlier(tmp_path_factory: pytest.TempPathFactory) -> Code:
+    """Return the fix and the decks of the commit that made the results."""
     content = tomllib.loads((RESULTS / FILE).read_text())
     if code()["sources"] == content["made_by"]:
         # There is no other fix to compare with: after a release whose results are all run again.
         pytest.skip("the results are of this fix")
-    assert content["made_by"] in as_good_as_todays(RESULTS)
+    assert code()["sources"] in content["same"]
     folder = tmp_path_factory.mktemp("earlier")
     check_out(content["commit"], folder / "sources")
-    return building.plugin(folder / "sources", folder / "build")
+    decks = folder / "sources" / "inputs"
+    for name, fingerprints in content["decks"].items():
+        text = (decks / f"{name}.in").read_text()
+        assert Deck(name, text, shipped=True).fingerprint in fingerprints
+    return Code(building.plugin(folder / "sources", folder / "build"), decks)
 
 
 def dumps(folder: Path) -> dict[str, bytes]:
@@ -48,25 +76,24 @@ def dumps(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("scene", POURED)
-def test_poured_packings_are_the_same(scene: str, earlier: Path, tmp_path: Path) -> None:
+def test_poured_packings_are_the_same(scene: str, earlier: Code, tmp_path: Path) -> None:
     deck, variables = POURED[scene]
-    all_variables = {**SIZE, **FEW_STEPS, **variables}
-    for name, plugin in (("then", earlier), ("now", None)):
-        run_deck(tmp_path / name, shipped_deck(deck), all_variables, plugin)
+    for name, code_of in (("then", earlier), ("now", TODAYS)):
+        code_of.run(tmp_path / name, deck, {**SIZE, **FEW_STEPS, **variables})
     assert dumps(tmp_path / "then") == dumps(tmp_path / "now")
 
 
 @pytest.mark.parametrize("particle", ["spheres", "dimers"])
 def test_packings_that_settle_and_respond_are_the_same(
-    particle: str, earlier: Path, tmp_path: Path
+    particle: str, earlier: Code, tmp_path: Path
 ) -> None:
-    run_deck(tmp_path / "start", shipped_deck(particle), {**SIZE, **NO_STEPS})
+    TODAYS.run(tmp_path / "start", particle, {**SIZE, **NO_STEPS})
     common = {"packing": str(tmp_path / "start" / "packing.restart"), "diameter": SIZE["diameter"]}
     settling = {**common, "particle": particle, "time_settling": 1.2}
     response = {**common, "change": "tilt", "angle": 20, "steps_changing": 60}
-    for name, plugin in (("then", earlier), ("now", None)):
-        run_deck(tmp_path / name / "settling", shipped_deck("settling"), settling, plugin)
+    for name, code_of in (("then", earlier), ("now", TODAYS)):
+        code_of.run(tmp_path / name / "settling", "settling", settling)
         if particle == "spheres":
-            run_deck(tmp_path / name / "response", shipped_deck("response"), response, plugin)
+            code_of.run(tmp_path / name / "response", "response", response)
     for deck in ("settling", "response") if particle == "spheres" else ("settling",):
         assert dumps(tmp_path / "then" / deck) == dumps(tmp_path / "now" / deck)

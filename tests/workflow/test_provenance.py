@@ -20,7 +20,7 @@ from lammps_inelastic.workflow.gather import adopt_results
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.provenance import code, differs
 from lammps_inelastic.workflow.report.sections.provenance import codes_line
-from lammps_inelastic.workflow.same_runs import FILE, as_good_as_todays
+from lammps_inelastic.workflow.same_runs import FILE, SameRuns, same_runs
 from lammps_inelastic.workflow.store import Result, read_result, write_result
 from lammps_inelastic.workflow.study import read_study
 from tests.workflow.study_run import run_few
@@ -182,6 +182,9 @@ def test_stored_results_of_a_fix_with_the_same_runs_are_taken(few: Path, tmp_pat
     [
         ("made_by = ", "cannot be read"),
         ('made_by = "a"', "made_by must be a hash of sources, and same a list of hashes"),
+        ('made_by = "a"\nsame = [1]', "made_by must be a hash of sources, and same a list of"),
+        ('made_by = "a"\nsame = []\ndecks = 1', "decks must be lists of fingerprints by the names"),
+        ('made_by = "a"\nsame = []\ndecks = {a = "b"}', "decks must be lists of fingerprints"),
         ('same = ["a"]', "made_by must be a hash of sources, and same a list of hashes"),
     ],
 )
@@ -190,7 +193,7 @@ def test_a_file_of_same_runs_that_is_not_as_it_must_be(
 ) -> None:
     (tmp_path / FILE).write_text(content)
     with pytest.raises(WorkflowError, match=re.escape(f"{tmp_path / FILE}: {said}")):
-        as_good_as_todays(tmp_path)
+        same_runs(tmp_path)
 
 
 def test_a_changed_deck_is_other_code(few: Path) -> None:
@@ -198,6 +201,11 @@ def test_a_changed_deck_is_other_code(few: Path) -> None:
     record = dict(read_result(results_of(few)[0]).record)
     assert differs(case, record) == ""
     assert differs(case, {**record, "fingerprint": "0"}) == "another version of the deck"
+    known = SameRuns(decks={case.deck: ("0",)})
+    assert differs(case, {**record, "fingerprint": "0"}, known) == ""
+    assert differs(case, {**record, "fingerprint": "0+0"}, known) == "another version of the deck"
+    other = SameRuns(decks={"other": ("0",)})
+    assert differs(case, {**record, "fingerprint": "0"}, other) == "another version of the deck"
 
 
 def test_the_report_says_whether_packings_are_of_one_code(few: Path) -> None:
