@@ -33,12 +33,7 @@ from .fabric import fabric_tensor
 from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
 from .geometry import particles_inside
 from .measurement import PackingMeasurement, measure_packing
-from .necks import (
-    dimer_volume,
-    neck_volume,
-    packing_fraction_with_necks,
-    with_scaled_necks,
-)
+from .necks import dimer_volume, neck_volume, packing_fraction_with_necks
 from .neighbours import DistanceContacts, contacts_by_distance
 from .network import NetworkDifference, contact_graph, draw_network, network_difference
 from .orientation import Orientation, dimer_orientation
@@ -52,7 +47,7 @@ from .packing import (
     measure_packing_fraction,
     packing_fraction,
 )
-from .particles import ParticleDump, ParticleFrame, read_particle_frame
+from .particles import ParticleDump, ParticleFrame, check_not_periodic, read_particle_frame
 from .pictures import draw_packing
 from .profile import (
     WallProfile,
@@ -122,6 +117,7 @@ __all__ = [
     "binned_exponent",
     "bond_order",
     "check_contacts",
+    "check_not_periodic",
     "contact_counts",
     "contact_graph",
     "contacts_by_distance",
@@ -167,7 +163,6 @@ __all__ = [
     "voxel_slices",
     "wall_profile",
     "wall_profile_monte_carlo",
-    "with_scaled_necks",
     "write_raw",
     "write_stl",
     "write_tiff",

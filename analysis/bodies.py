@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InputError
-from .geometry import FloatArray, IntArray, as_positions
+from .geometry import FloatArray, IntArray, as_integers, as_positions
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +79,9 @@ def group_spheres(bodies: ArrayLike) -> Particles:
     ----------
     bodies : (n,), body of each sphere, 0 for a free sphere, such as `ParticleFrame.bodies`
 
-    Raises InputError for an array of another shape, and for negative numbers.
+    Raises InputError for an array of another shape, and for numbers that are negative or not whole.
     """
-    body = np.asarray(bodies, dtype=np.int64)
+    body = as_integers(bodies, "bodies")
     if body.ndim != 1 or len(body) == 0:
         raise InputError(f"bodies must have shape (n,) with n >= 1, not {body.shape}")
     if (body < 0).any():

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from .bodies import Particles
 from .errors import InputError
-from .geometry import FloatArray, IntArray
+from .geometry import FloatArray, IntArray, as_integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +100,12 @@ def contact_sides(
     """Return the particles on both sides of every contact, (m, 2); -k stays for wall k.
 
     The parameters are those of `contact_counts`. Particles are indices, 0 to p - 1. Raises
-    InputError for arrays of other shapes, for a contact of an unknown sphere, and for a contact
-    within a body.
+    InputError for arrays of other shapes or numbers that are not whole, for ids that are there
+    twice, for a contact of an unknown sphere or of a sphere with itself, and for a contact within a
+    body.
     """
-    contacts = np.asarray(contact_ids, dtype=np.int64)
-    ids = np.asarray(sphere_ids, dtype=np.int64)
+    contacts = as_integers(contact_ids, "contact ids")
+    ids = as_integers(sphere_ids, "sphere ids")
     if contacts.ndim != 2 or contacts.shape[1] != 2:
         raise InputError(f"contact ids must have shape (m, 2), not {contacts.shape}")
     if ids.ndim != 1 or len(ids) == 0:
@@ -117,6 +118,9 @@ def contact_sides(
     of_spheres[:, 0] = True
     sides = contacts.copy()
     sides[of_spheres] = _index_of(contacts[of_spheres], ids)
+    alone = sides[:, 0] == sides[:, 1]
+    if alone.any():
+        raise InputError(f"sphere {contacts[alone][0, 0]} is in contact with itself")
     if particles is None or not particles.composite:
         return sides
     spheres = sides.copy()
@@ -151,7 +155,7 @@ def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> Coord
     means: list[float] = []
     histogram = np.zeros(0, dtype=np.int64)
     for frame in counts:
-        values = np.asarray(frame, dtype=np.int64)
+        values = as_integers(frame, "contact counts")
         if values.shape != mask.shape:
             raise InputError(f"contact counts must have shape {mask.shape}, not {values.shape}")
         means.append(float(values[mask].mean()))
@@ -173,6 +177,9 @@ def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> Coord
 def _index_of(wanted: IntArray, ids: IntArray) -> IntArray:
     """Return the places of some ids among all, in the shape of `wanted`."""
     order = np.argsort(ids)
+    twice = np.flatnonzero(np.diff(ids[order]) == 0)
+    if len(twice):
+        raise InputError(f"sphere {ids[order][twice[0]]} is there twice among the sphere ids")
     place = np.minimum(np.searchsorted(ids, wanted, sorter=order), len(ids) - 1)
     index = order[place]
     unknown = ids[index] != wanted

@@ -27,7 +27,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import DumpError
+from .errors import DumpError, printable, shortened
+from .files import reason_of, regular
 from .geometry import FloatArray
 
 HEADER_LINES = 9
@@ -67,10 +68,11 @@ class FrameHeader:
 def open_dump(path: Path) -> Iterator[Iterator[bytes]]:
     """Open a dump for reading, also one that gzip has compressed, whatever its name ends in.
 
-    Raises DumpError for a file that is not there or cannot be read.
+    Raises DumpError for a file that is not there or cannot be read, and for what is no file: a
+    folder, a pipe, a device.
     """
     try:
-        with path.open("rb") as raw:
+        with open(path, "rb", opener=regular) as raw:
             compressed = raw.read(len(GZIP_MAGIC)) == GZIP_MAGIC
             raw.seek(0)
             if compressed:
@@ -84,7 +86,7 @@ def open_dump(path: Path) -> Iterator[Iterator[bytes]]:
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise DumpError(path, f"cannot be unpacked: {error}") from None
     except OSError as error:
-        raise DumpError(path, f"cannot be read: {error.strerror}") from None
+        raise DumpError(path, f"cannot be read: {reason_of(error)}") from None
 
 
 def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | None:
@@ -99,7 +101,7 @@ def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | N
     if text[0] != "ITEM: TIMESTEP":
         raise DumpError(
             path,
-            f"expected 'ITEM: TIMESTEP', found '{_shortened(text[0])}' (the frame before has "
+            f"expected 'ITEM: TIMESTEP', found '{shortened(text[0])}' (the frame before has "
             "more or fewer rows than it announces, or the dump has 'units yes' or 'time yes')",
             line,
         )
@@ -108,9 +110,7 @@ def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | N
 
     step = _parsed_integer(text[1], path, line + 1)
     if not text[2].startswith("ITEM: NUMBER OF "):
-        raise DumpError(
-            path, f"expected 'ITEM: NUMBER OF', found '{_shortened(text[2])}'", line + 2
-        )
+        raise DumpError(path, f"expected 'ITEM: NUMBER OF', found '{shortened(text[2])}'", line + 2)
     label = text[2].removeprefix("ITEM: NUMBER OF ")
     rows = _parsed_integer(text[3], path, line + 3)
     if rows < 0:
@@ -118,13 +118,11 @@ def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | N
 
     flags = text[4].removeprefix("ITEM: BOX BOUNDS").split()
     if not text[4].startswith("ITEM: BOX BOUNDS") or len(flags) != 3:
-        raise DumpError(
-            path, f"expected an orthogonal box, found '{_shortened(text[4])}'", line + 4
-        )
+        raise DumpError(path, f"expected an orthogonal box, found '{shortened(text[4])}'", line + 4)
     box = np.array([_parsed_bounds(text[5 + axis], path, line + 5 + axis) for axis in range(3)])
 
     if text[8].split()[:2] != ["ITEM:", label]:
-        raise DumpError(path, f"expected 'ITEM: {label}', found '{_shortened(text[8])}'", line + 8)
+        raise DumpError(path, f"expected 'ITEM: {label}', found '{shortened(text[8])}'", line + 8)
     return FrameHeader(
         step=step,
         rows=rows,
@@ -165,7 +163,7 @@ def require_columns(header: FrameHeader, needed: Sequence[str], path: Path) -> N
 
 def missing_columns(header: FrameHeader, path: Path, names: str) -> DumpError:
     """Make the error that says which columns are missing and which are there."""
-    there = _printable(" ".join(header.columns)) or "none"
+    there = printable(" ".join(header.columns)) or "none"
     return DumpError(path, f"no column {names}; there is {there}", header.first_row_line - 1)
 
 
@@ -191,33 +189,22 @@ def malformed_row(
                 int(value) if name in whole else float(value)
             except ValueError:
                 kind = "whole number" if name in whole else "number"
-                return DumpError(path, f"{name} = '{_shortened(value)}' is no {kind}", number)
+                return DumpError(path, f"{name} = '{shortened(value)}' is no {kind}", number)
     return None
-
-
-def _shortened(text: str) -> str:
-    return _printable(text if len(text) <= 40 else text[:37] + "...")
-
-
-def _printable(text: str) -> str:
-    """Return a text that spoils no terminal, also where a binary file is quoted."""
-    return "".join(
-        letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text
-    )
 
 
 def _parsed_integer(text: str, path: Path, line: int) -> int:
     try:
         return int(text)
     except ValueError:
-        raise DumpError(path, f"expected an integer, found '{_shortened(text)}'", line) from None
+        raise DumpError(path, f"expected an integer, found '{shortened(text)}'", line) from None
 
 
 def _parsed_bounds(text: str, path: Path, line: int) -> tuple[float, float]:
     try:
         lower, upper = (float(field) for field in text.split())
     except ValueError:
-        raise DumpError(path, f"expected two bounds, found '{_shortened(text)}'", line) from None
+        raise DumpError(path, f"expected two bounds, found '{shortened(text)}'", line) from None
     if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
         raise DumpError(path, f"box bounds {lower:g} {upper:g} are not in order", line)
     return lower, upper

@@ -44,3 +44,15 @@ class PictureError(AnalysisError):
 
 class ExportError(AnalysisError):
     """A file for another program could not be written."""
+
+
+def shortened(text: str) -> str:
+    """Return a text that an error quotes, not too much of it."""
+    return printable(text if len(text) <= 40 else text[:37] + "...")
+
+
+def printable(text: str) -> str:
+    """Return a text that spoils no terminal, also where a binary file is quoted."""
+    return "".join(
+        letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text
+    )

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .contacts import ContactFrame
 from .coordination import contact_counts
 from .errors import InputError
-from .geometry import FloatArray, IntArray, as_box, particles_inside
+from .geometry import FloatArray, IntArray, as_box, as_floats, as_integers, particles_inside
 from .packing import packing_fraction
 from .particles import ParticleFrame
 
@@ -62,7 +62,16 @@ class Plateau:
 
 
 def monte_carlo(points: int = 100_000, seed: int = 0) -> PackingFractionOf:
-    """Return a function that measures a packing fraction with so many random points."""
+    """Return a function that measures a packing fraction with so many random points.
+
+    Parameters
+    ----------
+    points : number of random points, at least 1
+    seed : of numpy's default generator, not negative; every call draws the same points
+
+    The function takes positions (n, 3), radii (n,) and a box (3, 2), length, and raises InputError
+    as `packing_fraction` does.
+    """
 
     def measure(positions: ArrayLike, radii: ArrayLike, box: ArrayLike) -> float:
         return packing_fraction(positions, radii, box, points=points, seed=seed).value
@@ -139,12 +148,7 @@ def plateau(
     Raises InputError for arrays of other shapes, where the last values are not finite, for a band
     that is not positive, and for a share outside of (0, 1].
     """
-    when, series = np.asarray(steps, dtype=np.int64), np.asarray(values, dtype=np.float64)
-    if when.ndim != 1 or len(when) == 0 or when.shape != series.shape:
-        raise InputError(
-            f"steps and values must have the same shape (k,) with k >= 1, not {when.shape} and "
-            f"{series.shape}"
-        )
+    when, series = _series(steps, values)
     if not (band > 0 and 0 < last <= 1):
         raise InputError(f"band must be positive and last in (0, 1], not {band:g} and {last:g}")
     mean = float(series[-math.ceil(last * len(series)) :].mean())
@@ -168,11 +172,13 @@ def plot_evolution(
     Parameters
     ----------
     ax : the axes to draw on, which are returned
-    steps, values : (k,)
+    steps, values : (k,), time steps, and what was measured at each, in any unit
     reached : the plateau; None draws none
     label : the name of the series in the legend
+
+    Raises InputError for arrays of other shapes.
     """
-    (line,) = ax.plot(np.asarray(steps), np.asarray(values, dtype=np.float64), "o-", markersize=3)
+    (line,) = ax.plot(*_series(steps, values), "o-", markersize=3)
     if label is not None:
         line.set_label(label)
     ax.set_xlabel("step")
@@ -181,6 +187,17 @@ def plot_evolution(
         if reached.step is not None:
             ax.axvline(reached.step, color="0.6", linewidth=0.8, linestyle=":")
     return ax
+
+
+def _series(steps: ArrayLike, values: ArrayLike) -> tuple[IntArray, FloatArray]:
+    """Return steps and values, (k,) each; raise InputError for arrays of other shapes."""
+    when, series = as_integers(steps, "steps"), as_floats(values, "values")
+    if when.ndim != 1 or len(when) == 0 or when.shape != series.shape:
+        raise InputError(
+            f"steps and values must have the same shape (k,) with k >= 1, not {when.shape} and "
+            f"{series.shape}"
+        )
+    return when, series
 
 
 def _not_before(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ExportError, InputError
-from .geometry import FloatArray, IntArray, as_box, as_spheres
+from .files import reason_of, unfinished
+from .geometry import FloatArray, IntArray, as_box, as_count, as_integers, as_spheres
 
 # meshio, tifffile and trimesh are imported by the functions that need them: trimesh alone takes a
 # second, and those who only measure shall not wait for it.
@@ -25,6 +26,8 @@ from .geometry import FloatArray, IntArray, as_box, as_spheres
 PORE, SOLID = 0, 255
 # An ImageJ file of more bytes would need 64-bit addresses, which ImageJ's format has not.
 MOST_VOXELS = 4_000_000_000
+# A TIFF image holds the resolution as a ratio of whole numbers up to this one.
+MOST_IN_TIFF = 2**32 - 1
 # A slice is held in memory, at about ten bytes per voxel while it is computed.
 MOST_VOXELS_IN_SLICE = 100_000_000
 # So many faces take 5 GB; the file itself counts its faces with 32 bits.
@@ -236,12 +239,18 @@ def write_tiff(
     voxel : edge of a voxel, length
     progress : called for each slice
 
-    Raises InputError as `voxel_shape` does and for another ending, ExportError if writing fails.
+    Raises InputError as `voxel_shape` does, for another ending and for a voxel below 2.4e-10 or
+    above 4.2e9, which the format cannot hold; ExportError if writing fails.
     """
     import tifffile
 
     target = _named(path, (".tif", ".tiff"))
     computed = _Counted(voxel_slices(positions, radii, box, voxel), voxel_shape(box, voxel))
+    if not 1 / MOST_IN_TIFF <= voxel <= MOST_IN_TIFF:
+        raise InputError(
+            f"a TIFF image cannot hold voxels of {voxel:g}: they must be from 2.4e-10 to 4.2e9; "
+            "take another unit of length, or raw bytes"
+        )
     xlo, ylo, zlo = (as_box(box)[:, 0] / voxel).tolist()
     with _unfinished(target) as file:
         tifffile.imwrite(
@@ -350,9 +359,8 @@ def write_stl(
 
     target = _named(path, (".stl",))
     centres, radius = as_spheres(positions, radii)
-    if subdivisions < 0:
-        raise InputError(f"the number of subdivisions must not be negative, not {subdivisions}")
-    each: int = 20 * 4**subdivisions
+    # The faces of one sphere are too many long before their number takes a while to compute.
+    each: int = 20 * 4 ** min(as_count(subdivisions, "the number of subdivisions", 0), 30)
     faces = each * len(radius)
     if faces > MOST_FACES:
         raise InputError(
@@ -437,7 +445,7 @@ def _given(count: int, **columns: ArrayLike | None) -> dict[str, IntArray]:
     arrays: dict[str, IntArray] = {}
     for name, values in columns.items():
         if values is not None:
-            arrays[name] = np.asarray(values, dtype=np.int64)
+            arrays[name] = as_integers(values, name)
             if arrays[name].shape != (count,):
                 raise InputError(f"{name} must have shape ({count},), not {arrays[name].shape}")
     return arrays
@@ -461,14 +469,9 @@ def _named(path: str | PathLike[str], endings: Sequence[str]) -> Path:
 
 @contextmanager
 def _unfinished(target: Path) -> Iterator[Path]:
-    """Give a file to write, in the target's folder, and its name to it when it is whole."""
-    file = target.with_name(target.name + ".part")
+    """Give a file as `unfinished` does; raise ExportError if it cannot be written."""
     try:
-        yield file
-        file.replace(target)
+        with unfinished(target) as file:
+            yield file
     except OSError as error:
-        raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from None
-    finally:
-        # A file that is still there could not be written to its end, or not be renamed.
-        with suppress(OSError):
-            file.unlink()
+        raise ExportError(f"{target}: cannot be written: {reason_of(error)}") from None

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InputError
-from .geometry import FloatArray
+from .geometry import FloatArray, as_floats
 
 
 def fabric_tensor(normals: ArrayLike, weights: ArrayLike | None = None) -> FloatArray:
@@ -20,16 +20,19 @@ def fabric_tensor(normals: ArrayLike, weights: ArrayLike | None = None) -> Float
     normals : (m, 3), unit vectors, m >= 1
     weights : (m,), positive, such as the forces; None: every contact counts the same
 
-    Raises InputError for arrays of other shapes, and for weights that are not positive.
+    Raises InputError for arrays of other shapes, for normals that are not finite, and for weights
+    that are not positive and finite.
     """
-    vectors = np.asarray(normals, dtype=np.float64)
+    vectors = as_floats(normals, "normals")
     if vectors.ndim != 2 or vectors.shape[1] != 3 or len(vectors) == 0:
         raise InputError(f"normals must have shape (m, 3) with m >= 1, not {vectors.shape}")
-    weight = np.ones(len(vectors)) if weights is None else np.asarray(weights, dtype=np.float64)
+    weight = np.ones(len(vectors)) if weights is None else as_floats(weights, "weights")
     if weight.shape != (len(vectors),):
         raise InputError(f"weights must have shape ({len(vectors)},), not {weight.shape}")
+    if not np.isfinite(vectors).all():
+        raise InputError("normals hold NaN or infinity")
     # This condition is written so that NaN fails too.
-    if not (weight > 0).all():
-        raise InputError("weights must be positive")
+    if not ((weight > 0) & (weight < np.inf)).all():
+        raise InputError("weights must be positive and finite")
     tensor: FloatArray = np.einsum("c,ci,cj->ij", weight, vectors, vectors) / weight.sum()
     return tensor

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .bodies import Particles
 from .coordination import contact_sides, number_of_particles
 from .errors import InputError
-from .geometry import BoolArray, FloatArray
+from .geometry import BoolArray, FloatArray, as_count, as_floats
 from .plots import error_lengths
 
 if TYPE_CHECKING:
@@ -87,17 +87,17 @@ def force_distribution(
     largest : upper edge of the last bin, in mean forces
 
     Where some forces pull (< 0) the mean is that of their strengths, and as many bins go down to
-    -`largest`. Raises InputError for forces that are not finite or all 0, and without any bin.
+    -`largest`. Raises InputError for forces that are not finite or all 0, for no bins, and for a
+    largest force that is not positive and finite.
     """
-    strength = np.asarray(forces, dtype=np.float64)
+    strength = as_floats(forces, "forces")
     if strength.ndim != 1 or len(strength) == 0:
         raise InputError(f"forces must have shape (m,) with m >= 1, not {strength.shape}")
     if not np.isfinite(strength).all() or not strength.any():
         raise InputError("forces must be finite, and not all of them 0")
-    if bins < 1 or not (largest > 0 and math.isfinite(largest)):
-        raise InputError(
-            f"at least one bin up to a positive force is needed, not {bins}, {largest}"
-        )
+    bins = as_count(bins, "the number of bins")
+    if not (largest > 0 and math.isfinite(largest)):
+        raise InputError(f"the largest force must be positive and finite, not {largest:g}")
     mean = float(np.abs(strength).mean())
     pulls = bool((strength < 0).any())
     numbers, edges = np.histogram(
@@ -120,7 +120,11 @@ def plot_force_distribution(
 ) -> Axes:
     """Plot P(f / <f>) over f / <f>, on a logarithmic scale; empty bins are left out.
 
-    The axes are returned.
+    Parameters
+    ----------
+    ax : the axes to draw on, which are returned
+    distribution : from `force_distribution`: densities of b bins, per mean force, with their errors
+    label : the name of the curve in the legend
     """
     filled = distribution.density > 0
     density = distribution.density[filled]

@@ -60,9 +60,12 @@ def measure_packing(
     frame : particles of the packing
     counts : contacts of each particle in every contact frame; empty where contacts are not counted
     box : (3, 2), lower and upper bound per axis, length
-    points : number of random points for the packing fraction
-    seed : seed of these points
+    points : number of random points for the packing fraction, at least 1
+    seed : seed of these points, not negative
     walls : (3, 2), box whose faces are walls, length; None where the walls are not known
+
+    Nothing is periodic. Raises InputError for boxes or counts of other shapes, and for points or a
+    seed that are no whole numbers or too small.
     """
     bounds, particles = as_box(box), frame.particles
     in_box = particles_inside(particles.centres(frame.positions), bounds)

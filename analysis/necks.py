@@ -63,24 +63,6 @@ def neck_volume(radius: float, distance: float) -> float:
     return float(4 * math.pi * radius**3 * angle**2 * spherical_jn(1, angle))
 
 
-def with_scaled_necks(value: float, radius: float, distance: float) -> float:
-    """Return the packing fraction of equal dimers scaled as if each was as large as with its neck.
-
-    The result is value (V + V_neck) / V. Necks of different dimers may overlap, and then count
-    twice here; also, nothing is said of the necks that the box cuts. `packing_fraction_with_necks`
-    measures both.
-
-    Parameters
-    ----------
-    value : packing fraction of the dimers
-    radius : of all spheres, length
-    distance : of the two centres of each dimer, 0 < distance <= 2 radius, length
-
-    Raises InputError for a radius or a distance out of its range.
-    """
-    return value * (1 + neck_volume(radius, distance) / dimer_volume(radius, distance))
-
-
 def packing_fraction_with_necks(
     positions: ArrayLike,
     radii: ArrayLike,
@@ -102,13 +84,13 @@ def packing_fraction_with_necks(
     radii : (n,), of the spheres, length
     box : (3, 2), lower and upper bound per axis, length
     particles : which spheres make up which particle
-    points : number of random points
-    seed : of numpy's default generator
+    points : number of random points, at least 1
+    seed : of numpy's default generator, not negative
 
-    Raises InputError for arrays of other shapes, for fewer points than one, and for bodies without
-    a neck.
+    Raises InputError for arrays of other shapes, for points or a seed that are not such whole
+    numbers, and for bodies without a neck.
     """
-    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points)
+    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points, seed)
     one, other = _dimers_with_necks(centres, radius, particles)
     cover = Cover(centres, radius)
     necks = _Necks(centres, radius, one, other)

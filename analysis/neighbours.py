@@ -16,7 +16,7 @@ from scipy.spatial import KDTree
 
 from .bodies import Particles
 from .errors import InputError
-from .geometry import FloatArray, IntArray, as_box, as_spheres
+from .geometry import FloatArray, IntArray, as_box, as_integers, as_spheres
 
 # One reach for all spheres is the fastest up to this ratio of the largest to the smallest radius.
 SIMILAR_RADII = 1.5
@@ -48,8 +48,14 @@ class DistanceContacts:
         Parameters
         ----------
         sphere_ids : (n,), ids of the spheres in the order of the indices
+
+        Raises InputError for an array of another shape, or with fewer ids than spheres in contact.
         """
-        number = np.asarray(sphere_ids, dtype=np.int64)
+        number = as_integers(sphere_ids, "sphere ids")
+        if number.ndim != 1 or len(number) <= self.sides.max(initial=-1):
+            raise InputError(
+                f"sphere ids must be those of all spheres, not of shape {number.shape}"
+            )
         between_spheres = self.sides >= 0
         return np.where(
             between_spheres, number[np.where(between_spheres, self.sides, 0)], self.sides

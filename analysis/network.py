@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .bodies import Particles, group_spheres
 from .coordination import contact_sides
 from .errors import InputError
-from .geometry import FloatArray, as_positions
+from .geometry import FloatArray, as_floats, as_integers, as_positions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,8 +65,8 @@ def network_difference(
 
 def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], float]:
     """Return for each pair its share of the strengths of all forces, < 0 where it pulls."""
-    ids = np.asarray(contact_ids, dtype=np.int64)
-    strength = np.asarray(forces, dtype=np.float64)
+    ids = as_integers(contact_ids, "contact ids")
+    strength = as_floats(forces, "forces")
     if ids.ndim != 2 or ids.shape[1] != 2 or strength.shape != (len(ids),):
         raise InputError(
             f"contact ids and forces must have shape (m, 2) and (m,), not {ids.shape} and "
@@ -108,15 +108,17 @@ def contact_graph(
     particles : which spheres make up which particle; None: all are free
     walls : whether walls are nodes too; else contacts with walls are left out
 
-    Raises InputError as `contact_sides` does, and for forces of another shape.
+    Raises InputError as `contact_sides` does, and for forces of another shape or not finite.
     """
     sides = contact_sides(contact_ids, sphere_ids, particles)
     if particles is None:
         particles = group_spheres(np.zeros(len(np.asarray(sphere_ids)), dtype=np.int64))
     centres = particles.centres(positions)
-    strength = None if forces is None else np.asarray(forces, dtype=np.float64)
+    strength = None if forces is None else as_floats(forces, "forces")
     if strength is not None and strength.shape != (len(sides),):
         raise InputError(f"forces must have shape ({len(sides)},), not {strength.shape}")
+    if strength is not None and not np.isfinite(strength).all():
+        raise InputError("forces hold NaN or infinity")
     wanted = np.full(len(sides), True) if walls else sides[:, 1] >= 0
 
     graph = networkx.Graph()
@@ -161,7 +163,7 @@ def draw_network(
         in the paper
     palette : name of a colour map of matplotlib
 
-    Raises InputError for axes that are not two of x, y and z.
+    Raises InputError for axes that are not two of x, y and z, and for a graph without particles.
     """
     # This takes a second to import, and those who only count contacts need not wait for it.
     from mpl_toolkits.mplot3d import Axes3D

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InputError
-from .geometry import as_box, as_spheres
+from .geometry import as_box, as_integers, as_spheres
 from .neighbours import near_pairs
 
 FACES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
@@ -64,7 +64,7 @@ def largest_pair_overlap(
     count = len(radius)
     first, second = near_pairs(centres, radius, 0.0).T
     if bodies is not None:
-        body = np.asarray(bodies, dtype=np.int64)
+        body = as_integers(bodies, "bodies")
         if body.shape != (count,):
             raise InputError(f"bodies must have shape ({count},), not {body.shape}")
         free = (body[first] != body[second]) | (body[first] == 0)

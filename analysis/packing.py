@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from .bodies import Particles
-from .errors import InputError
-from .geometry import BoolArray, FloatArray, as_box, as_spheres, spheres_reaching
+from .geometry import BoolArray, FloatArray, as_box, as_count, as_spheres, spheres_reaching
 from .neighbours import near_pairs
 from .volumes import Pieces, pieces_of, split
 
@@ -81,7 +80,16 @@ def measure_packing_fraction(
 ) -> MeasuredPackingFraction:
     """Measure the packing fraction in a box, exactly where that is possible, and by random points.
 
-    The parameters are those of `exact_packing_fraction` and `packing_fraction`.
+    Parameters
+    ----------
+    positions : (n, 3), of the spheres, length
+    radii : (n,), of the spheres, length
+    box : (3, 2), lower and upper bound per axis, length
+    particles : which spheres make up which particle
+    points : number of random points, at least 1
+    seed : of numpy's default generator, not negative
+
+    Raises InputError for arrays of other shapes, and as `packing_fraction` does.
     """
     drawn = packing_fraction(positions, radii, box, points=points, seed=seed)
     if not particles.exactly_measurable:
@@ -102,7 +110,17 @@ def best_packing_fraction(
     """Return the packing fraction in a box: exact where that is possible, else by random points.
 
     It is the value of `measure_packing_fraction`, without random points where these do not matter.
-    Parameters as for that.
+
+    Parameters
+    ----------
+    positions : (n, 3), of the spheres, length
+    radii : (n,), of the spheres, length
+    box : (3, 2), lower and upper bound per axis, length
+    particles : which spheres make up which particle
+    points : number of random points, at least 1
+    seed : of numpy's default generator, not negative
+
+    Raises InputError for arrays of other shapes, and as `packing_fraction` does.
     """
     if particles.exactly_measurable:
         return exact_packing_fraction(positions, radii, box, particles).value
@@ -127,12 +145,13 @@ def packing_fraction(
     positions : (n, 3), length
     radii : (n,), length
     box : (3, 2), lower and upper bound per axis, length
-    points : number of random points
-    seed : of numpy's default generator
+    points : number of random points, at least 1
+    seed : of numpy's default generator, not negative
 
-    Raises InputError for arrays of other shapes, and for fewer points than one.
+    Raises InputError for arrays of other shapes, and for points or a seed that are not such whole
+    numbers.
     """
-    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points)
+    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points, seed)
     reaching = spheres_reaching(centres, radius, bounds)
     if not reaching.any():
         return PackingFraction(0.0, 0.0, points)
@@ -184,16 +203,17 @@ def exact_packing_fraction(
 
 
 def as_measurable_by_points(
-    positions: ArrayLike, radii: ArrayLike, box: ArrayLike, points: int
+    positions: ArrayLike, radii: ArrayLike, box: ArrayLike, points: int, seed: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return positions (n, 3), radii (n,) and a box (3, 2), checked for a count of random points.
 
-    Raises InputError where these have other shapes or values, and for fewer points than one.
+    Raises InputError where these have other shapes or values, for fewer points than one, and for a
+    negative seed.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
-    if points < 1:
-        raise InputError(f"at least one point is needed, not {points}")
+    as_count(points, "the number of points")
+    as_count(seed, "the seed", 0)
     return centres, radius, bounds
 
 

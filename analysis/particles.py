@@ -258,6 +258,26 @@ def read_particle_frame(
     return ParticleDump(path, radius=radius)[index]
 
 
+def check_not_periodic(
+    frame: ParticleFrame,
+    path: str | PathLike[str],
+    lacking: str = "overlaps across its faces are not looked for yet",
+) -> None:
+    """See that the box of a frame has no periodic face: nothing here looks across one.
+
+    Parameters
+    ----------
+    frame : frame of a particle dump
+    path : of the dump, for the error
+    lacking : what would be wrong, for the error
+
+    Raises DumpError for a box that is periodic along any axis.
+    """
+    if any("p" in flags for flags in frame.boundaries):
+        said = f"the box is periodic ({' '.join(frame.boundaries)}), and {lacking}"
+        raise DumpError(path, said)
+
+
 def _side_by_side(data: dict[str, FloatArray], names: Sequence[str]) -> FloatArray:
     """Return some columns as one array (n, columns)."""
     return np.column_stack([data[name] for name in names])

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from PIL import Image, ImageChops, ImageDraw, ImageFont
 
 from .errors import InputError, PictureError
-from .geometry import FloatArray, IntArray, as_box, as_spheres
+from .files import reason_of, unfinished
+from .geometry import FloatArray, IntArray, as_box, as_count, as_integers, as_spheres
 
 # A picture is drawn so many times larger and then reduced, which smooths all edges.
 OVERSAMPLING = 2
@@ -75,11 +76,12 @@ def draw_packing(
         than there are colours to tell apart
     pixels : the larger side of the picture, about
 
-    Raises InputError for arrays of other shapes, and PictureError where LAMMPS cannot draw or the
-    file cannot be written.
+    Raises InputError for arrays of other shapes and for numbers that are not whole and positive,
+    and PictureError where LAMMPS cannot draw or the file cannot be written.
     """
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(container)
+    as_count(pixels, "the number of pixels")
     if contacts is None:
         shading = _by_radius(radius)
     else:
@@ -90,20 +92,18 @@ def draw_packing(
         with Image.open(raw) as image:
             picture = _framed(image.convert("RGB"), shading, pixels)
     target = Path(path)
-    unfinished = target.with_name(target.name + ".part")
     try:
-        picture.save(unfinished, format="PNG", optimize=True)
-        unfinished.replace(target)
+        with unfinished(target) as file:
+            picture.save(file, format="PNG", optimize=True)
     except OSError as error:
-        raise PictureError(f"{target}: cannot be written: {error.strerror}") from None
+        raise PictureError(f"{target}: cannot be written: {reason_of(error)}") from None
 
 
 def _by_contacts(contacts: ArrayLike, count: int, width: int) -> _Shading:
-    numbers = np.asarray(contacts, dtype=np.int64)
+    numbers = as_integers(contacts, "contacts")
     if numbers.shape != (count,):
         raise InputError(f"contacts must have shape ({count},), not {numbers.shape}")
-    if width < 1:
-        raise InputError(f"a colour stands for at least one number of contacts, not {width}")
+    as_count(width, "the number of contacts that share a colour")
     starts = [shade * width for shade in range(CONTACT_SHADES)]
     labels = [str(start) if width == 1 else f"{start}-{start + width - 1}" for start in starts]
     labels[-1] = f"{starts[-1]}+"

@@ -15,13 +15,23 @@ from scipy.special import j0
 
 from .bodies import Particles
 from .errors import InputError
-from .geometry import FloatArray, IntArray, as_box, as_spheres, spheres_reaching
+from .geometry import (
+    FloatArray,
+    IntArray,
+    as_box,
+    as_count,
+    as_floats,
+    as_spheres,
+    spheres_reaching,
+)
 from .overlaps import FACES
 from .packing import packing_fraction
 from .volumes import pieces_of
 
 # Pairs of a sphere and a slab are worked off in groups of about this many, to bound the memory.
 PAIRS = 200_000
+# More slabs are a slip of the pen, and would fill the memory.
+MOST_SLABS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +79,9 @@ def wall_profile(
     particles : which spheres make up which particle; without, every sphere is one
     diameter : to scale the distances with, length; by default that of the spheres, if all are equal
 
-    Raises InputError for a face that does not exist, for slabs that do not fit into the box, and
-    for spheres of several sizes without a diameter.
+    Raises InputError for arrays of other shapes, for a body of three or more spheres, for a face
+    that does not exist, for slabs that do not fit into the box or are more than a million, and for
+    spheres of several sizes without a diameter.
     """
     centres, radius = as_spheres(positions, radii)
     slabs = _Slabs(box, wall, thickness)
@@ -122,14 +133,15 @@ def wall_profile_monte_carlo(
     wall : which face: xlo, xhi, ylo, yhi, zlo or zhi
     thickness : of the slabs, length; what is left of the box after the last whole slab is not used
     diameter : to scale the distances with, length; by default that of the spheres, if all are equal
-    points : number of random points in each slab
-    seed : each slab's points have a seed of their own, drawn from this one
+    points : number of random points in each slab, at least 1
+    seed : not negative; each slab's points have a seed of their own, drawn from this one
 
-    Raises InputError as `wall_profile` does.
+    Raises InputError as `wall_profile` and `packing_fraction` do.
     """
     centres, radius = as_spheres(positions, radii)
     slabs = _Slabs(box, wall, thickness)
     scale = _diameter(radius, diameter)
+    as_count(seed, "the seed", 0)
     seeds = np.random.SeedSequence(seed).generate_state(slabs.count)
     measured = []
     for number, own_seed in enumerate(seeds):
@@ -169,7 +181,7 @@ def mueller_packing_fraction(scaled_distances: ArrayLike, width: float | None = 
 
     Raises InputError for a negative distance, and for a narrower container.
     """
-    distance = np.asarray(scaled_distances, dtype=np.float64)
+    distance = as_floats(scaled_distances, "distances")
     # This condition is written so that NaN fails too.
     if not (distance >= 0).all():
         raise InputError("distances from the wall must not be negative or NaN")
@@ -199,6 +211,8 @@ class _Slabs:
                 f"slabs must be thicker than 0 and fit into the box's {extent:g} along "
                 f"{'xyz'[self._axis]}, not {thickness:g}"
             )
+        if extent > MOST_SLABS * thickness:
+            raise InputError(f"slabs of {thickness:g} are more than {MOST_SLABS} in the box")
         # A quotient such as 0.25 / 0.005 may be a little less than 50.
         self.count = math.floor(extent / thickness * (1 + 1e-9))
         self.middles: FloatArray = np.linspace(0.5, self.count - 0.5, self.count) * thickness

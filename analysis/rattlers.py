@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .bodies import Particles
 from .coordination import ContactCounts, contact_counts, contact_sides, number_of_particles
 from .errors import InputError
-from .geometry import BoolArray, IntArray
+from .geometry import BoolArray, IntArray, as_integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +69,12 @@ def backbone(
 
     Raises InputError as `contact_sides` does, and for `fewest` of another shape.
     """
-    contacts = np.asarray(contact_ids, dtype=np.int64)
+    contacts = as_integers(contact_ids, "contact ids")
     sides = contact_sides(contacts, sphere_ids, particles)
     count = number_of_particles(sphere_ids, particles)
     if fewest is None:
         fewest = 4 if particles is None else contacts_to_hold(particles)
-    needed = np.asarray(fewest, dtype=np.int64)
+    needed = as_integers(fewest, "fewest")
     if needed.shape not in ((), (count,)):
         raise InputError(f"fewest must be one number or have shape ({count},), not {needed.shape}")
 

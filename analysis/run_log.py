@@ -7,6 +7,7 @@ dump must hold: what `dump`, `dump_modify`, `undump` and `write_dump` say, and t
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +17,8 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import LogError
+from .errors import LogError, shortened
+from .files import reason_of, regular
 from .geometry import FloatArray, IntArray
 
 _LOOP = re.compile(r"Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) atoms")
@@ -29,8 +31,11 @@ _ANEW = ("LAMMPS", "units", "atom_style", "read_restart", "read_data", "clear")
 _SAME_TIME = 1e-6
 # Thermo output has eight digits: this is its relative rounding.
 _DIGITS = 1e-8
-# In longer runs, the frames that are written at times are not predicted.
-_MOST_STEPS = 50_000_000
+# Frames are not predicted where a run has more of them, or more steps between which to look for
+# those that are written at times: a step count that is damaged shall not exhaust the memory.
+_MOST = 10_000_000
+# Steps are read as float64, which holds every whole number below this one.
+_LARGEST_STEP = 2**53
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,15 +138,17 @@ class RunLog:
 def read_run_log(path: str | PathLike[str]) -> RunLog:
     """Read a log of LAMMPS with one line of thermo output a step (styles one and custom).
 
-    Raises LogError where the file cannot be read, or where what it tells contradicts itself.
+    Raises LogError where the file cannot be read or is none (a folder, a pipe, a device), where a
+    number in it is damaged, and where what it tells contradicts itself.
     """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8", errors="replace")
+        with open(file, encoding="utf-8", errors="replace", opener=regular) as log:
+            text = log.read()
     except FileNotFoundError:
         raise LogError(file, "no such file") from None
     except OSError as error:
-        raise LogError(file, f"cannot be read: {error.strerror}") from None
+        raise LogError(file, f"cannot be read: {reason_of(error)}") from None
     reader = _Reader(file)
     for number, line in enumerate(text.splitlines(), 1):
         reader.read(line, number)
@@ -174,6 +181,15 @@ class _File:
     fix: str | None = None
 
 
+@dataclass(frozen=True)
+class _End:
+    """What the line after a run says: its wall time, its steps, and the atoms at its end."""
+
+    seconds: float
+    steps: int
+    atoms: int
+
+
 class _Reader:
     """A reader that goes through the lines of a log, and what it has found so far."""
 
@@ -204,8 +220,10 @@ class _Reader:
             self.close_run(None)
             self._names, self._header = words, number
         elif self._names and (loop := _LOOP.match(line)):
-            self.close_run(loop)
+            self.close_run(self._end(loop, number))
         elif self._names and (row := _numbers(words, len(self._names))) is not None:
+            if _count(words[0]) is None:
+                raise LogError(self._path, f"'{shortened(words[0])}' is no step", number)
             self._rows.append(row)
         elif _LOOP.match(line):
             # This run has thermo output of another style: nobody knows where it ended.
@@ -214,7 +232,19 @@ class _Reader:
         elif words and not self._names:
             self._command(words)
 
-    def close_run(self, loop: re.Match[str] | None) -> None:
+    def _end(self, loop: re.Match[str], number: int) -> _End:
+        """Return what the line after a run says."""
+        seconds, steps, atoms = _real(loop[1]), _count(loop[2]), _count(loop[3])
+        if seconds is None or steps is None or atoms is None:
+            raise LogError(
+                self._path,
+                f"'{shortened(loop[0])}' is damaged: it must hold a time, a number of steps and a "
+                "number of atoms",
+                number,
+            )
+        return _End(seconds, steps, atoms)
+
+    def close_run(self, end: _End | None) -> None:
         """Keep the run that the thermo output of the last header belongs to, if there is one."""
         if self._rows:
             table = np.array(self._rows).T
@@ -223,9 +253,9 @@ class _Reader:
                 line=self._header,
                 before=self._step,
                 first=int(thermo["Step"][0]),
-                steps=None if loop is None else int(loop[2]),
-                seconds=None if loop is None else float(loop[1]),
-                atoms=None if loop is None else int(loop[3]),
+                steps=None if end is None else end.steps,
+                seconds=None if end is None else end.seconds,
+                atoms=None if end is None else end.atoms,
                 thermo=thermo,
                 every=self._every,
                 counts=self._counts_of(self._names),
@@ -235,7 +265,7 @@ class _Reader:
             for dump in self._dumps.values():
                 self._write(dump, run)
             self._step = run.known
-        elif self._names and loop is not None:
+        elif self._names and end is not None:
             raise LogError(self._path, "a run has no line of thermo output", self._header)
         self._names, self._rows = [], []
 
@@ -268,17 +298,18 @@ class _Reader:
                 run.line,
             )
         steps = run.thermo["Step"]
-        wanted = {run.first}
-        if run.every:
-            wanted |= set(range(-(-run.first // run.every) * run.every, run.known, run.every))
         there = set(steps.astype(np.int64).tolist())
-        missing = sorted(wanted - there) if run.every is not None else []
-        if missing or (np.diff(steps) <= 0).any() or steps[-1] > run.known:
-            what = f"of step {missing[0]} is missing" if missing else "do not follow one another"
+        wanted = _multiples(run.every, run.first, run.known) if run.every else ()
+        # The first one that is missing ends the search, however many more a run claims to have.
+        missing = next((step for step in wanted if step not in there), None)
+        if missing is not None or (np.diff(steps) <= 0).any() or steps[-1] > run.known:
+            what = (
+                "do not follow one another" if missing is None else f"of step {missing} is missing"
+            )
             raise LogError(
                 self._path,
-                f"{'a line' if missing else 'the lines'} of thermo output {what}, in the run from "
-                f"step {run.first} to {run.known}",
+                f"{'the lines' if missing is None else 'a line'} of thermo output {what}, in the "
+                f"run from step {run.first} to {run.known}",
                 run.line,
             )
 
@@ -346,14 +377,15 @@ class _Reader:
         """Add the frames that a dump has written in a run."""
         file, last = self.files[dump.path], run.known
         if dump.every:
-            steps = list(range(-(-run.first // dump.every) * dump.every, last + 1, dump.every))
+            expected = _multiples(dump.every, run.first, last + 1)
+            found = list(expected) if len(expected) <= _MOST else None
         else:
             found = _steps_at_times(run, dump.time) if dump.time and not self._cut else None
-            if found is None:
-                file.known = False
-                return
-            steps = found
             file.slack = 1
+        if found is None:
+            file.known = False
+            return
+        steps = found
         if dump.first and dump.last is None and steps[:1] != [run.first]:
             steps.insert(0, run.first)
         steps = [step for step in steps if step != dump.last]
@@ -376,9 +408,14 @@ class _Reader:
         file.runs.append(len(self.runs) - 1)
 
 
+def _multiples(every: int, first: int, end: int) -> range:
+    """Return the steps, from a first one and before an end, that a number divides."""
+    return range(-(-first // every) * every, end, every)
+
+
 def _steps_at_times(run: Run, interval: float) -> list[int] | None:
     """Return the steps at which a multiple of a time interval is reached; None if unknown."""
-    if "Time" not in run.thermo or run.known - run.first > _MOST_STEPS:
+    if "Time" not in run.thermo or run.known - run.first > _MOST:
         return None
     steps = np.arange(run.first, run.known + 1)
     times = at_steps(steps, run.thermo["Step"], run.thermo["Time"])
@@ -439,14 +476,23 @@ def _comment(words: list[str]) -> int:
 
 
 def _integer(word: str) -> int | None:
+    """Return the whole number that a word is; None if it is none."""
     try:
         return int(word)
     except ValueError:
         return None
 
 
+def _count(word: str) -> int | None:
+    """Return the step or the number of steps or atoms that a word is; None if it is none."""
+    value = _integer(word)
+    return value if value is not None and value < _LARGEST_STEP else None
+
+
 def _real(word: str) -> float | None:
+    """Return the finite number that a word is; None if it is none."""
     try:
-        return float(word)
+        value = float(word)
     except ValueError:
         return None
+    return value if math.isfinite(value) else None

@@ -18,11 +18,13 @@ from scipy.optimize import brentq, minimize_scalar
 
 from .bodies import Particles
 from .errors import InputError
-from .geometry import BoolArray, FloatArray
+from .geometry import BoolArray, FloatArray, as_count, as_floats
 from .neighbours import contacts_by_distance
 
 # Exponents beyond this are no power law of a packing.
 STEEPEST = 20.0
+# The exponential of a larger number overflows.
+STEEPEST_TERM = 700.0
 # An exponent of so few values says nothing.
 FEWEST = 10
 
@@ -46,6 +48,19 @@ class PowerLaw:
     count: int
 
 
+def _between(values: ArrayLike, low: float, high: float) -> FloatArray:
+    """Return values, (n,) and finite, of which those between two bounds are wanted.
+
+    Raises InputError for other values, and for bounds that are not 0 < low < high.
+    """
+    if not (0 < low < high < math.inf and high / low < math.inf):
+        raise InputError(f"the bounds of a power law must be 0 < low < high, not {low:g}, {high:g}")
+    given = as_floats(values, "values")
+    if given.ndim != 1 or not np.isfinite(given).all():
+        raise InputError("the values of a power law must have shape (n,) and be finite")
+    return given
+
+
 def power_law(values: ArrayLike, low: float, high: float) -> PowerLaw:
     """Return the power law that makes the values between two bounds most likely.
 
@@ -65,11 +80,7 @@ def power_law(values: ArrayLike, low: float, high: float) -> PowerLaw:
     Raises InputError for other bounds, for values that are not finite, and for fewer than ten
     values between the bounds, or all of them at one end.
     """
-    if not (0 < low < high < math.inf):
-        raise InputError(f"the bounds of a power law must be 0 < low < high, not {low:g}, {high:g}")
-    given = np.asarray(values, dtype=np.float64)
-    if given.ndim != 1 or not np.isfinite(given).all():
-        raise InputError("the values of a power law must have shape (n,) and be finite")
+    given = _between(values, low, high)
     inside = given[(given >= low) & (given <= high)]
     if len(inside) < FEWEST:
         raise InputError(
@@ -86,6 +97,9 @@ def power_law(values: ArrayLike, low: float, high: float) -> PowerLaw:
     s = float(brentq(excess, -STEEPEST, STEEPEST, xtol=1e-12))
     step = 1e-4
     variance = (excess(s + step) - excess(s - step)) / (2 * step)
+    # Between bounds that are almost the same all exponents are as likely.
+    if not variance > 0:
+        raise InputError(f"the values between {low:g} and {high:g} are too near for a power law")
     return PowerLaw(s - 1, 1 / math.sqrt(len(inside) * variance), low, high, len(inside))
 
 
@@ -95,7 +109,8 @@ def _mean_of_logarithm(s: float, length: float) -> float:
     # The series near zero: both terms grow without bound there, and their difference does not.
     if abs(t) < 1e-4:
         return length * (0.5 + t / 12)
-    return length / -math.expm1(-t) - 1 / s
+    # Where exp(-t) would overflow, the first term is 0 to all digits.
+    return (length / -math.expm1(-t) if t > -STEEPEST_TERM else 0.0) - 1 / s
 
 
 def small_gaps(
@@ -117,13 +132,16 @@ def small_gaps(
     particles : which spheres make up which particle; None: all spheres are free
     left_out : (p,), particles whose gaps say nothing, such as rattlers, which lie about
 
-    Raises InputError as `contacts_by_distance` does.
+    Raises InputError as `contacts_by_distance` does, and for `left_out` of another shape.
     """
     near = contacts_by_distance(positions, radii, largest, particles)
     gaps: FloatArray = near.gaps
     if left_out is None:
         return gaps
-    owner = np.arange(len(np.asarray(radii))) if particles is None else particles.index
+    owner = np.arange(len(as_floats(radii, "radii"))) if particles is None else particles.index
+    count = len(owner) if particles is None else len(particles)
+    if np.shape(left_out) != (count,):
+        raise InputError(f"left_out must have shape ({count},), not {np.shape(left_out)}")
     kept = ~left_out[owner[near.sides[:, 0]]] & ~left_out[owner[near.sides[:, 1]]]
     return gaps[kept]
 
@@ -140,11 +158,11 @@ def local_ratios(forces: ArrayLike, heights: ArrayLike, layers: int = 20) -> Flo
     heights : (m,), of their places, length
     layers : number of layers, at least 1
 
-    Raises InputError for arrays of other shapes, for forces that pull (< 0) or are not finite, for
-    fewer contacts than layers, and for a layer in which all forces are 0.
+    Raises InputError for arrays of other shapes, for forces that pull (< 0), for forces or heights
+    that are not finite, for fewer contacts than layers, and for a layer in which all forces are 0.
     """
-    strength = np.asarray(forces, dtype=np.float64)
-    height = np.asarray(heights, dtype=np.float64)
+    strength = as_floats(forces, "forces")
+    height = as_floats(heights, "heights")
     if strength.ndim != 1 or strength.shape != height.shape:
         raise InputError(
             "forces and heights must have the same shape (m,), "
@@ -153,7 +171,9 @@ def local_ratios(forces: ArrayLike, heights: ArrayLike, layers: int = 20) -> Flo
     # This condition is written so that NaN fails too.
     if not ((strength >= 0) & (strength < np.inf)).all():
         raise InputError("forces must be finite and not below 0: none of the contacts may pull")
-    if not 1 <= layers <= len(strength):
+    if not np.isfinite(height).all():
+        raise InputError("heights hold NaN or infinity")
+    if as_count(layers, "the number of layers") > len(strength):
         raise InputError(f"{len(strength)} contacts cannot be in {layers} layers")
     parts = np.array_split(strength[np.argsort(height, kind="stable")], layers)
     if not all(part.any() for part in parts):
@@ -170,13 +190,15 @@ def logarithmic_density(
     Parameters
     ----------
     values : (n,), those outside of the bounds are left out
-    low, high : bounds, 0 < low < high
-    per_decade : about so many bins
+    low, high : bounds, 0 < low < high, in the unit of the values
+    per_decade : about so many bins, at least 1
 
-    The densities are shares of all values given, per unit of the value.
+    The densities are shares of all values given, per unit of the value. Raises InputError for other
+    bounds, for values that are not finite, and for fewer bins than one a decade.
     """
-    given = np.asarray(values, dtype=np.float64)
-    bins = max(1, round(per_decade * math.log10(high / low)))
+    given = _between(values, low, high)
+    wanted = as_count(per_decade, "the number of bins per decade")
+    bins = max(1, round(wanted * math.log10(high / low)))
     edges = np.geomspace(low, high, bins + 1)
     counts, _ = np.histogram(given, edges)
     middles: FloatArray = np.sqrt(edges[:-1] * edges[1:])
@@ -191,11 +213,18 @@ def binned_exponent(middles: ArrayLike, density: ArrayLike, low: float, high: fl
     Parameters
     ----------
     middles, density : (b,) each, as `logarithmic_density` returns them
-    low, high : the bins whose middles lie between these are used
+    low, high : the bins whose middles lie between these are used, in the unit of the middles
 
-    Raises InputError for fewer than three such bins, or where all values are in one of them.
+    Raises InputError for arrays of other shapes, for middles that are not positive and ascending,
+    for densities below 0, for fewer than three such bins, or where all values are in one of them.
     """
-    x, y = np.asarray(middles, dtype=np.float64), np.asarray(density, dtype=np.float64)
+    x, y = as_floats(middles, "middles"), as_floats(density, "density")
+    if x.ndim != 1 or x.shape != y.shape:
+        raise InputError(
+            f"middles and density must have the same shape (b,), not {x.shape} and {y.shape}"
+        )
+    if not ((x > 0) & np.isfinite(x) & (y >= 0) & np.isfinite(y)).all() or (np.diff(x) <= 0).any():
+        raise InputError("middles must be positive and ascending, densities finite and not below 0")
     inside = (x > low) & (x < high)
     if inside.sum() < 3 or (y[inside] > 0).sum() < 2:
         raise InputError(f"too few bins with values between {low:g} and {high:g} for a power law")

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from .errors import InputError
-from .geometry import BoolArray, FloatArray, as_box, as_positions, particles_inside
+from .geometry import BoolArray, FloatArray, as_box, as_count, as_positions, particles_inside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +30,8 @@ NEIGHBOURS = 12
 # its bonds are: ten Wolde, Ruiz-Montero and Frenkel, Faraday Discussions 104 (1996) 93.
 ALIGNED = 0.7
 CRYSTALLINE_BONDS = 8
+# A packing with a larger share of crystalline particles is not random.
+MOST_CRYSTALLINE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +68,15 @@ class BondOrder:
     Attributes
     ----------
     q4, q6 : (c,), one value per particle in the box
-    w6 : (c,), third-order invariant, normalised; -0.0132 for fcc, -0.0124 for hcp
     crystalline_bonds : (c,), how many of the twelve bonds join particles of the same orientation
+    w6 : (c,), third-order invariant, normalised; -0.0132 for fcc, -0.0124 for hcp; None unless it
+        was asked for
     """
 
     q4: FloatArray
     q6: FloatArray
-    w6: FloatArray
     crystalline_bonds: FloatArray
+    w6: FloatArray | None = None
 
     @property
     def crystalline(self) -> BoolArray:
@@ -89,7 +92,7 @@ class BondOrder:
     @property
     def crystallised(self) -> bool:
         """Whether most of the particles are in a crystal."""
-        return self.crystalline_share > 0.5
+        return self.crystalline_share > MOST_CRYSTALLINE
 
     @property
     def shares(self) -> dict[str, float]:
@@ -109,14 +112,6 @@ class BondOrder:
             for index, name in enumerate(Q6_OF_CRYSTALS)
         }
         return found | {"disordered": 1.0 - self.crystalline_share}
-
-    def verdict(self) -> str:
-        """Say in one line whether the packing has crystallised, beside the crystals' values."""
-        state = "crystallised" if self.crystallised else "not crystallised"
-        return (
-            f"{state}: {self.crystalline_share:.1%} of {len(self.q6)} particles in a crystal, "
-            f"q6 = {self.q6.mean():.3f} (fcc {Q6_OF_CRYSTALS['fcc']}, hcp {Q6_OF_CRYSTALS['hcp']})"
-        )
 
 
 def radial_distribution(
@@ -141,8 +136,9 @@ def radial_distribution(
     import freud
 
     centres, bounds = as_positions(positions), as_box(box)
-    if bins < 1 or not (largest > 0 and math.isfinite(largest)):
-        raise InputError(f"at least one shell up to a positive radius is needed: {bins}, {largest}")
+    bins = as_count(bins, "the number of shells")
+    if not (largest > 0 and math.isfinite(largest)):
+        raise InputError(f"the largest radius must be positive and finite, not {largest:g}")
     chosen = _chosen(centres, bounds)
     reach = np.column_stack([bounds[:, 0] - largest, bounds[:, 1] + largest])
     outside = (reach[:, 0] < centres.min(axis=0)) | (reach[:, 1] > centres.max(axis=0))
@@ -170,7 +166,7 @@ def radial_distribution(
     )
 
 
-def bond_order(positions: ArrayLike, box: ArrayLike) -> BondOrder:
+def bond_order(positions: ArrayLike, box: ArrayLike, *, w6: bool = False) -> BondOrder:
     """Measure the bond-orientational order of the particles in a box away from the walls.
 
     The neighbours are the twelve nearest, which needs no cutoff. The box should be two diameters
@@ -180,8 +176,10 @@ def bond_order(positions: ArrayLike, box: ArrayLike) -> BondOrder:
     ----------
     positions : (n, 3), centres of all spheres, n >= 13, length
     box : (3, 2), length
+    w6 : whether to measure w6 as well, which takes a third longer
 
-    Raises InputError for too few particles, and for a box without a centre.
+    Raises InputError for arrays of other shapes, for too few particles, and for a box without a
+    centre.
     """
     import freud
 
@@ -215,15 +213,27 @@ def bond_order(positions: ArrayLike, box: ArrayLike) -> BondOrder:
     return BondOrder(
         q4=order(4),
         q6=order(6),
-        w6=order(6, wl=True, wl_normalize=True),
         crystalline_bonds=np.asarray(aligned.num_connections, dtype=np.float64)[chosen],
+        w6=order(6, wl=True, wl_normalize=True) if w6 else None,
     )
 
 
 def plot_radial_distribution(
     ax: Axes, distribution: RadialDistribution, *, diameter: float = 1.0, label: str | None = None
 ) -> Axes:
-    """Plot g(r) over r / diameter; the axes are returned."""
+    """Plot g(r) over r / diameter.
+
+    Parameters
+    ----------
+    ax : the axes to draw on, which are returned
+    distribution : from `radial_distribution`: values of b shells, and their edges, length
+    diameter : of the spheres, length; 1 leaves the distances in the unit of length
+    label : the name of the curve in the legend
+
+    Raises InputError for a diameter that is not positive and finite.
+    """
+    if not 0 < diameter < math.inf:
+        raise InputError(f"a diameter must be positive and finite, not {diameter:g}")
     ax.plot(distribution.middles / diameter, distribution.values, linewidth=1, label=label)
     ax.axhline(1.0, color="0.7", linewidth=0.8)
     ax.set_xlabel("r" if diameter == 1.0 else "r / d")

@@ -20,11 +20,10 @@ from lammps_inelastic.analysis import (
     RunFilesError,
     UnfinishedRunError,
     check_contacts,
+    check_not_periodic,
     contact_counts,
     iterate_contact_frames,
-    open_run,
     particles_inside,
-    read_run_log,
     voxel_shape,
     write_raw,
     write_stl,
@@ -36,7 +35,7 @@ from lammps_inelastic.analysis.export import Progress
 from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray, spheres_reaching
 
 from .finished import CONTACTS as CONTACT_DUMP
-from .finished import LOG, unchanged
+from .finished import open_in_folder
 
 # The file has this name if no other is given, and its format's ending.
 NAME = "packing"
@@ -88,13 +87,9 @@ def _check_frames(dump: ParticleDump, source: Path) -> None:
 
     A dump that was named alone may be of another run than the contacts beside it.
     """
-    folder, contacts = dump.path.parent, source / CONTACT_DUMP
-    log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
+    contacts = source / CONTACT_DUMP
     try:
-        files = open_run(dump, contacts if contacts.exists() else None, log)
-        files.check_last(dump[-1])
-        if source.is_dir():
-            unchanged(folder)
+        open_in_folder(dump, contacts if contacts.exists() else None, alone=not source.is_dir())
     except UnfinishedRunError as error:
         raise AnalysisError(f"{error}; --step N writes a frame that is there") from None
     except RunFilesError as error:
@@ -230,11 +225,8 @@ def write_image(
     box : (3, 2), box of the image, length; None for the dump's
     voxel : edge of a voxel, length; None for a tenth of the smallest radius
     """
-    if any("p" in flags for flags in frame.boundaries):
-        raise AnalysisError(
-            f"{path}: the box is periodic ({' '.join(frame.boundaries)}), and spheres that reach "
-            "through its faces are not drawn on the other side yet"
-        )
+    lacking = "spheres that reach through its faces are not drawn on the other side yet"
+    check_not_periodic(frame, path, lacking)
     bounds = frame.box if box is None else box
     if not spheres_reaching(frame.positions, frame.radii, bounds).any():
         raise AnalysisError(f"{path}: no sphere reaches into the box at step {frame.step}")

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import os
+import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import WorkflowError
+
+# Every HDF5 file begins with these bytes.
+HDF5 = b"\x89HDF\r\n\x1a\n"
+# A temporary name has so much of the machine's name: file systems take 255 bytes in all.
+LONGEST_HOST = 20
 
 
 @contextmanager
@@ -20,7 +26,9 @@ def whole(path: Path) -> Iterator[Path]:
     """
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")
+        # Processes of other machines may have the same number, and write to the same folder.
+        writer = f"{os.uname().nodename[:LONGEST_HOST]}.{os.getpid()}.{secrets.token_hex(4)}"
+        temporary = path.with_name(f".{path.name}.{writer}")
         try:
             yield temporary
             # Some file systems say only now that the disk is full.
@@ -80,6 +88,25 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+def check_target(path: Path, *, hdf5: bool) -> None:
+    """See that results replace results alone, and nothing else replaces them.
+
+    Parameters
+    ----------
+    path : file that will be written, and may be there already
+    hdf5 : whether HDF5 will be written
+
+    Raises WorkflowError if a file of the other kind is there, and OSError if it cannot be read.
+    """
+    if not is_file(path):
+        return
+    with path.open("rb") as file:
+        start = file.read(len(HDF5))
+    if start and (start == HDF5) != hdf5:
+        kind = "no HDF5 file" if hdf5 else "an HDF5 file"
+        raise WorkflowError(f"{path}: this file is {kind}, and is not replaced")
 
 
 def digest_of(path: Path) -> str:

@@ -10,11 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from lammps_inelastic.analysis import RunFiles, RunFilesError, RunLog, at_steps
+from lammps_inelastic.analysis import (
+    ParticleDump,
+    RunFiles,
+    RunFilesError,
+    RunLog,
+    at_steps,
+    open_run,
+    read_run_log,
+)
 from lammps_inelastic.analysis.dump_text import open_dump
 from lammps_inelastic.analysis.run_files import AGAIN
 
 from .decks import find_deck
+from .errors import WorkflowError
+from .files import read_regular
 from .shipped import DECKS, SETTLING
 
 FINISHED = "finished.json"
@@ -26,6 +36,8 @@ MEASURED_BY = "measured by"
 NOT_MEASURED = "not measured: "
 # These files of a finished run are read.
 FILES = (LOG, PARTICLES, CONTACTS)
+# A JSON file holds the texts of the decks, and is not larger than this [bytes].
+LARGEST_RECORD = 100_000_000
 # Numbers that differ by less, relatively, are the same: dumps keep 12 digits and more.
 SAME = 1e-9
 
@@ -49,6 +61,47 @@ def checksum(path: Path) -> str:
         for line in lines:
             found.update(line)
     return found.hexdigest()
+
+
+def read_json(path: Path) -> Any:
+    """Return what a JSON file holds. Raises WorkflowError with one line if it cannot be read."""
+    content = read_regular(path, LARGEST_RECORD)
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError):
+        raise WorkflowError(f"{path}: no JSON, or damaged") from None
+
+
+def json_of(path: Path) -> dict[str, Any] | None:
+    """Return what a JSON file holds; None if it cannot be read, or holds no object."""
+    try:
+        content = read_json(path)
+    except WorkflowError:
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def open_in_folder(
+    dump: ParticleDump, contacts: Path | None, *, over: bool = True, alone: bool = False
+) -> RunFiles:
+    """Open a run's files as they lie in a folder, with the log and the record that are beside them.
+
+    Parameters
+    ----------
+    dump : the particle dump
+    contacts : path of the contact dump; None where contacts are not needed
+    over : whether the run must have ended
+    alone : whether the dump was named without its folder, whose record may be of another run
+
+    Raises AnalysisError with one line where the files do not belong together, or are not whole.
+    """
+    folder = dump.path.parent
+    log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
+    files = open_run(dump, contacts, log, over=over)
+    files.check_last(dump[-1])
+    if not alone:
+        _check_recorded(folder)
+    return files
 
 
 def check_stage(
@@ -77,14 +130,14 @@ def check_stage(
     check_unchanged(folder, record, stage)
 
 
-def unchanged(folder: Path) -> None:
+def _check_recorded(folder: Path) -> None:
     """See that the files in the folder of a study's run, or of one of its stages, are unchanged.
 
     A folder without a record cannot be checked. Raises RunFilesError with one line.
     """
     for where in (folder, folder.absolute().parent):
         try:
-            record = json.loads((where / FINISHED).read_text())
+            record = json_of(where / FINISHED) or {}
             stages = {(where / stage["folder"]).resolve(): stage for stage in record["stages"]}
         except (OSError, ValueError, KeyError, TypeError):
             continue
@@ -101,12 +154,9 @@ def other_run(folder: Path, record: Mapping[str, Any]) -> str:
     folder : folder of the case
     record : record of the result
     """
-    try:
-        there = json.loads((folder / FINISHED).read_text())
-    except (OSError, ValueError):
-        return ""
+    there = json_of(folder / FINISHED)
     run = {name: value for name, value in record.items() if name != MEASURED_BY}
-    if not isinstance(there, dict) or there == run:
+    if there is None or there == run:
         return ""
     return f"of the run of {record['started']}, but {folder} is that of {there.get('started')}"
 
@@ -116,9 +166,10 @@ def check_unchanged(folder: Path, record: Mapping[str, Any], stage: Mapping[str,
 
     Files of which the record has no checksum are not compared. Raises RunFilesError with one line.
     """
+    known = record.get("files")
     for name in FILES:
         path = str(Path(stage["folder"]) / name)
-        wanted = record.get("files", {}).get(path)
+        wanted = known.get(path) if isinstance(known, Mapping) else None
         if wanted is not None and checksum(folder / path) != wanted:
             raise RunFilesError(
                 f"{folder / path}: is not the file that the run of {FINISHED} has left; {AGAIN}"
@@ -127,6 +178,8 @@ def check_unchanged(folder: Path, record: Mapping[str, Any], stage: Mapping[str,
 
 def _check_log(files: RunFiles, log: RunLog) -> None:
     """See that a log of one of our decks is there from its beginning to its end."""
+    if not log.runs:
+        raise RunFilesError(f"{log.path}: tells of no run: a part of it is missing; {AGAIN}")
     for path in (files.particles.path, files.contacts):
         if path is not None and not log.names(path):
             raise RunFilesError(

@@ -5,6 +5,7 @@
     cases/CASE.failed/     the last run that failed, with its log
     cases/CASE.damaged/    a run whose finished.json could not be read
     cases/.locks/CASE      locked while somebody runs or measures the case
+    cases/.locks/results   locked while somebody gathers results
     results/STUDY/CASE.h5  what was measured of it; CASE.h5.damaged where that could not be read
     STUDY.h5               all results of a study
 
@@ -22,14 +23,14 @@ import shutil
 import signal
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
 from .errors import WorkflowError
-from .files import digest_of, is_file, read_regular, write_text, writing
-from .finished import CONTACTS, FINISHED, PARTICLES, checksums
+from .files import digest_of, is_file, write_text, writing
+from .finished import CONTACTS, FINISHED, PARTICLES, checksums, json_of
 from .store import origin_of
 from .study import INPUTS, Case, Study
 
@@ -42,8 +43,6 @@ FAILED = "failed.json"
 MARK = "INELASTIC_CASE"
 # A killed process may take so long to go [seconds].
 PATIENCE = 10.0
-# A JSON file holds the texts of the decks, and is not larger than this [bytes].
-LARGEST_RECORD = 100_000_000
 _PLAIN = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 # So long after one attempt at a lock comes the next [seconds].
 NEXT_ATTEMPT = 0.05
@@ -103,7 +102,7 @@ class Folder:
 
     def is_finished(self, case: Case) -> bool:
         """Say whether there is a whole run of the case that can still be measured."""
-        record = _json_of(self.case(case) / FINISHED)
+        record = json_of(self.case(case) / FINISHED)
         return case.is_of(record) and is_file(self.case(case) / PARTICLES)
 
     def damage(self, study: Study, case: Case) -> str | None:
@@ -126,7 +125,7 @@ class Folder:
         if damage := self.damage(study, case):
             lines.append(f"{damage}; kept as {_renamed(self.result(study, case)).name}")
         run = self.case(case)
-        if run.is_dir() and _json_of(run / FINISHED) is None:
+        if run.is_dir() and json_of(run / FINISHED) is None:
             lines.append(f"{run / FINISHED}: cannot be read; kept as {_renamed(run).name}")
         return lines
 
@@ -179,6 +178,23 @@ class Folder:
         with os.fdopen(handle, "w") as file:
             yield _locked(file)
 
+    @contextmanager
+    def gathering(self) -> Iterator[None]:
+        """Wait until nobody else gathers results of this folder, and let nobody meanwhile.
+
+        Who gathers and writes inside of it never replaces newer results by older ones. Where the
+        file system has no locks, or nothing may be written or has been run, it does not wait.
+        """
+        with ExitStack() as held:
+            with suppress(OSError):
+                handle = os.open(self._gathers, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666)
+                fcntl.flock(held.enter_context(os.fdopen(handle, "w")), fcntl.LOCK_EX)
+            yield
+
+    @property
+    def _gathers(self) -> Path:
+        return self.root / "cases" / ".locks" / "results"
+
     def _lock(self, case: Case) -> Path:
         return self.root / "cases" / ".locks" / case.name
 
@@ -212,6 +228,8 @@ class Folder:
             if case.inputs:
                 (part / INPUTS).mkdir()
             for name, file in case.inputs.items():
+                if not is_file(file.path):
+                    raise WorkflowError(f"{file.path}: has gone since the study was read")
                 copy = part / INPUTS / name
                 shutil.copyfile(file.path, copy)
                 if digest_of(copy) != file.digest:
@@ -227,7 +245,7 @@ class Folder:
         shutil.rmtree(self.failure(case), ignore_errors=True)
 
     def fail(self, case: Case, reason: str, job: str = "") -> list[str]:
-        """Put a failed run aside; return the last lines of its output.
+        """Put a failed run aside, as far as there is one; return the last lines of its output.
 
         Parameters
         ----------
@@ -237,9 +255,12 @@ class Folder:
         """
         failure = self.failure(case)
         shutil.rmtree(failure, ignore_errors=True)
-        self.part(case).rename(failure)
-        lines = last_lines(failure / "lmp.out")
-        write_json(failure / FAILED, {"reason": reason, "job": job, "last_lines": lines})
+        lines = last_lines(self.part(case) / "lmp.out")
+        # The run may have failed for want of room or rights, which a note of it needs as well.
+        with suppress(OSError, WorkflowError):
+            self.part(case).mkdir(exist_ok=True)
+            self.part(case).rename(failure)
+            write_json(failure / FAILED, {"reason": reason, "job": job, "last_lines": lines})
         return lines
 
     def reason(self, case: Case) -> str:
@@ -251,7 +272,7 @@ class Folder:
         return self._of_failure(case, "job") == job
 
     def _of_failure(self, case: Case, what: str) -> str:
-        said = (_json_of(self.failure(case) / FAILED) or {}).get(what, UNKNOWN)
+        said = (json_of(self.failure(case) / FAILED) or {}).get(what, UNKNOWN)
         return " ".join(str(said).split()) or UNKNOWN
 
 
@@ -265,15 +286,6 @@ def _locked(file: IO[str]) -> bool:
         else:
             return True
     return False
-
-
-def _json_of(path: Path) -> dict[str, Any] | None:
-    """Return what a JSON file holds; None if it cannot be read, or holds no object."""
-    try:
-        content = json.loads(read_regular(path, LARGEST_RECORD))
-    except (ValueError, RecursionError):
-        return None
-    return content if isinstance(content, dict) else None
 
 
 def _renamed(path: Path) -> Path:

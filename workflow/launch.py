@@ -12,14 +12,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from .errors import StudyError
+from .errors import StudyError, WorkflowError
 from .finished import NOT_MEASURED
 from .folder import MARK, Folder, last_lines
 from .progress import Display
@@ -126,21 +126,44 @@ class _Job:
             outcome.kept.append(name)
             display.ended(name, f"there already: {name}")
         else:
-            for line in self._folder.set_aside(self._study, self._case):
-                display.say(line)
-            self._measuring = self._folder.is_finished(self._case)
-            display.started(name, "measuring" if self._measuring else "running")
-            if self._measuring:
-                self._measure()
-            else:
-                self._folder.begin(self._case)
-                self._run()
-            return True
+            return self._unless_it_fails(self._start, outcome, display)
         self._held.close()
         return False
 
     def goes_on(self, outcome: Outcome, display: Display) -> bool:
         """Start the next process when one has ended; return False after the last."""
+        return self._unless_it_fails(self._go_on, outcome, display)
+
+    def _unless_it_fails(
+        self, step: Callable[[Outcome, Display], bool], outcome: Outcome, display: Display
+    ) -> bool:
+        """Take a step of the case; where a file is in its way, this case alone fails."""
+        try:
+            return step(outcome, display)
+        except BrokenPipeError:
+            # Whoever reads what is shown has gone: that ends the study.
+            raise
+        except (WorkflowError, OSError) as error:
+            if self._process is not None:
+                kill_group(self._process)
+            reason = in_a_line(error)
+            if self._measuring:
+                return self._leave(f"cannot be measured: {reason}", [], outcome, display)
+            return self._fail(reason, outcome, display)
+
+    def _start(self, outcome: Outcome, display: Display) -> bool:
+        for line in self._folder.set_aside(self._study, self._case):
+            display.say(line)
+        self._measuring = self._folder.is_finished(self._case)
+        display.started(self._case.name, "measuring" if self._measuring else "running")
+        if self._measuring:
+            self._measure()
+        else:
+            self._folder.begin(self._case)
+            self._run()
+        return True
+
+    def _go_on(self, outcome: Outcome, display: Display) -> bool:
         assert self._process is not None
         name, code = self._case.name, self._process.poll()
         if code is None:
@@ -160,9 +183,9 @@ class _Job:
             lines = last_lines(self._folder.case(self._case) / MEASURED)
             if code == 0 and self._folder.is_measured(self._study, self._case):
                 show_lacking(name, lines, display)
-                outcome.measured.append(name)
                 if self._study.outputs.keep == "results":
                     self._folder.drop_dumps(self._case)
+                outcome.measured.append(name)
                 display.ended(name, f"done in {self._seconds:.0f} s: {name}")
                 self._held.close()
                 return False
@@ -245,6 +268,11 @@ class _Job:
         output = self._folder.part(self._case) / "lmp.out"
         if steps and (step := step_of(output)) is not None:
             display.stepped(self._case.name, min(step, steps), steps)
+
+
+def in_a_line(error: Exception) -> str:
+    """Return what an error says as one line."""
+    return " ".join(str(error).split())
 
 
 def measuring(study: Study, case: Case, folder: Folder) -> list[str]:

@@ -18,15 +18,14 @@ from lammps_inelastic.analysis import (
     PictureError,
     RunFiles,
     UnfinishedRunError,
+    check_not_periodic,
     contact_counts,
     contacts_by_distance,
     measure_packing,
-    open_run,
     particles_inside,
-    read_run_log,
 )
 
-from .finished import LOG, unchanged
+from .finished import open_in_folder
 from .pictures import draw_frame
 
 PICTURE = "packing.png"
@@ -157,27 +156,18 @@ def _files(particles: ParticleDump, contacts: Path | None) -> RunFiles:
         raise AnalysisError(
             f"{contacts}: no such file; --contact-gap GAP counts contacts by distance"
         )
-    folder = particles.path.parent
-    log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
     try:
         # By distance, contacts are those of one frame, whatever comes after it.
-        files = open_run(particles, contacts, log, over=contacts is not None)
+        return open_in_folder(particles, contacts, over=contacts is not None)
     except UnfinishedRunError as error:
         raise AnalysisError(
             f"{error}; --contact-gap GAP counts contacts in the last frame that is there"
         ) from None
-    files.check_last(particles[-1])
-    unchanged(folder)
-    return files
 
 
 def _check_frame(dump: Path, frame: ParticleFrame, box: FloatArray) -> None:
     """Raise AnalysisError for a periodic box, and where no particle is in the measuring box."""
-    if any("p" in flags for flags in frame.boundaries):
-        raise AnalysisError(
-            f"{dump}: the box is periodic ({' '.join(frame.boundaries)}), and "
-            "overlaps across its faces are not looked for yet"
-        )
+    check_not_periodic(frame, dump)
     if not particles_inside(frame.particles.centres(frame.positions), box).any():
         raise AnalysisError(
             f"{dump}: no particle's centre lies in the box {as_ranges(box)} "

@@ -36,6 +36,7 @@ from lammps_inelastic.analysis import (
     backbone,
     best_packing_fraction,
     bond_order,
+    check_not_periodic,
     contact_counts,
     contacts_of,
     fabric_tensor,
@@ -106,12 +107,13 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
 def _open(
     folder: Path, record: Mapping[str, Any], stage: Mapping[str, Any]
 ) -> tuple[RunFiles, RunLog]:
-    """Open the files of a stage, which must be those of this run, and whole."""
+    """Open the files of a stage: those of this run, whole, and of a box that is not periodic."""
     where = folder / stage["folder"]
     log = read_run_log(where / LOG)
     contacts = None if has_soft_contacts(stage) else where / CONTACTS
     files = open_run(ParticleDump(where / PARTICLES), contacts, log)
     check_stage(folder, record, stage, files, log)
+    check_not_periodic(files.particles[-1], files.particles.path)
     return files, log
 
 
@@ -439,6 +441,7 @@ def _profile(
         points=wanted.points,
         seed=SEED,
     )
+    values["profile/diameter"] = np.asarray(diameter)
     values["profile/distance"] = drawn.distances
     values["profile/monte_carlo"] = drawn.values
     if drawn.uncertainties is not None:

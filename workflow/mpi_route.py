@@ -27,6 +27,7 @@ from .folder import Folder
 from .launch import (
     Options,
     Outcome,
+    in_a_line,
     measure_finished,
     measured_too_long,
     missing_file,
@@ -78,7 +79,9 @@ def run_in_job(
             except Exception as error:
                 if world.size > 1:
                     # After an error such as a full disk, the other ranks would wait for ever.
-                    print(f"inelastic: {case.name}: {_last(error)}", file=sys.stderr, flush=True)
+                    print(
+                        f"inelastic: {case.name}: {in_a_line(error)}", file=sys.stderr, flush=True
+                    )
                     time.sleep(HEARD)
                     world.Abort(2)
                 raise
@@ -129,25 +132,11 @@ def _lead(
         group.agree(NOTHING)
         return
     began = time.time()
-    for line in folder.set_aside(study, case):
-        display.say(line)
-    if folder.is_finished(case):
-        group.agree(MEASURE)
-    else:
-        display.started(case.name, "running")
-        part = folder.begin(case)
-        for stage in range(len(case.stages)):
-            prepare_stage(case, stage, part)
-        group.agree(RUN)
-        reason = _run(case, part, options, group)
-        seconds = time.time() - began
-        if reason is not None:
-            lines = folder.fail(case, reason, job)
-            outcome.failed[case.name] = reason
-            display.ended(case.name, f"FAILED ({reason}): {case.name}", lines)
-            return
-        commands = case.commands(options.ranks)
-        folder.finish(case, run_record(case, commands, options.ranks, began, seconds))
+    if (reason := _make(study, case, folder, options, group, display)) is not None:
+        lines = folder.fail(case, reason, job)
+        outcome.failed[case.name] = reason
+        display.ended(case.name, f"FAILED ({reason}): {case.name}", lines)
+        return
     display.started(case.name, "measuring")
     left = None if options.timeout is None else options.timeout - (time.time() - began)
     try:
@@ -166,6 +155,39 @@ def _lead(
     else:
         outcome.failed[case.name] = unmeasurable(reason, folder.case(case))
         display.ended(case.name, f"CANNOT BE MEASURED ({reason}): {case.name}")
+
+
+def _make(
+    study: Study, case: Case, folder: Folder, options: Options, group: _Group, display: Display
+) -> str | None:
+    """Run a case unless there is a whole run of it; return why it failed, if it did."""
+    began = time.time()
+    try:
+        for line in folder.set_aside(study, case):
+            display.say(line)
+        finished = folder.is_finished(case)
+        if not finished:
+            display.started(case.name, "running")
+            part = folder.begin(case)
+            for stage in range(len(case.stages)):
+                prepare_stage(case, stage, part)
+    except (WorkflowError, OSError) as error:
+        # A file is in the way of this case alone, and the other ranks of the group wait.
+        group.agree(NOTHING)
+        return in_a_line(error)
+    group.agree(MEASURE if finished else RUN)
+    if finished:
+        return None
+    reason = _run(case, part, options, group)
+    if reason is not None:
+        return reason
+    seconds = time.time() - began
+    record = run_record(case, case.commands(options.ranks), options.ranks, began, seconds)
+    try:
+        folder.finish(case, record)
+    except (WorkflowError, OSError) as error:
+        return in_a_line(error)
+    return None
 
 
 def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
@@ -193,13 +215,13 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
                     print(f"inelastic: {case.name}: {error}", flush=True)
                     time.sleep(HEARD)
                     MPI.COMM_WORLD.Abort(1)
-                return _last(error)
+                return in_a_line(error)
             # The errors of LAMMPS have no class of their own, and come on all ranks.
             except Exception as error:
                 if REFUSED in str(error):
                     return "exit status 1"
                 if ENDED not in str(error):
-                    return _last(error)
+                    return in_a_line(error)
             finally:
                 engine.close()
                 if group.leads:
@@ -223,10 +245,6 @@ def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
 def _without_quit(text: str) -> str:
     """Put an unknown command in the place of each `quit`."""
     return _QUIT.sub(lambda quit: REFUSED if int(quit.group(1) or 0) else ENDED, text)
-
-
-def _last(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 def _together(outcomes: Sequence[Outcome], cases: Sequence[Case]) -> Outcome:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,7 +86,7 @@ def read_record(path: Path) -> Recorded:
         identifiers = arrays["id"]
         first = np.asarray(np.searchsorted(identifiers, arrays["id1"]))
         second = np.where(arrays["id2"] > 0, np.searchsorted(identifiers, arrays["id2"]), -1)
-    except (OSError, ValueError, KeyError, EOFError, TypeError, BadZipFile) as error:
+    except (OSError, ValueError, KeyError, EOFError, TypeError, BadZipFile, zlib.error) as error:
         raise ValueError(f"{path}: no recorded contact problem, or a damaged one") from error
     return Recorded(arrays, first.astype(np.int64), second.astype(np.int64))
 

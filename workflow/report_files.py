@@ -6,7 +6,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from .files import write_text, writing
+from .errors import WorkflowError
+from .files import check_target, write_text, writing
 
 
 def write_report(
@@ -20,7 +21,14 @@ def write_report(
     out : HTML file to write
     figures : folder for the figures and their numbers; None writes none
     markdown : file for the tables as text; None writes none
+
+    Raises WorkflowError if a file cannot be written, or would replace results or the page.
     """
+    for target in (out, markdown):
+        if target is not None:
+            check_target(target, hdf5=False)
+    if markdown is not None and markdown.resolve() == out.resolve():
+        raise WorkflowError(f"{markdown}: page and tables need a file each: they have the same")
     # Drawing takes a while to import, for which the other subcommands need not wait.
     from .report import all_sections, read_data, render, render_markdown
     from .report.figures import Figure, Pictures

@@ -45,8 +45,9 @@ def run_and_gather(
     if first:
         print_outcome(study, outcome)
         file = folder.root / f"{study.name}.h5"
-        stored = gather_results(study, folder)
-        write_studies(file, [stored])
+        with folder.gathering():
+            stored = gather_results(study, folder)
+            write_studies(file, [stored])
         by_name = {case.name: case for case in study.cases}
         if other := sum(bool(differs(by_name[one.case], one.record)) for one in stored.results):
             print(other_code(other, folder.result_folder(study)))

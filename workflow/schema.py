@@ -155,6 +155,7 @@ SCHEMA: Mapping[str, Entry] = {
         "length^2/time^2",
         "kinetic energy over mass: mean of v^2 / 2 over the spheres, weighted by r^3",
     ),
+    "profile/diameter": _number("length", "of the largest sphere, by which slabs are measured"),
     "profile/distance": Entry("(s,)", "length", "middle of each slab from the wall"),
     "profile/packing_fraction": Entry("(s,)", "1", "in each slab, exact"),
     "profile/monte_carlo": Entry("(s,)", "1", "in each slab, by random points"),

@@ -309,7 +309,10 @@ def test_stl_of_many_spheres_is_written_in_parts(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("subdivisions", "message"),
-    [(-1, "must not be negative, not -1"), (12, r"1 spheres of 20 x 4\^12 .* more than 1e\+08")],
+    [
+        (-1, "subdivisions must be at least 0, not -1"),
+        (12, r"1 spheres of 20 x 4\^12 .* more than 1e\+08"),
+    ],
 )
 def test_wrong_subdivisions(tmp_path: Path, subdivisions: int, message: str) -> None:
     with pytest.raises(InputError, match=message):

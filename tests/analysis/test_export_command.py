@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -186,7 +187,7 @@ def failure_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["xyz", "--frame", "-4"], "no frame -4; there are 3, from 0 to 2"),
         (["xyz", "--voxel", "1"], "--voxel is for tiff and raw, not for xyz"),
         (["raw", "--subdivisions", "1"], "--subdivisions is for stl, not for raw"),
-        (["stl", "--subdivisions", "-1"], "must not be negative, not -1"),
+        (["stl", "--subdivisions", "-1"], "subdivisions must be at least 0, not -1"),
         (["stl", "--box", "2", "3", "2", "3", "2", "3"], "no sphere's centre lies in the box"),
         (["tiff", "--box", "2", "3", "2", "3", "2", "3"], "no sphere reaches into the box"),
         (["tiff", "--box", "1", "0", "0", "1", "0", "1"], "xlo = 1 must be less than xhi = 0"),
@@ -215,6 +216,18 @@ def test_no_dump(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     message = failure_of([str(tmp_path), "--format", "xyz"], capsys)
     assert "particles.lammpsdump: no such file" in message
     assert "nowhere: no such file" in failure_of(["nowhere", "--format", "xyz"], capsys)
+
+
+@pytest.mark.parametrize("name", ["particles.lammpsdump", "contacts.lammpsdump", "log.lammps"])
+def test_what_is_no_file(run: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nobody waits for the writer of a pipe, nor for the end of a device."""
+    (run / name).unlink(missing_ok=True)
+    os.mkfifo(run / name)
+    said = f"{run / name}: cannot be read: it is a folder, a pipe or a device, and must be a file"
+    assert said in failure_of([str(run), "--format", "xyz"], capsys)
+    (run / name).unlink()
+    (run / name).symlink_to("/dev/zero")
+    assert said in failure_of([str(run), "--format", "xyz"], capsys)
 
 
 def test_image_of_a_periodic_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -88,8 +88,8 @@ def test_forces_that_pull() -> None:
         ([1, np.inf], {}, "finite, and not all of them 0"),
         ([1, np.nan], {}, "finite, and not all of them 0"),
         ([0, 0], {}, "not all of them 0"),
-        ([1], {"bins": 0}, "at least one bin"),
-        ([1], {"largest": 0}, "at least one bin up to a positive force"),
+        ([1], {"bins": 0}, "number of bins must be at least 1"),
+        ([1], {"largest": 0}, "the largest force must be positive"),
     ],
 )
 def test_wrong_input(forces: Any, options: dict[str, Any], message: str) -> None:

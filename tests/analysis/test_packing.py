@@ -133,5 +133,5 @@ def test_wrong_input(positions: Any, radii: Any, box: Any, message: str) -> None
 
 
 def test_no_points() -> None:
-    with pytest.raises(InputError, match="at least one point is needed, not 0"):
+    with pytest.raises(InputError, match="the number of points must be at least 1, not 0"):
         packing_fraction([[0, 0, 0]], [1], UNIT, points=0)

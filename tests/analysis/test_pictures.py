@@ -93,13 +93,20 @@ def test_picture_into_no_folder(tmp_path: Path) -> None:
         draw_packing(tmp_path / "no" / "packing.png", CENTRES, RADII, CONTAINER, pixels=100)
 
 
+def test_nothing_is_left_of_a_picture_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "packing.png").mkdir()
+    with pytest.raises(PictureError, match=r"packing\.png: cannot be written: Is a directory"):
+        draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER, pixels=100)
+    assert [path.name for path in tmp_path.iterdir()] == ["packing.png"]
+
+
 def test_wrong_number_of_contacts(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"contacts must have shape \(2,\), not \(3,\)"):
         draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2, 3])
 
 
 def test_a_colour_for_no_contacts_at_all(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="at least one number of contacts, not 0"):
+    with pytest.raises(InputError, match="share a colour must be at least 1, not 0"):
         draw_packing(
             tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2], contacts_per_colour=0
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,8 @@ def written(path: Path, text: str) -> list[int] | None:
         (DUMP.format(3) + "dump_modify all delay 5\n" + run(0, 7), None),
         (DUMP.format(3) + "dump_modify all skip v_dull\n" + run(0, 7), None),
         (DUMP.format(1) + "dump_modify all every/time 0.15\n" + run(0, 7), None),
+        # More frames than there is memory for.
+        (DUMP.format(1) + run(0, 7).replace("for 7", "for 40000000000"), None),
         (
             DUMP.format(1)
             + "dump_modify all every/time 0.3\nthermo_modify format float %.2g\n"
@@ -99,6 +102,15 @@ def test_frames_of_which_a_log_tells(tmp_path: Path, text: str, steps: list[int]
         (run(0, 9).replace("for 9", "for 4"), "line 1: the lines of thermo output do not follow"),
         (run(5, 5).replace("    10 ", "     4 "), "the lines of thermo output do not follow one"),
         ("   Step Time\nLoop time of 1 on 1 procs for 0 steps with 3 atoms\n", "a run has no line"),
+        # Numbers that are damaged: far more steps than there is memory for, and what is no number.
+        (
+            "thermo 1\n" + run(0, 1).replace("for 1", "for 40000000000"),
+            "line 2: a line of thermo output of step 2 is missing, in the run from step 0 to 400",
+        ),
+        (run(0, 5).replace("of 0.5", "of 0.00.1"), "line 4: 'Loop time of 0.00.1 on 2 procs f"),
+        (run(0, 5).replace("for 5", "for " + "9" * 5000), "line 4: 'Loop time of 0.5 on 2 procs"),
+        (run(0, 5).replace("with 3", "with " + "9" * 5000), "line 4: .* is damaged: it must hold"),
+        (run(0, 5).replace("     5 ", "5" * 400 + " "), "line 3: '5+\\.\\.\\.' is no step"),
     ],
 )
 def test_a_log_that_contradicts_itself(tmp_path: Path, text: str, said: str) -> None:
@@ -109,8 +121,10 @@ def test_a_log_that_contradicts_itself(tmp_path: Path, text: str, said: str) -> 
 def test_what_is_no_log(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"log\.lammps: no such file"):
         read_run_log(tmp_path / "log.lammps")
-    with pytest.raises(LogError, match="cannot be read: Is a directory"):
-        read_run_log(tmp_path)
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path, tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(LogError, match="cannot be read: it is a folder, a pipe or a device"):
+            read_run_log(path)
     (tmp_path / "picture").write_bytes(bytes(range(256)) * 10)
     assert read_run_log(tmp_path / "picture").runs == []
 

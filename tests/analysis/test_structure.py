@@ -55,7 +55,7 @@ INSIDE = np.array([[3, 7], [3, 7], [3, 7]])
 def test_crystals(
     centres: FloatArray, box: Any, name: str, q4: float, q6: float, w6: float
 ) -> None:
-    found = bond_order(centres, box)
+    found = bond_order(centres, box, w6=True)
     # The values of Steinhardt, Nelson and Ronchetti (1983), to the digits given.
     assert found.q4 == pytest.approx(q4, abs=SINGLE)
     assert found.q6 == pytest.approx(q6, abs=SINGLE)
@@ -64,7 +64,6 @@ def test_crystals(
     assert found.crystallised
     assert found.shares[name] == 1
     assert sum(found.shares.values()) == 1
-    assert found.verdict().startswith("crystallised: 100.0% of ")
 
 
 def test_a_shaken_crystal_is_still_one() -> None:
@@ -81,7 +80,8 @@ def test_points_at_random_are_no_crystal() -> None:
     assert found.crystalline_share < 0.001
     assert not found.crystallised
     assert found.shares["disordered"] > 0.999
-    assert found.verdict().startswith("not crystallised: 0.0% of ")
+    # It takes a third longer, and few ask for it.
+    assert found.w6 is None
 
 
 def test_radial_distribution_of_points_at_random_is_one() -> None:
@@ -129,8 +129,14 @@ def test_plot() -> None:
     [
         (lambda: bond_order(FCC[:12], [[0, 1]] * 3), "more than 12 particles are needed, not 12"),
         (lambda: bond_order(FCC, [[50, 51]] * 3), "no particle's centre lies in the box"),
-        (lambda: radial_distribution(FCC, MIDDLE, largest=0), "at least one shell"),
-        (lambda: radial_distribution(FCC, MIDDLE, largest=1, bins=0), "at least one shell"),
+        (
+            lambda: radial_distribution(FCC, MIDDLE, largest=0),
+            "the largest radius must be positive",
+        ),
+        (
+            lambda: radial_distribution(FCC, MIDDLE, largest=1, bins=0),
+            "number of shells must be at least 1",
+        ),
     ],
 )
 def test_wrong_input(call: Callable[[], object], message: str) -> None:

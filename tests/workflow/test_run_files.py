@@ -18,9 +18,10 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import AnalysisError, ParticleDump, open_run, read_run_log
+from lammps_inelastic.workflow.finished import other_run
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.measure import measure_case
-from lammps_inelastic.workflow.study import Outputs, read_study
+from lammps_inelastic.workflow.study import Outputs, ProfileOutput, read_study
 from tests.pouring import NO_STEPS
 from tests.workflow.few_spheres import TINY
 from tests.workflow.study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same
@@ -346,6 +347,27 @@ def test_a_frame_can_be_named_by_its_step(
     assert "names sphere 999" in refusal(capsys, *export, "--step", 135)
 
 
+@pytest.mark.parametrize("text", ["[" * 100_000, "null", '{"stages": 1}'])
+def test_a_record_that_is_none(
+    runs: tuple[Path, Path], text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It tells of no files, which cannot be compared with it."""
+    run, _ = runs
+    record = json.loads((run / "finished.json").read_text())
+    for content in (text, json.dumps(record | {"files": [1]})):
+        (run / "finished.json").write_text(content)
+        assert main(["look", str(run), *BOX, "--points", "1000", "--no-picture"]) == 0
+        assert bool(other_run(run, record)) == content.startswith("{")
+
+
+def test_a_log_without_runs(runs: tuple[Path, Path]) -> None:
+    run, _ = runs
+    text = (run / LOG).read_text()
+    (run / LOG).write_text(re.sub(r"^   Step.*?^Loop time.*?$", "", text, flags=re.M | re.S))
+    with pytest.raises(AnalysisError, match=r"log\.lammps: tells of no run: a part of it is miss"):
+        measure_case(run, OUTPUTS)
+
+
 def test_a_run_that_goes_on_can_be_looked_at(
     runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -426,6 +448,25 @@ def test_every_stage_of_a_run_is_compared(
         (stage / LOG).write_text(whole)
     (run / "spheres" / CONTACTS).unlink()
     with pytest.raises(AnalysisError, match=r"contacts\.lammpsdump: no such file"):
+        measure_case(run, OUTPUTS)
+
+
+def test_a_profile_notes_the_diameter_of_its_slabs(runs: tuple[Path, Path]) -> None:
+    """A report cannot know it otherwise where a deck has no variable of that name."""
+    slabs = ProfileOutput(reach=0.2, thickness=0.5, points=100)
+    values = measure_case(runs[0], OUTPUTS.model_copy(update={"profile": slabs})).values
+    assert values["profile/diameter"] == 0.2
+    assert values["profile/distance"].tolist() == pytest.approx([0.05, 0.15], rel=1e-12)
+
+
+def test_a_periodic_box_is_not_measured(runs: tuple[Path, Path]) -> None:
+    """Nothing is looked for across its faces: a study would have too few contacts."""
+    run, _ = runs
+    record = json.loads((run / "finished.json").read_text())
+    (run / "finished.json").write_text(json.dumps(record | {"files": {}}))
+    dump = run / PARTICLES
+    dump.write_text(dump.read_text().replace("BOX BOUNDS ff ff ff", "BOX BOUNDS pp ff ff"))
+    with pytest.raises(AnalysisError, match=r"particles\.lammpsdump: the box is periodic \(pp ff"):
         measure_case(run, OUTPUTS)
 
 

@@ -330,7 +330,7 @@ def test_somebody_else_runs_it(
 def test_starts_from_a_data_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_data(tmp_path / "my.data", diameter=0.2)
     path = tmp_path / "few.toml"
-    text = TINY.replace("{seeds}", "1").replace("[outputs]", "start = 'my.data'\n[outputs]")
+    text = TINY.replace("{seeds}", "1").replace("particles = 30", "start = 'my.data'")
     path.write_text(text)
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
     numbers = numbers_of(tmp_path / "out" / "few.h5")
@@ -405,3 +405,28 @@ def test_a_look_does_not_keep_a_run_from_its_case(tmp_path: Path) -> None:
     with folder.lock(case) as mine:
         assert mine
     looker.join()
+
+
+@pytest.mark.parametrize("options", [[], ["--mpi"]])
+def test_a_start_that_is_missing_fails_its_case_alone(
+    options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first case deletes the start of the second one, and the third one runs."""
+    names = ["a.data", "b.data", "c.data"]
+    for name in names:
+        (tmp_path / name).write_text(name)
+    deck = f"variable start index none\nprint 'here'\nshell rm -f {tmp_path / 'b.data'}\n"
+    (tmp_path / "own.in").write_text(deck)
+    path = tmp_path / "own.toml"
+    path.write_text(f"title = 't'\ndeck = 'own.in'\n[parameters]\nstart = {names}\n")
+    out = tmp_path / "out"
+    done = inelastic("run", path, "--out", out, "--at-once", 1, *options, ranks=len(options))
+    assert (done.returncode, done.stderr) == (1, "")
+    gone = f"{tmp_path / 'b.data'}: has gone since the study was read"
+    failed = [line for line in done.stdout.splitlines() if line.startswith("  failed: own_")]
+    assert sum(line.endswith(f": {gone}") for line in failed) == 1
+    # The deck leaves nothing to measure, but has run.
+    assert sum(": cannot be measured: " in line for line in failed) == 2
+    (tmp_path / "b.data").write_text("b.data")
+    assert main(["status", str(path), "--out", str(out)]) == 0
+    assert gone in capsys.readouterr().out

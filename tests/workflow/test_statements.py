@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import statistics
 from typing import Any
 
 import h5py
@@ -89,7 +90,7 @@ def test_how_many_runs_reach_a_plateau() -> None:
         first = outside[-1] + 1 if len(outside) else 0
         times[float(force)].append(time[first] if first < len(phi) else math.inf)
     reached = {force: int(np.isfinite(values).sum()) for force, values in times.items()}
-    middle = {force: np.sort(values)[len(values) // 2] for force, values in times.items()}
+    middle = {force: statistics.median(values) for force, values in times.items()}
     assert (
         f"{reached[FORCE]} of 36 runs reach a plateau of the packing fraction, after a median of "
         f"{middle[FORCE]:.2f} units of time; without it {reached[0.0]} of 36 do, and the median is "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import hashlib
 import io
 import random
@@ -14,7 +16,13 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.workflow.errors import WorkflowError
+from lammps_inelastic.workflow.files import whole
+from lammps_inelastic.workflow.folder import Folder
+from lammps_inelastic.workflow.launch import Options
+from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.run_and_gather import run_and_gather
 from lammps_inelastic.workflow.schema import SCHEMA, VERSION
+from lammps_inelastic.workflow.shipped import shipped_studies
 from lammps_inelastic.workflow.store import (
     SEAL,
     Result,
@@ -24,6 +32,7 @@ from lammps_inelastic.workflow.store import (
     write_result,
     write_studies,
 )
+from lammps_inelastic.workflow.study import Study, read_study
 
 
 def result_of(case: str, /, **variables: Any) -> Result:
@@ -158,3 +167,70 @@ def test_the_document_lists_the_schema() -> None:
         f"| `{name}` | {entry.shape} | {entry.unit} | {entry.meaning} |"
         for name, entry in SCHEMA.items()
     ]
+
+
+def test_two_writers_of_one_file_do_not_meet(tmp_path: Path) -> None:
+    """They may be on two machines, where processes may have the same number."""
+    path = tmp_path / "a.txt"
+    with whole(path) as first, whole(path) as second:
+        first.write_text("first")
+        second.write_text("second")
+    assert path.read_text() == "first"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("module", ["cli.collect", "run_and_gather", "cli.reproduce"])
+def test_results_are_gathered_by_one_at_a_time(
+    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise an older set of them could be written after a newer one."""
+    folder = Folder(tmp_path)
+    locks = tmp_path / "cases" / ".locks"
+    locks.mkdir(parents=True)
+    held = []
+
+    def is_held() -> bool:
+        with (locks / "results").open("a") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+        return False
+
+    def gather(study: Study, _: Folder) -> StoredStudy:
+        held.append(is_held())
+        return StoredStudy(study.name, study.title, study.text, [])
+
+    def write(*_: object) -> None:
+        held.append(is_held())
+
+    place = f"lammps_inelastic.workflow.{module}"
+    monkeypatch.setattr(f"{place}.gather_results", gather)
+    monkeypatch.setattr(f"{place}.write_studies", write)
+    if module == "cli.collect":
+        assert main(["collect", "table-1", "--out", str(tmp_path)]) == 0
+    elif module == "run_and_gather":
+        study = read_study(shipped_studies()["table-1"])
+        run_and_gather(study, [], folder, Options())
+    else:
+        monkeypatch.setattr(f"{place}.write_report", lambda *_: None)
+        (tmp_path / "kept" / "table-1").mkdir(parents=True)
+        kept = ["--stored-only", "--results", str(tmp_path / "kept")]
+        assert main(["reproduce", "--out", str(tmp_path), *kept]) == 0
+    assert held
+    assert all(held)
+    assert not is_held()
+
+
+def test_results_are_gathered_where_there_are_no_locks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_locks(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    with Folder(tmp_path / "nowhere").gathering():
+        assert not list(tmp_path.iterdir())
+    (tmp_path / "cases" / ".locks").mkdir(parents=True)
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    with Folder(tmp_path).gathering():
+        pass

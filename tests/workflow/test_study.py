@@ -84,6 +84,11 @@ def mistakes_of(path: Path) -> list[str]:
             HEAD + "outputs = { pictures = 5 }",
             "outputs.pictures: 5 is not allowed: it must be a li",
         ),
+        (HEAD + "rows = [{}, 5]", "rows[2]: 5 is not allowed: it must be a table (at line 3)"),
+        (
+            HEAD + "[outputs]\npictures = [0, 1.5]",
+            "outputs.pictures[2]: 1.5 is not allowed: it must be a whole number from 0 to ",
+        ),
         (HEAD + "rows = 5", "rows: 5 is not allowed: it must be a list"),
         (HEAD + "parameters = []", "parameters: [] is not allowed: it must be a table"),
         (HEAD + "[parameters]\nseed = '1'", "parameters.seed: '1' is not allowed: it must be a wh"),
@@ -291,6 +296,33 @@ def test_a_start_may_have_any_name(
     part = Folder(tmp_path / "out").begin(case)
     assert (part / "inputs" / name).read_text() == "data"
     assert (part / "spheres.in").read_text() == case.stages[0].deck.text
+
+
+def test_a_start_from_a_file_has_particles_of_its_own(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Several numbers of them would be one start, run again and again under wrong names."""
+    (tmp_path / "my.data").write_text("data")
+    text = HEAD + "[parameters]\nparticles = [1000, 2000]\n"
+    refusal = "not allowed where start is a file, which has a number of particles of its own"
+    for start, key in (
+        ("start = './my.data'", "parameters.particles"),
+        ("[[rows]]\nstart = ['random', './my.data']", "parameters.particles"),
+        ("[[rows]]\nstart = './my.data'\nparticles = 5", "rows[1].particles"),
+    ):
+        (line,) = mistakes_of(write_study(text + start))
+        assert line.startswith(f"{key}: {refusal}")
+    rows = "[[rows]]\nparticles = [1000, 2000]\n[[rows]]\nstart = './my.data'"
+    names = [case.name.rpartition("_")[0] for case in read_study(write_study(HEAD + rows)).cases]
+    assert names == [
+        "spheres_particles=1000_seed=1",
+        "spheres_particles=2000_seed=1",
+        "spheres_start=inputs-my.data_seed=1",
+    ]
+    # A deck of one's own may need both.
+    (tmp_path / "own.in").write_text("variable start index x\nvariable particles index 5\n")
+    own = "title = 't'\ndeck = 'own.in'\n[parameters]\nstart = './my.data'\nparticles = [1, 2]"
+    assert len(read_study(write_study(own)).cases) == 2
 
 
 def test_a_word_of_a_deck_is_no_file(write_study: Callable[..., Path], tmp_path: Path) -> None:

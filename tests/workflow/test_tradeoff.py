@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import (
@@ -30,6 +31,7 @@ from lammps_inelastic.workflow.study import Case
 from lammps_inelastic.workflow.thermo import read_thermo
 from lammps_inelastic.workflow.tradeoff.advice import recommendations
 from lammps_inelastic.workflow.tradeoff.comparison import compare, reference_of
+from lammps_inelastic.workflow.tradeoff.figure import plot_errors
 from lammps_inelastic.workflow.tradeoff.plan import Configuration, Plan, Run
 from lammps_inelastic.workflow.tradeoff.states import (
     EXACT,
@@ -38,7 +40,10 @@ from lammps_inelastic.workflow.tradeoff.states import (
     curves_of,
     errors,
     problems_of,
+    read_states,
+    write_states,
 )
+from lammps_inelastic.workflow.tradeoff.table import as_csv
 from tests.core.contact_problems import Problem, no_bodies
 from tests.core.reference_solver import reference
 from tests.workflow.few_spheres import write_data
@@ -270,6 +275,30 @@ def test_a_start_without_a_reference_or_not_at_rest_counts_where_it_can() -> Non
     assert (len(loose.outcomes), len(loose.values("plateau_time"))) == (3, 2)
 
 
+def test_no_errors_against_a_reference_that_still_moves() -> None:
+    results = made_up_study()
+    for run, result in results:
+        if (run.start, run.configuration) == ("1", configuration(tolerance=0.0005)):
+            result.values["numbers/plateau_time"] = np.array(np.nan)
+    comparison = compare(results)
+    _, loose, soft = comparison.rows
+    names = ("packing_fraction_error", "coordination_number_error", "network_error", "shared")
+    for row in (loose, soft):
+        for one in row.outcomes:
+            known = [name for name in names if math.isfinite(one.numbers[name])]
+            assert known == ([] if one.run.start == "1" else [*names])
+        assert len(comparison.shifts(row, "packing_fraction")) == 2
+    # The starts 2 and 3 have 0.61 and 0.62.
+    assert comparison.scatter("packing_fraction") == pytest.approx(0.01 / math.sqrt(2))
+    lines = list(csv.DictReader(as_csv(comparison).splitlines()))
+    assert [line["start"] for line in lines if line["network_error"]] == ["2", "3", "2", "3"]
+    ax = Figure().subplots()
+    plot_errors(ax, comparison, "packing_fraction")
+    runs, medians, *_ = (line.get_xydata().tolist() for line in ax.lines)
+    assert len(runs) == 2
+    assert medians == [[0.005, pytest.approx(0.005)]]
+
+
 def test_the_reference_is_the_tightest_with_the_shortest_step() -> None:
     best = configuration(tolerance=1e-6, dt=0.005)
     others = [configuration(tolerance=1e-6), configuration("soft", 1e-7), configuration()]
@@ -463,7 +492,7 @@ def test_damaged_records_are_named(
     """A damaged record costs its own start; the solutions of the other one are kept."""
     arguments, out = finished
     (one, *_) = out.glob("states/cases/*")
-    saved = {path: path.read_bytes() for path in one.glob("*.npz")}
+    saved = {path: path.read_bytes() for path in [*one.glob("*.npz"), *one.glob("solved-*")]}
     for path, content in saved.items():
         path.write_bytes(content[:100])
     try:
@@ -477,6 +506,51 @@ def test_damaged_records_are_named(
     with (out / "states.csv").open() as file:
         assert len({row["start"] for row in csv.DictReader(file)}) == 1
     assert main(arguments) == 0
+
+
+def test_a_cut_off_log_of_a_recorded_run(
+    finished: tuple[list[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody needs it once all is solved; without it, what is not solved is left out."""
+    arguments, out = finished
+    (one, *_) = out.glob("states/cases/*")
+    saved = {path: path.read_bytes() for path in (one / "log.lammps", one / "solved-rest.json")}
+    cut = saved[one / "log.lammps"]
+    (one / "log.lammps").write_bytes(cut[: cut.rindex(b"Loop time of")])
+    before = (out / "states.csv").read_text()
+    try:
+        assert main(arguments) == 0
+        assert (out / "states.csv").read_text() == before
+        (one / "solved-rest.json").unlink()
+        (one / "log.lammps").write_bytes(cut[: cut.rindex(b"   Step")])
+        capsys.readouterr()
+        assert main(arguments) == 1
+    finally:
+        for path, content in saved.items():
+            path.write_bytes(content)
+    said = f"left out: {one.name}: {one / 'log.lammps'}: tells of no run that settles and then ends"
+    assert said in capsys.readouterr().out
+    assert len((out / "states.csv").read_text().splitlines()) < len(before.splitlines())
+    assert main(arguments) == 0
+
+
+def test_logs_that_tell_of_no_settling(tmp_path: Path) -> None:
+    end = "Loop time of 1 on 1 procs for 0 steps with 3 atoms\n"
+    for text in ("", f"   Step   Time\n  0   0\n{end}", 2 * f"   Step\n  0\n{end}"):
+        (tmp_path / "log.lammps").write_text(text)
+        with pytest.raises(ValueError, match=r"log\.lammps: tells of no run that settles"):
+            problems_of(tmp_path)
+
+
+def test_solutions_are_written_and_read(tmp_path: Path) -> None:
+    path = tmp_path / "solved-rest.json"
+    state = Solved("1", "rest", 7, "apgd from zero", 5e-7, 12, 1 / 3, 0.1, math.pi, 0.0, 1e-300)
+    write_states(path, [state])
+    assert read_states(path) == [state]
+    for text in ("[" * 100_000, "{}", "null", '[{"start": "1"}]', path.read_text()[:-9]):
+        path.write_text(text)
+        with pytest.raises(ValueError, match=r"solved-rest\.json: no JSON|validation error"):
+            read_states(path)
 
 
 def test_errors_of_a_solution() -> None:

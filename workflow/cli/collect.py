@@ -6,15 +6,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..errors import WorkflowError
-from ..files import is_file
+from ..files import check_target
 from ..folder import Folder
 from ..gather import gather_results
 from ..store import write_studies
 from .arguments import add_out, add_studies, as_cases, read_studies
-
-# Every HDF5 file begins with these bytes.
-HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -37,20 +33,11 @@ def run(options: argparse.Namespace) -> int:
     studies = read_studies(options.studies)
     folder = Folder(options.out)
     file = options.file or folder.root / f"{'+'.join(study.name for study in studies)}.h5"
-    _check_target(file)
-    stored = [gather_results(study, folder) for study in studies]
-    write_studies(file, stored)
+    check_target(file, hdf5=True)
+    with folder.gathering():
+        stored = [gather_results(study, folder) for study in studies]
+        write_studies(file, stored)
     for study, found in zip(studies, stored, strict=True):
         print(f"{study.name}: {len(found.results)} of {as_cases(study.cases)}")
     print(f"written: {file}")
     return 0
-
-
-def _check_target(file: Path) -> None:
-    """Raise WorkflowError if a file that would be replaced is no HDF5 file."""
-    if not is_file(file):
-        return
-    with file.open("rb") as opened:
-        start = opened.read(len(HDF5))
-    if start and start != HDF5:
-        raise WorkflowError(f"{file}: this file is no HDF5 file, and is not replaced")

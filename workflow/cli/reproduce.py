@@ -80,7 +80,8 @@ def run(options: argparse.Namespace) -> int:
         if not options.stored_only:
             failed += len(run_and_gather(study, study.cases, folder, running).failed)
     store = folder.root / STORE
-    write_studies(store, [gather_results(study, folder) for study in studies])
+    with folder.gathering():
+        write_studies(store, [gather_results(study, folder) for study in studies])
     print(f"results: {store}")
     root = folder.root
     write_report([store], root / REPORT, root / FIGURES, root / TABLES)

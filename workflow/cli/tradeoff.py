@@ -22,6 +22,7 @@ from ..tradeoff.comparison import compare
 from ..tradeoff.options import read_plan
 from ..tradeoff.plan import Plan, Run, command_line, label_of, runs_of
 from ..tradeoff.states import (
+    MOMENTS,
     Solved,
     curves_of,
     problems_of,
@@ -165,18 +166,22 @@ def _solve_states(plan: Plan, out: Path, timeout: float | None) -> tuple[list[So
         for start, case in zip(plan.starts, cases, strict=True):
             if not folder.is_measured(study, case):
                 continue
+            done = {name: folder.case(case) / f"solved-{name}.json" for name in MOMENTS}
+            solved: dict[str, list[Solved]] = {}
+            for moment, path in done.items():
+                with suppress(ValueError):
+                    solved[moment] = read_states(path)
+            left = [moment for moment in MOMENTS if moment not in solved]
             try:
-                for moment, problem in problems_of(folder.case(case)).items():
-                    done = folder.case(case) / f"solved-{moment}.json"
-                    with suppress(OSError, ValueError, TypeError):
-                        states += read_states(done)
-                        continue
+                # What is solved needs neither the log of its run nor its problem.
+                problems = problems_of(folder.case(case), left) if left else {}
+                for moment, problem in problems.items():
                     display.say(f"solves {case.name}, {moment}")
-                    solved = list(solve_state(label_of(start), moment, problem))
-                    write_states(done, solved)
-                    states += solved
+                    solved[moment] = list(solve_state(label_of(start), moment, problem))
+                    write_states(done[moment], solved[moment])
             except ValueError as error:
                 lost.append(f"left out: {case.name}: {error}")
+            states += [one for moment in MOMENTS for one in solved.get(moment, ())]
     return states, lost
 
 

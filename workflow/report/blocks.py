@@ -178,9 +178,9 @@ class Section:
         return all(isinstance(block, Text) and block.missing for block in self.blocks)
 
 
-def missing(study: str) -> Text:
-    """Return the note of a study that has no results."""
-    return Text(f"Not run yet. To make it: inelastic run {study} --out DIR", missing=True)
+def missing(command: str) -> Text:
+    """Return the note of a study that has no results, with the command that makes them."""
+    return Text(f"Not run yet. To make it: {command}", missing=True)
 
 
 def nothing_run() -> Text:

@@ -34,7 +34,7 @@ from .sections import (
     tolerance_and_force,
 )
 from .sections.any_study import study_section
-from .sections.provenance import provenance_section
+from .sections.provenance import commands, provenance_section
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,8 @@ class Entry:
     def section(self, name: str, data: Data) -> Section:
         """Return the section, with a note in it if there is nothing to show."""
         content = self.build(data)
-        note = missing(self.studies[0]) if self.studies else nothing_run()
+        run = commands(data, self.studies[:1])
+        note = missing(run[0]) if run else nothing_run()
         blocks = content.blocks or [note]
         return Section(
             name,
@@ -71,7 +72,9 @@ class Entry:
 SECTIONS: Mapping[str, Entry] = {
     "figure-4": Entry("Figure 4: spheres fall", pictures.falling_spheres, ["figure-4"]),
     "figure-5": Entry(
-        "Figure 5: the packing comes to rest", coming_to_rest.coming_to_rest, ["table-2"]
+        "Figure 5: the packing comes to rest",
+        coming_to_rest.coming_to_rest,
+        ["table-2", "more-seeds"],
     ),
     "table-1": Entry(
         "Table 1: tolerance and random force",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -114,13 +115,15 @@ def profile(result: Result) -> tuple[FloatArray, FloatArray] | None:
     """Return a wall profile: distance over the diameter (s,), packing fraction (s,), or None.
 
     The packing fraction is that of exact volumes where it was measured, else of random points.
-    None stands for a result without a profile.
+    None stands for a result without a profile, or whose diameter is not known.
     """
     distance = result.values.get("profile/distance")
     values = result.values.get("profile/packing_fraction", result.values.get("profile/monte_carlo"))
-    if distance is None or values is None:
+    # Older results do not note the diameter: theirs is that of the deck, if it has one.
+    diameter = float(result.values.get("profile/diameter", result.setting("diameter")))
+    if distance is None or values is None or math.isnan(diameter):
         return None
-    return distance / result.setting("diameter", 1.0), values
+    return distance / diameter, values
 
 
 def profiles(results: Iterable[Result]) -> list[tuple[FloatArray, FloatArray]]:

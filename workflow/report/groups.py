@@ -45,20 +45,20 @@ def varying(results: Sequence[Result]) -> list[str]:
     ]
 
 
-def labelled(results: Sequence[Result]) -> dict[str, list[Result]]:
-    """Return the results of the same parameters together, by what is not the same in all.
+def labelled(results: Sequence[Result]) -> list[tuple[str, list[Result]]]:
+    """Return the results of the same parameters together, each group with what is not alike in all.
 
     The label names the deck, where there are several, and what varies among the runs of that deck.
     """
     decks = grouped(results, lambda result: str(result.record["deck"]))
-    groups: dict[str, list[Result]] = {}
+    groups: list[tuple[str, list[Result]]] = []
     for deck, runs in decks.items():
         names = varying(runs)
         for (_, *values), group in grouped(runs, by_variables(names)).items():
             words = [f"{n} = {as_value(v)}" for n, v in zip(names, values, strict=True)]
             if len(decks) > 1 or not words:
                 words.insert(0, deck)
-            groups[", ".join(words)] = group
+            groups.append((", ".join(words), group))
     return groups
 
 

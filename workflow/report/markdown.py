@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from .blocks import Cell, Section, Table, Text
 from .data import Data
 from .figures import Figure
-from .page import Summary, summarise
-from .sections.provenance import codes_line
+from .page import OF_COMPARISON, OF_RESULTS, Summary, summarise
+from .sections.provenance import codes_line, commands
 
 # These sections hold all that is needed to repeat the runs: the page has them.
 LEFT_OUT = frozenset({"provenance", "checks"})
@@ -25,8 +25,9 @@ def render_markdown(data: Data, sections: Sequence[Section], figures: str = "") 
     """
     results = [result for study in data.studies.values() for result in study.results]
     once = list({result.case: result for result in results}.values())
-    blocks = ["# Does it reproduce the paper?", codes_line(once)]
     summary = summarise(sections)
+    heading = OF_RESULTS if summary is None else OF_COMPARISON
+    blocks = [f"# {heading}", codes_line(once)]
     if summary is not None:
         blocks += _summary(summary)
     for section in sections:
@@ -35,7 +36,7 @@ def render_markdown(data: Data, sections: Sequence[Section], figures: str = "") 
         blocks.append(f"## {section.title}")
         blocks += _blocks(section, figures)
         if section.studies:
-            blocks.append(f"`inelastic run {' '.join(section.studies)} --out DIR`")
+            blocks.append("\n".join(["```sh", *commands(data, section.studies), "```"]))
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 

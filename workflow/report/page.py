@@ -20,6 +20,8 @@ from .statistics import SIGNIFICANT, adjusted, computing_seconds
 from .text import DASH, as_probability, as_stated, as_text, as_time
 
 TEMPLATE = "template.html.j2"
+# The headings of a report, and of what compares it with the paper where there is anything to.
+OF_RESULTS, OF_COMPARISON = "Hard random packings: results", "Does it reproduce the paper?"
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,8 @@ def render(data: Data, sections: Sequence[Section]) -> str:
     once = {result.case: result for result in results}.values()
     return environment.from_string(text).render(
         paper=data.paper["source"],
+        of_results=OF_RESULTS,
+        of_comparison=OF_COMPARISON,
         sections=sections,
         summary=summarise(sections),
         commands=partial(commands, data),

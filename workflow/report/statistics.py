@@ -198,6 +198,14 @@ class Difference:
 UNKNOWN = Difference(math.nan, math.nan, math.nan)
 
 
+def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
+    """Say whether all hold: not known if one is not, and none is known to be false."""
+    found = list(verdicts)
+    if False in found:
+        return False
+    return None if None in found or not found else True
+
+
 def difference(one: Sample | Stated, other: Sample | Stated) -> Difference:
     """Return the difference of two means by Welch's t test.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from decimal import Decimal
 
 from .statistics import Sample, Stated
 
@@ -12,6 +13,8 @@ NOT_RUN = "not run yet"
 DASH, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
 # The paper's means over several simulations are printed with two decimals.
 DECIMALS_OF_SERIES = 2
+# A number of so many digits before or behind the point is written with a power of ten.
+LONGEST = 12
 
 
 def as_text(value: float, decimals: int) -> str:
@@ -25,12 +28,16 @@ def as_text(value: float, decimals: int) -> str:
 
 def as_short(value: float) -> str:
     """Write a number in as few digits as it needs, at most four, or a dash for NaN."""
-    if math.isnan(value) or value == 0:
-        return DASH if math.isnan(value) else "0"
-    # Fixed notation is read more easily, and fits all that occurs here.
+    if value == 0 or not math.isfinite(value):
+        return as_text(value, 0)
+    # Fixed notation is read more easily; a tiny or huge number would be zeros alone.
     decimals = 3 - math.floor(math.log10(abs(value)))
-    text = f"{value:.{max(decimals, 0)}f}" if decimals < 12 else f"{value:.4g}"
-    return (text.rstrip("0").rstrip(".") if "." in text else text).replace("-", MINUS)
+    if not -LONGEST < decimals < LONGEST:
+        text = f"{value:.4g}"
+    else:
+        text = f"{value:.{max(decimals, 0)}f}"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+    return text.replace("-", MINUS)
 
 
 def as_count(value: float) -> str:
@@ -47,9 +54,11 @@ def as_value(value: object) -> str:
     """Write a parameter: a number with its own digits, or a word."""
     if not isinstance(value, int | float):
         return str(value)
+    # Round-off is in the last of a number's 17 digits.
+    number = Decimal(f"{value:.15g}" if isinstance(value, float) else value)
     # A small number is written as 0.00005, not as 5e-05.
-    small = 0 < abs(value) < 1e-3
-    return f"{value:.10f}".rstrip("0") if small else f"{value:,.10g}"
+    fixed = number.is_finite() and -LONGEST < number.adjusted() < LONGEST
+    return f"{number:,f}" if fixed else f"{number:g}"
 
 
 def as_time(seconds: float) -> str:

@@ -59,6 +59,12 @@ class Stage:
         """All variables of the deck that are a study's to choose, with their values."""
         return {**self.deck.parameters, **self.values}
 
+    @property
+    def unused(self) -> frozenset[str]:
+        """The variables that mean nothing: a start from a file has particles of its own."""
+        from_file = str(self.variables.get("start")).startswith(f"{INPUTS}/")
+        return frozenset({"particles"} if from_file else ())
+
 
 @dataclass(frozen=True)
 class Case:
@@ -93,7 +99,7 @@ class Case:
             name: value
             for stage in self.stages
             for name, value in stage.variables.items()
-            if name in stage.values or name in ALWAYS_SHOWN
+            if name in stage.values or (name in ALWAYS_SHOWN and name not in stage.unused)
         }
         words = [self.deck, *(f"{name}={_as_word(v)}" for name, v in shown.items())]
         # Defaults are left out, as a deck may get a new variable; `is_of` sees when one changes.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -63,11 +63,16 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
         for key, (name, value) in wanted.items():
             if name in parameters:
                 choices[name] = values_of(key, name, value, decks, folder, mistakes)
+        keys = {name: key for key, (name, _) in wanted.items()}
+        if "particles" in choices and _starts_from_file(decks, choices, folder):
+            mistakes.append(
+                f"{keys['particles']}: not allowed where start is a file, which has a number of "
+                "particles of its own; give it in rows with another start"
+            )
         if math.prod(len(values) for values in choices.values()) > MOST_CASES:
             mistakes.append(f"{where}: more than {MOST_CASES} cases")
         if mistakes:
             continue
-        keys = {name: key for key, (name, _) in wanted.items()}
         keys["deck"] = f"{where}.deck" if "deck" in row else "deck"
         for combination in itertools.product(*choices.values()):
             try:
@@ -86,6 +91,14 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
     for name in file.parameters:
         if name not in known:
             mistakes.append(_unknown(f"parameters.{name}", _all_decks(file, folder)))
+
+
+def _starts_from_file(
+    decks: Sequence[Deck], choices: Mapping[str, Sequence[Value]], folder: Path
+) -> bool:
+    """Say whether one of our decks would take its particles from a data file in some case."""
+    ours = [deck for deck in decks if deck.shipped]
+    return any(file_of(ours, "start", v, folder) is not None for v in choices.get("start", ()))
 
 
 def _decks(name: Any, folder: Path) -> list[Deck]:

@@ -39,6 +39,13 @@ def shown(mistake: str) -> str:
     return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
 
 
+def _place(steps: Sequence[int | str]) -> str:
+    """Return a key as `lines_of_keys` has it: entries of a list count from 1."""
+    kept = (step for step in steps if step not in ("str", "list[str]"))
+    words = (f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in kept)
+    return "".join(words).removeprefix(".")
+
+
 def mistakes_of(error: ValidationError) -> Iterator[str]:
     """Return the mistakes that pydantic found, one line each, as a user of the file would say."""
     said: set[str] = set()
@@ -54,7 +61,7 @@ def mistakes_of(error: ValidationError) -> Iterator[str]:
                 said.add(line)
                 yield line
             continue
-        place = ".".join(str(step) for step in mistake["loc"] if step not in ("str", "list[str]"))
+        place = _place(mistake["loc"])
         message = mistake["msg"].removeprefix("Value error, ")
         if mistake["type"] == "extra_forbidden":
             model: type[BaseModel] = Outputs if place.startswith("outputs") else StudyFile

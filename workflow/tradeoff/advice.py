@@ -29,16 +29,16 @@ def _enough(comparison: Comparison, title: str, name: str, form: str) -> str:
     hard = [row for row in comparison.rows if row.configuration.contacts == "hard"]
     if len(hard) == 1:
         return f"{title}: only one configuration of hard contacts has results to compare."
-    if math.isnan(scatter):
-        return (
-            f"{title}: errors cannot be judged by one start, whose runs end in different packings; "
-            "take several (--seeds)."
-        )
     tightest = f"the tightest, {described(reference.configuration, comparison)}"
     if not reference.all_at_rest:
         return (
             f"{title}: {tightest}, has not come to rest from every start, so that nothing can be "
             "compared with it."
+        )
+    if math.isnan(scatter):
+        return (
+            f"{title}: errors cannot be judged by one start, whose runs end in different packings; "
+            "take several (--seeds)."
         )
     good = [
         (row, shifts)

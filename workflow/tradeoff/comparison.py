@@ -54,6 +54,11 @@ class Outcome:
     run: Run
     numbers: Mapping[str, float]
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the run came to rest."""
+        return not math.isnan(self.numbers["plateau_time"])
+
 
 @dataclass(frozen=True)
 class Row:
@@ -110,20 +115,23 @@ class Comparison:
     def scatter(self, name: str) -> float:
         """Return the standard deviation of a number between the starts at the reference.
 
-        NaN where there are fewer than two starts.
+        NaN where fewer than two starts came to rest.
         """
         row = self.reference()
-        values = np.empty(0) if row is None else row.values(name)
+        outcomes = () if row is None else row.outcomes
+        values = _finite(one.numbers[name] for one in outcomes if one.at_rest)
         return float(values.std(ddof=1)) if len(values) > 1 else math.nan
 
     def shifts(self, row: Row, name: str) -> FloatArray:
-        """Return a number less the reference's, one a start that both have."""
+        """Return a number less the reference's, one a start from which both came to rest."""
         reference = self.reference(row.configuration.ranks)
         if reference is None:
             return np.empty(0)
-        known = {one.run.start: one.numbers[name] for one in reference.outcomes}
+        known = {one.run.start: one.numbers[name] for one in reference.outcomes if one.at_rest}
         return _finite(
-            one.numbers[name] - known.get(one.run.start, math.nan) for one in row.outcomes
+            one.numbers[name] - known.get(one.run.start, math.nan)
+            for one in row.outcomes
+            if one.at_rest
         )
 
 
@@ -187,8 +195,11 @@ def _finite(values: Iterable[float]) -> FloatArray:
 def _numbers(result: Result, reference: Result | None) -> dict[str, float]:
     numbers = {name: result.number(name) for name in MEASURED}
     numbers |= dict.fromkeys(COMPARED, math.nan)
-    # A packing that still moves has no error to speak of: its last moment is one of many.
-    if reference is None or reference is result or math.isnan(numbers["plateau_time"]):
+    if reference is None or reference is result:
+        return numbers
+    # The last moment of a packing that still moves is one of many: it has no errors, and nothing
+    # has errors against it.
+    if any(math.isnan(one.number("plateau_time")) for one in (result, reference)):
         return numbers
     for name in ("packing_fraction", "coordination_number"):
         numbers[f"{name}_error"] = abs(numbers[name] - reference.number(name))

@@ -12,7 +12,7 @@ import json
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -20,12 +20,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import read_run_log
 
 from ..decks import Value, find_deck
 from ..files import write_text
+from ..finished import LOG, read_json
 from ..records import Recorded, read_record, records
 from ..shipped import SETTLING
 from ..study import Case, Input, stage_of
@@ -126,14 +128,19 @@ def recording_case(plan: Plan, start: int | Path) -> Case:
     return Case((first, stage_of(find_deck(SETTLING, folder), settling)), inputs)
 
 
-def problems_of(folder: Path) -> dict[str, Recorded]:
-    """Return the recorded problems of a run that are nearest to the moments, by their names.
+def problems_of(folder: Path, moments: Iterable[str] = MOMENTS) -> dict[str, Recorded]:
+    """Return the recorded problems of a run that are nearest to some moments, by their names.
 
     Moments after the end of the run are left out. Raises ValueError if a record is damaged or
-    there is none, or if the log cannot be read.
+    there is none, or if the log cannot be read or lacks a part.
     """
+    log = read_run_log(folder / LOG)
     # The deck's last run, of no steps, only completes the dump.
-    thermo = read_run_log(folder / "log.lammps").runs[-2].thermo
+    thermo = log.runs[-2].thermo if len(log.runs) > 1 else {}
+    if "Time" not in thermo:
+        raise ValueError(
+            f"{log.path}: tells of no run that settles and then ends: a part of it is missing"
+        )
     times = dict(zip(thermo["Step"], thermo["Time"], strict=True))
     paths = {int(path.name.split(".")[1]): path for path in records(folder)}
     paths = {step: path for step, path in paths.items() if step in times}
@@ -141,9 +148,9 @@ def problems_of(folder: Path) -> dict[str, Recorded]:
         raise ValueError(f"{folder}: no recorded contact problem is there")
     last = max(times.values())
     return {
-        moment: read_record(paths[min(paths, key=lambda step: abs(times[step] - when))])
-        for moment, when in MOMENTS.items()
-        if when <= last
+        moment: read_record(paths[min(paths, key=lambda step: abs(times[step] - MOMENTS[moment]))])
+        for moment in moments
+        if MOMENTS[moment] <= last
     }
 
 
@@ -247,8 +254,8 @@ def write_states(path: Path, states: Sequence[Solved]) -> None:
 
 
 def read_states(path: Path) -> list[Solved]:
-    """Read what write_states has written. Raises ValueError or TypeError for anything else."""
-    return [Solved(**one) for one in json.loads(path.read_text())]
+    """Read what write_states has written. Raises ValueError for anything else."""
+    return TypeAdapter(list[Solved]).validate_python(read_json(path))
 
 
 @dataclass(frozen=True)

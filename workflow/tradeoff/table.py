@@ -58,11 +58,11 @@ COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
 )
 LEGEND = (
     "Medians over the starts. At rest: starts that came to rest within the run; the others have no "
-    "time and no errors. Overlap: largest at rest, and before. Seconds: wall time until at rest; "
-    "time: simulated. Errors: difference to the reference from the same start, of packing "
-    "fraction (phi), contacts per particle (z) and contact forces (0: the same network, 2: no "
-    "contact in common). Complementarity: largest gap under a force. Drift: of the centre of mass "
-    "at the end, diameters per time."
+    "time and no errors, nor is anything compared with them. Overlap: largest at rest, and before. "
+    "Seconds: wall time until at rest; time: simulated. Errors: difference to the reference from "
+    "the same start, of packing fraction (phi), contacts per particle (z) and contact forces (0: "
+    "the same network, 2: no contact in common). Complementarity: largest gap under a force. "
+    "Drift: of the centre of mass at the end, diameters per time."
 )
 
 
@@ -86,7 +86,7 @@ def never_at_rest(comparison: Comparison) -> list[str]:
     """Return one line for each configuration with runs that did not come to rest."""
     lines = []
     for row in comparison.rows:
-        moving = [one for one in row.outcomes if math.isnan(one.numbers["plateau_time"])]
+        moving = [one for one in row.outcomes if not one.at_rest]
         if moving:
             one = row.configuration
             drift = max(each.numbers["drift"] for each in moving)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,19 +19,21 @@ from ..quantities import OF_ANY_STUDY
 from ..statistics import numbers
 from ..text import as_value
 from .pictures import network_picture, step_pictures
+from .provenance import commands_of
 
 # One plot has at most so many curves: more cannot be told apart.
 MOST_CURVES = 7
 # The numbers that are plotted, with the labels of their axes.
 PLOTTED = {"packing_fraction": "packing fraction", "coordination_number": "coordination number"}
 
-Groups = Mapping[str, Sequence[Result]]
+# What tells a group of runs from the others, and its runs.
+Groups = Sequence[tuple[str, Sequence[Result]]]
 
 
 def study_section(study: StoredStudy) -> Section:
     """Return the section of a study that is none of the paper's."""
     groups = labelled(study.results)
-    anchor = f"study-{re.sub(r'[^a-z0-9]+', '-', study.name.lower())}"
+    anchor = _anchor(study.name)
     blocks: list[Block] = []
     if groups:
         blocks.append(_table(groups))
@@ -38,30 +41,35 @@ def study_section(study: StoredStudy) -> Section:
         blocks += _evolution(groups, anchor)
         blocks += _distributions(groups, anchor)
         blocks += _profiles(groups, anchor)
-        for number, (label, group) in enumerate(groups.items(), 1):
+        for number, (label, group) in enumerate(groups, 1):
             blocks += step_pictures(group, f"{anchor}-pictures-{number}", label)
             caption = f"Network of contacts: {label}"
             blocks += network_picture(group, f"{anchor}-network-{number}", caption)
     return Section(
         anchor,
         f"{study.title} ({study.name})",
-        blocks or [missing(f"{study.name}.toml")],
+        blocks or [missing(commands_of(study)[0])],
         studies=(study.name,),
     )
 
 
+def _anchor(name: str) -> str:
+    """Return a study's name for links and files; two names, such as a_b and a-b, differ in it."""
+    plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+    digest = hashlib.sha256(name.encode()).hexdigest()[:8]
+    return f"study-{plain}" if plain == name else f"study-{plain}-{digest}"
+
+
 def _table(groups: Groups) -> Table:
     known = [
-        quantity
-        for quantity in OF_ANY_STUDY
-        if any(quantity.over(group).n for group in groups.values())
+        quantity for quantity in OF_ANY_STUDY if any(quantity.over(group).n for _, group in groups)
     ]
     columns: list[Column[Case]] = [Column("case", lambda case: case.label), RUNS]
     columns += [quantity.column() for quantity in known]
     return table(
         "All cases, means over seeds",
         columns,
-        [Case(label, group) for label, group in groups.items()],
+        [Case(label, group) for label, group in groups],
         ("Mean ± standard deviation (standard error); what all cases have alike is not named.",),
     )
 
@@ -80,7 +88,7 @@ def _against(study: StoredStudy, names: Sequence[str], anchor: str) -> list[Bloc
         if panels:
             caption = f"Packing fraction and coordination number against {name}; error bars: "
             caption += f"standard error over the runs.{_left_out(drawn['packing_fraction'])}"
-            figures.append(Figure(f"{anchor}-{name}", caption, panels))
+            figures.append(Figure(f"{anchor}-against-{name}", caption, panels))
     return figures
 
 
@@ -109,7 +117,7 @@ def _curves_against(
 
 def _evolution(groups: Groups, anchor: str) -> list[Block]:
     drawn: dict[str, list[Curve]] = {number: [] for number in PLOTTED}
-    for label, group in groups.items():
+    for label, group in groups:
         # A mean over seeds would hide how a packing comes to rest: the first run is shown.
         first = group[0]
         steps = series(first, "evolution/step")
@@ -127,7 +135,7 @@ def _evolution(groups: Groups, anchor: str) -> list[Block]:
 
 def _distributions(groups: Groups, anchor: str) -> list[Block]:
     curves = []
-    for label, group in groups.items():
+    for label, group in groups:
         found = arrays_of(group, "distribution/contacts")
         if found:
             mean, error = mean_distribution(found)
@@ -142,7 +150,7 @@ def _distributions(groups: Groups, anchor: str) -> list[Block]:
 def _profiles(groups: Groups, anchor: str) -> list[Block]:
     curves = [
         curve(label, *mean_curve(found), kind="profile")
-        for label, group in groups.items()
+        for label, group in groups
         if (found := profiles(group))
     ]
     if not curves:

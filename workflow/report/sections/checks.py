@@ -6,15 +6,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ...shipped import DECKS
 from ...store import Result
 from ..blocks import Cell, Content
 from ..columns import RUNS, Column, table
-from ..data import SPHERES, Data
+from ..data import Data
 from ..groups import labelled
 from ..quantities import COORDINATION_NUMBER, RESOLUTION
 from ..text import as_short, as_text
 
-# Two bodies that turn may overlap by two tolerances; spheres by one.
+# Bodies turn, and may overlap by two tolerances, as spheres may with a curved wall; free spheres
+# among themselves and at the flat walls of our decks by one.
 ALLOWED_OF_BODIES, ALLOWED_OF_SPHERES = 2.0, 1.0
 # Overlap and tolerance are rounded numbers of different programs: so much more is the same.
 ROUNDING = 1e-6
@@ -45,9 +47,9 @@ class _Row:
     @property
     def allowed(self) -> float:
         """The allowed overlap, tolerances."""
-        deck = str(self.group[0].record["deck"])
-        of_spheres = deck == SPHERES or "response" in deck
-        return ALLOWED_OF_SPHERES if of_spheres else ALLOWED_OF_BODIES
+        flat = all(stage["deck"] in DECKS for one in self.group for stage in one.record["stages"])
+        bodies = any(one.number("particles") < one.number("spheres") for one in self.group)
+        return ALLOWED_OF_SPHERES if flat and not bodies else ALLOWED_OF_BODIES
 
     @property
     def resolution(self) -> float:
@@ -86,7 +88,7 @@ def checks(data: Data) -> Content:
     rows = [
         _Row(study.name, label, group)
         for study in data.studies.values()
-        for label, group in labelled(study.results).items()
+        for label, group in labelled(study.results)
     ]
     if not rows:
         return Content()
@@ -97,8 +99,9 @@ def checks(data: Data) -> Content:
                 COLUMNS,
                 rows,
                 (
-                    "ε: the loosest of a run. Marked: an overlap of more than ε (2 ε for bodies "
-                    "that turn), or a count whose ε / (g h²) is above 0.01.",
+                    "ε: the loosest of a run. Marked: an overlap of more than ε (2 ε where there "
+                    "are bodies, which turn, or a deck of your own, whose walls may be curved), or "
+                    "a count whose ε / (g h²) is above 0.01.",
                 ),
             )
         ]

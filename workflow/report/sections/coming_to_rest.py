@@ -191,14 +191,13 @@ class _ToPlateau:
 
 
 def _median(values: FloatArray) -> str:
-    """Write the median and the quartiles."""
-    low, middle, high = (_text(values, share) for share in (0.25, 0.5, 0.75))
-    return f"{middle} ({low} to {high})"
+    """Write the median and the quartiles; runs that do not reach the plateau are longest."""
+    # Of the values themselves: between a finite one and infinity there is none to interpolate.
+    low, high = np.quantile(values, (0.25, 0.75), method="inverted_cdf")
+    return f"{_text(np.median(values))} ({_text(low)} to {_text(high)})"
 
 
-def _text(values: FloatArray, share: float) -> str:
-    """Write the value below which a share of all values lies; runs that do not end are longest."""
-    value = float(np.sort(values)[min(int(share * len(values)), len(values) - 1)])
+def _text(value: float) -> str:
     return as_text(value, 2) if math.isfinite(value) else "not reached"
 
 
@@ -256,7 +255,7 @@ def _statement_on_times(rows: Sequence[_ToPlateau]) -> list[Statement]:
 
 
 def _seconds(row: _ToPlateau) -> str:
-    middle = _text(row.seconds, 0.5)
+    middle = _text(np.median(row.seconds))
     unit = " s" if 2 * row.reached > len(row.group) else ""
     return f"{middle}{unit} ({row.reached} of {len(row.group)} runs reach it)"
 

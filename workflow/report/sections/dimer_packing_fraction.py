@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..data import Data
 from ..figures import Curve, Figure, Panel, curve
 from ..groups import count_of
 from ..quantities import PACKING_FRACTION, PACKING_FRACTION_WITH_NECKS, Quantity
-from ..statistics import Difference
+from ..statistics import Difference, all_hold
 from ..text import as_count, as_measured, as_sample, as_short
 from .aspect_ratios import HEAD, POOLED, Row, against_aspect, rows_of, shaken
 
@@ -83,17 +83,9 @@ def _statements(raw: Sequence[Curve], necks: Sequence[Curve], stated: float) -> 
     said = f"The packing fraction grows with L/d and falls above about {as_short(stated)}."
     alike = "With the volume of the necks the curve is qualitatively the same."
     return [
-        Statement(said, _all(_turns_at(one, stated) for one in raw), _tops(raw)),
-        Statement(alike, _all(_rises_and_falls(one, stated) for one in necks), _tops(necks)),
+        Statement(said, all_hold(_turns_at(one, stated) for one in raw), _tops(raw)),
+        Statement(alike, all_hold(_rises_and_falls(one, stated) for one in necks), _tops(necks)),
     ]
-
-
-def _all(verdicts: Iterable[bool | None]) -> bool | None:
-    """Say whether all hold: not known if one is not, and none is known to be false."""
-    found = list(verdicts)
-    if False in found:
-        return False
-    return None if None in found or not found else True
 
 
 def _is_known(one: Curve) -> bool:

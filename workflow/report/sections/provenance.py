@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -32,15 +33,34 @@ NOT_STATED = (
 )
 
 
-def commands(data: Data, name: str) -> list[str]:
-    """Return the commands that make a study's part of a report."""
-    report = f"inelastic report DIR/{name}.h5"
-    study = data.studies.get(name)
-    if study is not None and not _is_shipped(study, STUDIES_FOLDER):
-        if _is_shipped(study, QUICK_FOLDER):
-            return ["inelastic reproduce --quick --out DIR"]
-        return [f"inelastic run {name}.toml --out DIR", report]
-    return [f"inelastic run {name} --out DIR", report]
+def commands(data: Data, names: Iterable[str]) -> list[str]:
+    """Return the commands that make the parts of some studies in a report, each once."""
+    lines: dict[str, None] = {}
+    for name in names:
+        study = data.studies.get(name)
+        lines |= dict.fromkeys(_commands_of_shipped(name) if study is None else commands_of(study))
+    return list(lines)
+
+
+def commands_of(study: StoredStudy) -> list[str]:
+    """Return the commands that make one study's part of a report; the first one runs it."""
+    # The runs of a tradeoff have the command that asks for them in the place of a study file.
+    if study.text.startswith("inelastic "):
+        return [f"{study.text} --out DIR", "inelastic report DIR/tradeoff.h5"]
+    if _is_shipped(study, STUDIES_FOLDER):
+        return _commands_of_shipped(study.name)
+    if _is_shipped(study, QUICK_FOLDER):
+        return ["inelastic reproduce --quick --out DIR"]
+    file = shlex.quote(f"{study.name}.toml")
+    return [f"inelastic run {file} --out DIR", _reported(study.name)]
+
+
+def _commands_of_shipped(name: str) -> list[str]:
+    return [f"inelastic run {name} --out DIR", _reported(name)]
+
+
+def _reported(name: str) -> str:
+    return f"inelastic report DIR/{shlex.quote(f'{name}.h5')}"
 
 
 def _is_shipped(study: StoredStudy, folder: Path) -> bool:
@@ -74,9 +94,8 @@ def provenance_section(data: Data, files: Sequence[str]) -> Section:
     blocks: list[Block] = []
     results = [result for study in data.studies.values() for result in study.results]
     if data.studies:
-        lines = [line for name in data.studies for line in commands(data, name)]
         blocks.append(_runs_table(data.studies.values()))
-        blocks.append(Listing("\n".join(dict.fromkeys(lines))))
+        blocks.append(Listing("\n".join(commands(data, data.studies))))
     else:
         blocks.append(nothing_run())
     blocks.append(

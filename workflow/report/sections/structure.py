@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from lammps_inelastic.analysis.structure import Q6_OF_CRYSTALS
+from lammps_inelastic.analysis.structure import MOST_CRYSTALLINE, Q6_OF_CRYSTALS
 
 from ...store import Result
 from ..blocks import Block, Cell, Content
@@ -19,8 +19,6 @@ from ..statistics import numbers
 from ..text import as_count, as_short
 from .aspect_ratios import shaken
 
-# A packing with a larger share of crystalline particles is not random.
-MOST_CRYSTALLINE = 0.5
 # The first peak of g(r) is cut off here: it is high and narrow, and says little.
 HIGHEST_G = 4.0
 # Dimers of these aspect ratios are shown beside spheres.
