@@ -18,7 +18,7 @@ from ..columns import RUNS, Column, table
 from ..curves import FloatArray
 from ..data import Data, series
 from ..figures import Curve, Figure, Panel, curve
-from ..groups import by_value, count_of, grouped, nearest_size, seed_label
+from ..groups import by_value, count_of, grouped, matching, nearest_size, seed_label
 from ..quantities import COORDINATION_NUMBER, PACKING_FRACTION, Quantity
 from ..statistics import SIGNIFICANT, sample
 from ..text import DASH, as_count, as_probability, as_short, as_text
@@ -212,7 +212,8 @@ PLATEAU_COLUMNS: Sequence[Column[_ToPlateau]] = (
 
 def _times_to_the_plateau(data: Data) -> list[_ToPlateau]:
     """Return how long it takes with each random force, in the study with many seeds."""
-    known = [r for r in data.results("more-seeds") if series(r, "evolution/seconds") is not None]
+    usual = matching(data.results("more-seeds"), tolerance=data.usual_tolerance)
+    known = [r for r in usual if series(r, "evolution/seconds") is not None]
     rows = []
     for force, group in sorted(grouped(known, by_value("random_force")).items()):
         found = [_plateau(r, PACKING_FRACTION, BAND_OF_PHI) for r in group]

@@ -107,15 +107,22 @@ def tolerance_and_force(data: Data) -> Content:
     return Content(
         tables,
         [one for row in run for one in (row.phi, row.z)],
-        [*_statements_on_force(more), *_statements_on_tolerance(data, of_paper)],
+        [
+            *_statements_on_force(more),
+            # With the more seeds, where they have as many tolerances.
+            *(_statements_on_tolerance(data, more) or _statements_on_tolerance(data, of_paper)),
+        ],
     )
 
 
 def _statements_on_force(more: Sequence[_Row]) -> list[Statement]:
     """Compare the rows with many seeds: with the random force, and without."""
-    shaken = next((row for row in more if row.force == "yes"), None)
     still = next((row for row in more if row.force == "no"), None)
-    if shaken is None or still is None:
+    if still is None:
+        return []
+    others = (row for row in more if row.force == "yes" and row.tolerance == still.tolerance)
+    shaken = next(others, None)
+    if shaken is None:
         return []
     phi = _of_pairs(still.group, shaken.group, PACKING_FRACTION)
     z = _of_pairs(still.group, shaken.group, COORDINATION_NUMBER)
