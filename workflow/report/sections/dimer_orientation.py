@@ -293,7 +293,7 @@ def _statements(rows: Sequence[_Orientation], force: float) -> list[Statement]:
             f"random force {as_short(force)}: a_x less a_z over isotropic is "
             f"{as_measured(mean.value, mean.error, 3)} in the mean over {len(rows)} aspect ratios; "
             f"the least probable alone is {as_measured(level[most].value, level[most].error, 3)} "
-            f"at L/d = {rows[most].aspect} (p = {as_probability(alone[most])}, Holm)",
+            f"at L/d = {rows[most].aspect} (p {as_probability(alone[most])}, Holm)",
         ),
         Statement(
             "a_y is smaller: dimers lie down.",
@@ -319,8 +319,8 @@ def _statement_on_length(aspects: Sequence[float], a_y: Sequence[Sample]) -> Sta
         "They lie down more the longer they are.",
         holds,
         f"a_y / isotropic goes as {as_measured(line.value, line.error, 3)} times L/d from "
-        f"{as_short(LONG)} on (p = {as_probability(line.p)}), but by a parabola as "
-        f"{as_measured(end.value, end.error, 2)} at the longest (p = {as_probability(end.p)})"
+        f"{as_short(LONG)} on (p {as_probability(line.p)}), but by a parabola as "
+        f"{as_measured(end.value, end.error, 2)} at the longest (p {as_probability(end.p)})"
         if not math.isnan(end.p)
         else "",
     )
