@@ -440,6 +440,19 @@ def test_wall_forces_stay_until_the_next_step(between: str, tmp_path: Path, lmp:
     assert float(second) == pytest.approx(weight, abs=1e-6)
 
 
+def lying_and_frozen(folder: Path) -> str:
+    """Return a sphere on the floor and one that is frozen."""
+    return scene(
+        [[0.5, RADIUS, 0.5], [0.2, 0.5, 0.2]],
+        RADIUS,
+        folder,
+        tolerance=EPS,
+        fixes="group still id 2\ngroup moving subtract all still",
+        motion="fix motion moving nve",
+        options="region container frozen still",
+    )
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -452,15 +465,7 @@ def test_changes_before_run_pre_no(
     change: str, words: str, tmp_path: Path, refused: Refused
 ) -> None:
     """What a set-up would refuse is refused without one."""
-    text = scene(
-        [[0.5, RADIUS, 0.5], [0.2, 0.5, 0.2]],
-        RADIUS,
-        tmp_path,
-        tolerance=EPS,
-        fixes="group still id 2\ngroup moving subtract all still",
-        motion="fix motion moving nve",
-        options="region container frozen still",
-    )
+    text = lying_and_frozen(tmp_path)
     assert words in refused(text + f"run 5\n{change}\nrun 5 pre no\n")
 
 
@@ -505,14 +510,7 @@ def test_restart_files_tell_the_regular_time_step(
 
 def test_a_frozen_group_whose_number_another_one_has(tmp_path: Path, refused: Refused) -> None:
     """Groups are known by their names: the new one would freeze what is in it."""
-    text = scene(
-        [[0.5, RADIUS, 0.5], [0.2, 0.5, 0.2]],
-        RADIUS,
-        tmp_path,
-        tolerance=EPS,
-        fixes="group still id 2",
-        options="region container frozen still",
-    )
+    text = lying_and_frozen(tmp_path)
     error = refused(text + "run 0\ngroup still delete\ngroup other id 1\nrun 1\n")
     assert "frozen group still does not exist any more" in error, error
 
