@@ -54,7 +54,8 @@ def network_difference(
     forces : (m,), not all 0; < 0 where a contact pulls
     reference_ids, reference_forces : (r, 2) and (r,), likewise
 
-    Raises InputError for arrays of other shapes, and for forces that are not finite or all 0.
+    Raises InputError for arrays of other shapes, for a contact of a sphere with itself, and for
+    forces that are not finite or all 0.
     """
     one = _shares(contact_ids, forces)
     other = _shares(reference_ids, reference_forces)
@@ -72,6 +73,8 @@ def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], 
             f"contact ids and forces must have shape (m, 2) and (m,), not {ids.shape} and "
             f"{strength.shape}"
         )
+    if (own := ids[:, 0] == ids[:, 1]).any():
+        raise InputError(f"sphere {ids[own][0, 0]} is in contact with itself")
     # This condition is written so that NaN fails too.
     total = np.abs(strength).sum()
     if not 0 < total < np.inf:

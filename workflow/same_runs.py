@@ -34,7 +34,7 @@ class SameRuns:
 
     def has_fix(self, sources: str | None, todays: str) -> bool:
         """Say whether a fix, by the hash of its sources, has the runs of today's."""
-        return sources == todays or (sources == self.made_by and todays in self.fixes)
+        return sources == todays or {sources, todays} <= {self.made_by, *self.fixes}
 
     def has_deck(self, name: str, fingerprint: str, todays: str) -> bool:
         """Say whether a deck, by its fingerprint, has the runs of today's of this name."""

@@ -163,7 +163,7 @@ def test_stored_results_of_other_code_are_not_taken(
 
 
 def test_stored_results_of_a_fix_with_the_same_runs_are_taken(few: Path, tmp_path: Path) -> None:
-    """Only where the folder names the fix that made them, and today's among those with its runs."""
+    """Only where the folder names both, the fix that made them and today's, as of the same runs."""
     kept = tmp_path / "kept"
     shutil.copytree(few / "out" / "results" / "few", kept / "few")
     for result in (kept / "few").glob("*.h5"):
@@ -171,9 +171,14 @@ def test_stored_results_of_a_fix_with_the_same_runs_are_taken(few: Path, tmp_pat
     study = read_study(few / "few.toml")
     todays = code()["sources"]
     for number, (made, same, count) in enumerate(
-        [("earlier", todays, 2), ("another", todays, 0), ("earlier", "later", 0)]
+        [
+            ("earlier", [todays], 2),
+            ("first", ["earlier", todays], 2),
+            ("another", [todays], 0),
+            ("earlier", ["later"], 0),
+        ]
     ):
-        (kept / FILE).write_text(f'made_by = "{made}"\nsame = ["{same}"]\n')
+        (kept / FILE).write_text(f'made_by = "{made}"\nsame = {json.dumps(same)}\n')
         assert adopt_results(study, Folder(tmp_path / str(number)), kept) == count
 
 

@@ -172,6 +172,7 @@ def test_networks_that_differ() -> None:
         ([[1, 2]], [0], "finite, and not all of them 0"),
         ([[1, 2]], [math.nan], "finite, and not all of them 0"),
         (np.empty((0, 2)), [], "finite, and not all of them 0"),
+        ([[1, 2], [7, 7]], [1, 1], "sphere 7 is in contact with itself"),
     ],
 )
 def test_networks_that_cannot_be_compared(ids: Any, forces: Any, message: str) -> None:
