@@ -273,7 +273,7 @@ def test_a_start_without_a_reference_or_not_at_rest_counts_where_it_can() -> Non
     assert "has not come to rest from every start" in recommendations(compare(results))[0]
     assert len(loose.values("packing_fraction_error")) == 1
     assert sorted(loose.slower) == pytest.approx([2, 6])
-    assert (len(loose.outcomes), len(loose.values("plateau_time"))) == (3, 2)
+    assert (len(loose.runs), len(loose.values("plateau_time"))) == (3, 2)
 
 
 def test_no_errors_against_a_reference_that_still_moves() -> None:
@@ -285,7 +285,7 @@ def test_no_errors_against_a_reference_that_still_moves() -> None:
     _, loose, soft = comparison.rows
     names = ("packing_fraction_error", "coordination_number_error", "network_error", "shared")
     for row in (loose, soft):
-        for one in row.outcomes:
+        for one in row.runs:
             known = [name for name in names if math.isfinite(one.numbers[name])]
             assert known == ([] if one.run.start == "1" else [*names])
         assert len(comparison.shifts(row, "packing_fraction")) == 2

@@ -66,7 +66,7 @@ class Grouped(Protocol):
 
 
 @dataclass(frozen=True)
-class Case:
+class LabelledRuns:
     """A row with the runs of one case and a name for them."""
 
     label: str

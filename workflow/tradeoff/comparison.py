@@ -42,7 +42,7 @@ COMPARED = ("packing_fraction_error", "coordination_number_error", "network_erro
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunNumbers:
     """The numbers that came out of one run.
 
     Attributes
@@ -62,28 +62,28 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Row:
-    """The outcomes of a configuration from all starts.
+    """The numbers of the runs of a configuration from all starts.
 
     Attributes
     ----------
     configuration : the configuration
-    outcomes : outcome of each start
+    runs : numbers of the run from each start
     slower : times that soft contacts of the same tolerance took to come to rest, over the times of
         these hard ones, for each start that both have; empty for soft contacts
     """
 
     configuration: Configuration
-    outcomes: Sequence[Outcome]
+    runs: Sequence[RunNumbers]
     slower: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def values(self, name: str) -> FloatArray:
         """Return a number from each start that has it."""
-        return _finite(outcome.numbers[name] for outcome in self.outcomes)
+        return _finite(one.numbers[name] for one in self.runs)
 
     @property
     def all_at_rest(self) -> bool:
         """True if the configuration came to rest from all starts."""
-        return len(self.values("plateau_seconds")) == len(self.outcomes)
+        return len(self.values("plateau_seconds")) == len(self.runs)
 
     def median(self, name: str) -> float:
         """Return the median over the starts; NaN if none has the number."""
@@ -118,8 +118,8 @@ class Comparison:
         NaN where fewer than two starts came to rest.
         """
         row = self.reference()
-        outcomes = () if row is None else row.outcomes
-        values = _finite(one.numbers[name] for one in outcomes if one.at_rest)
+        runs = () if row is None else row.runs
+        values = _finite(one.numbers[name] for one in runs if one.at_rest)
         return float(values.std(ddof=1)) if len(values) > 1 else math.nan
 
     def shifts(self, row: Row, name: str) -> FloatArray:
@@ -127,10 +127,10 @@ class Comparison:
         reference = self.reference(row.configuration.ranks)
         if reference is None:
             return np.empty(0)
-        known = {one.run.start: one.numbers[name] for one in reference.outcomes if one.at_rest}
+        known = {one.run.start: one.numbers[name] for one in reference.runs if one.at_rest}
         return _finite(
             one.numbers[name] - known.get(one.run.start, math.nan)
-            for one in row.outcomes
+            for one in row.runs
             if one.at_rest
         )
 
@@ -146,12 +146,12 @@ def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
         for run, result in results
         if run.configuration == reference_of(configurations, run.configuration.ranks)
     }
-    outcomes = [
-        Outcome(run, _numbers(result, references.get((run.configuration.ranks, run.start))))
+    numbers = [
+        RunNumbers(run, _numbers(result, references.get((run.configuration.ranks, run.start))))
         for run, result in results
     ]
     grouped = {
-        configuration: [one for one in outcomes if one.run.configuration == configuration]
+        configuration: [one for one in numbers if one.run.configuration == configuration]
         for configuration in configurations
     }
     rows = []
@@ -179,7 +179,7 @@ def _matches(hard: Configuration, soft: Configuration) -> bool:
     )
 
 
-def _ratios(above: Sequence[Outcome], below: Sequence[Outcome]) -> FloatArray:
+def _ratios(above: Sequence[RunNumbers], below: Sequence[RunNumbers]) -> FloatArray:
     """Return the ratios of the times to rest, one a start that came to rest in both."""
     known = {one.run.start: one.numbers["plateau_seconds"] for one in below}
     return _finite(

@@ -17,7 +17,7 @@ from lammps_inelastic.analysis.plots import plot_bounds, plot_points, style_of
 from ..files import whole
 from ..report.figures import DPI, RC
 from .comparison import Comparison, Row
-from .states import Curve
+from .states import WayMedians
 
 # The figure is about as wide as a page [inches].
 SIZE = (7.4, 4.3)
@@ -57,7 +57,7 @@ def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
         return _write(figure, path)
 
 
-def draw_states(curves: Sequence[Curve], path: Path) -> list[Path]:
+def draw_states(curves: Sequence[WayMedians], path: Path) -> list[Path]:
     """Draw the errors of recorded states against time, and write it as PNG and as SVG.
 
     Parameters
@@ -95,7 +95,7 @@ def plot_cost(ax: Axes, comparison: Comparison) -> Axes:
     """Plot the wall time to rest against the largest overlap there: a point a run, and medians."""
     for number, (label, rows) in enumerate(_curves(comparison.rows).items()):
         names = ("overlap_at_rest", "plateau_seconds")
-        runs = [[one.numbers[name] for name in names] for row in rows for one in row.outcomes]
+        runs = [[one.numbers[name] for name in names] for row in rows for one in row.runs]
         medians = [[row.median(name) for name in names] for row in rows]
         _plot(ax, runs, medians, label, number)
     _logarithmic(ax)
@@ -110,9 +110,7 @@ def plot_errors(ax: Axes, comparison: Comparison, name: str) -> Axes:
     for number, (label, rows) in enumerate(_curves(comparison.rows).items()):
         error = f"{name}_error"
         runs = [
-            [row.configuration.tolerance, one.numbers[error]]
-            for row in rows
-            for one in row.outcomes
+            [row.configuration.tolerance, one.numbers[error]] for row in rows for one in row.runs
         ]
         medians = [[row.configuration.tolerance, row.median(error)] for row in rows]
         _plot(ax, runs, medians, label, number)

@@ -259,7 +259,7 @@ def read_states(path: Path) -> list[Solved]:
 
 
 @dataclass(frozen=True)
-class Curve:
+class WayMedians:
     """The medians over the states of a way, from the loosest value to the tightest, (k,) each.
 
     Attributes
@@ -283,7 +283,7 @@ def _median(values: Sequence[float]) -> float:
     return statistics.median(numbers) if numbers else math.nan
 
 
-def curves_of(states: Sequence[Solved]) -> list[Curve]:
+def curves_of(states: Sequence[Solved]) -> list[WayMedians]:
     """Return a curve for each way. A value that some state has not reached is left out."""
     number = len({(one.start, one.moment) for one in states})
     curves = []
@@ -298,5 +298,5 @@ def curves_of(states: Sequence[Solved]) -> list[Curve]:
             for name in MEDIANS
         }
         if values:
-            curves.append(Curve(way.name, np.array(values), medians))
+            curves.append(WayMedians(way.name, np.array(values), medians))
     return curves

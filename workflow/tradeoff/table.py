@@ -17,7 +17,7 @@ from ..wide_table import print_wide
 from .advice import described, ratio_text
 from .comparison import COMPARED, MEASURED, Comparison, Row
 from .plan import Plan, command_line
-from .states import MEDIANS, Curve, Solved, curves_of
+from .states import MEDIANS, Solved, WayMedians, curves_of
 
 TITLE = "Time and accuracy of hard and soft contacts"
 MISSING = "-"
@@ -34,7 +34,7 @@ def _number(form: str, name: str) -> Callable[[Row], str]:
 
 
 def _at_rest(row: Row) -> str:
-    return f"{len(row.values('plateau_time'))} of {len(row.outcomes)}"
+    return f"{len(row.values('plateau_time'))} of {len(row.runs)}"
 
 
 # Each column has a heading, and a function that writes a row's cell.
@@ -86,7 +86,7 @@ def never_at_rest(comparison: Comparison) -> list[str]:
     """Return one line for each configuration with runs that did not come to rest."""
     lines = []
     for row in comparison.rows:
-        moving = [one for one in row.outcomes if not one.at_rest]
+        moving = [one for one in row.runs if not one.at_rest]
         if moving:
             one = row.configuration
             drift = max(each.numbers["drift"] for each in moving)
@@ -135,14 +135,14 @@ def as_csv(comparison: Comparison) -> str:
     writer = csv.writer(text, lineterminator="\n")
     own = ("contacts", "solver", "tolerance", "dt", "ranks")
     writer.writerow([*own, "start", "case", *MEASURED, *COMPARED])
-    for outcome in (one for row in comparison.rows for one in row.outcomes):
-        described = [getattr(outcome.run.configuration, name) for name in own]
-        numbers = [outcome.numbers[name] for name in (*MEASURED, *COMPARED)]
+    for one in (run for row in comparison.rows for run in row.runs):
+        described = [getattr(one.run.configuration, name) for name in own]
+        numbers = [one.numbers[name] for name in (*MEASURED, *COMPARED)]
         writer.writerow(
             [
                 *("" if value is None else value for value in described),
-                outcome.run.start,
-                outcome.run.case.name,
+                one.run.start,
+                one.run.case.name,
                 *("" if math.isnan(value) else repr(value) for value in numbers),
             ]
         )
@@ -168,7 +168,7 @@ _STATES_HEADINGS = (
 )
 
 
-def _states_cells(curves: Sequence[Curve]) -> list[list[str]]:
+def _states_cells(curves: Sequence[WayMedians]) -> list[list[str]]:
     """Return the cells of a row for each value of each way."""
     rows = []
     for curve in curves:
@@ -179,7 +179,7 @@ def _states_cells(curves: Sequence[Curve]) -> list[list[str]]:
     return rows
 
 
-def print_states(curves: Sequence[Curve]) -> None:
+def print_states(curves: Sequence[WayMedians]) -> None:
     """Print the medians over the states."""
     console = Console(highlight=False)
     table = Table(box=None, pad_edge=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...store import Result, StoredStudy
 from ..blocks import Block, Section, Table, missing
-from ..columns import RUNS, Case, Column, table
+from ..columns import RUNS, Column, LabelledRuns, table
 from ..curves import mean_curve, mean_distribution
 from ..data import arrays_of, profiles, series
 from ..figures import Curve, Figure, Panel, curve, points
@@ -64,12 +64,12 @@ def _table(groups: Groups) -> Table:
     known = [
         quantity for quantity in OF_ANY_STUDY if any(quantity.over(group).n for _, group in groups)
     ]
-    columns: list[Column[Case]] = [Column("case", lambda case: case.label), RUNS]
+    columns: list[Column[LabelledRuns]] = [Column("case", lambda case: case.label), RUNS]
     columns += [quantity.column() for quantity in known]
     return table(
         "All cases, means over seeds",
         columns,
-        [Case(label, group) for label, group in groups],
+        [LabelledRuns(label, group) for label, group in groups],
         ("Mean ± standard deviation (standard error); what all cases have alike is not named.",),
     )
 

@@ -10,7 +10,7 @@ from lammps_inelastic.analysis import InputError, binned_exponent
 
 from ...store import Result
 from ..blocks import Block, Content, Text
-from ..columns import RUNS, Case, Column, table
+from ..columns import RUNS, Column, LabelledRuns, table
 from ..curves import mean_curve
 from ..data import SPHERES, Data, curves_of, profiles
 from ..figures import Curve, Figure, Panel, curve
@@ -27,7 +27,7 @@ from ..quantities import (
 from ..statistics import Sample, sample
 from ..text import as_count, as_sample, as_short
 
-COLUMNS: Sequence[Column[Case]] = (
+COLUMNS: Sequence[Column[LabelledRuns]] = (
     Column("packing", lambda case: case.label),
     RUNS,
     PACKING_FRACTION.column(),
@@ -50,7 +50,7 @@ class _Part:
     low: float
     high: float
 
-    def column(self) -> Column[Case]:
+    def column(self) -> Column[LabelledRuns]:
         """Return a column with the exponent of this part."""
         return Column(self.heading, lambda case: as_sample(self.over(case.group), 3))
 
@@ -83,7 +83,7 @@ PARTS = (
 def reference(data: Data) -> Content:
     """Show isostaticity, the power laws, the radial distribution function and wall layers."""
     groups = grouped(data.results("reference"), _label)
-    cases = [Case(label, group) for label, group in groups.items()]
+    cases = [LabelledRuns(label, group) for label, group in groups.items()]
     if not cases:
         return Content()
     blocks: list[Block] = [
@@ -187,7 +187,7 @@ def _label(result: Result) -> str:
     return f"dimers, L/d = {as_short(result.setting('aspect_ratio'))}"
 
 
-def _curves(cases: Sequence[Case], x: str, y: str) -> list[Curve]:
+def _curves(cases: Sequence[LabelledRuns], x: str, y: str) -> list[Curve]:
     return [
         curve(case.label, *mean_curve(found))
         for case in cases
@@ -195,7 +195,7 @@ def _curves(cases: Sequence[Case], x: str, y: str) -> list[Curve]:
     ]
 
 
-def _panel(cases: Sequence[Case], x: str, y: str, along: str, up: str) -> Panel | None:
+def _panel(cases: Sequence[LabelledRuns], x: str, y: str, along: str, up: str) -> Panel | None:
     """Return a panel with two logarithmic axes; None if nothing was measured."""
     curves = []
     for one in _curves(cases, x, y):

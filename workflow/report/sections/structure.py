@@ -9,7 +9,7 @@ from lammps_inelastic.analysis.structure import MOST_CRYSTALLINE, Q6_OF_CRYSTALS
 
 from ...store import Result
 from ..blocks import Block, Cell, Content
-from ..columns import RUNS, Case, Column, table
+from ..columns import RUNS, Column, LabelledRuns, table
 from ..curves import FloatArray, mean_curve
 from ..data import Data, curves_of
 from ..figures import Curve, Figure, Panel, curve
@@ -25,12 +25,12 @@ HIGHEST_G = 4.0
 SHOWN_ASPECTS = (1.1, 1.5, 2.0)
 
 
-def _verdict(case: Case) -> Cell:
+def _verdict(case: LabelledRuns) -> Cell:
     crystallised = numbers(case.group, CRYSTALLINE.name).mean > MOST_CRYSTALLINE
     return Cell("crystallised" if crystallised else "not crystallised", marked=crystallised)
 
 
-COLUMNS: Sequence[Column[Case]] = (
+COLUMNS: Sequence[Column[LabelledRuns]] = (
     Column("packing", lambda case: case.label),
     RUNS,
     Q4.column(),
@@ -97,14 +97,14 @@ def forces(data: Data) -> Content:
     )
 
 
-def _cases(data: Data) -> list[Case]:
+def _cases(data: Data) -> list[LabelledRuns]:
     """Return spheres by their number and dimers by aspect ratio."""
     spheres = [
-        Case(f"{as_count(particles)} spheres", group)
+        LabelledRuns(f"{as_count(particles)} spheres", group)
         for (particles, _), group in by_size(data.results("table-2", "table-1")).items()
     ]
     dimers = [
-        Case(f"dimers, L/d = {as_short(aspect)}", group)
+        LabelledRuns(f"dimers, L/d = {as_short(aspect)}", group)
         for one in shaken(data)[:1]
         for aspect, group in one.groups.items()
         if aspect in SHOWN_ASPECTS
