@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import clarabel
@@ -138,16 +137,21 @@ def wall_overlap(name: str, positions: NDArray[np.float64], step: int, timestep:
 def test_overlap_of_every_step(name: str, tmp_path: Path) -> None:
     """Fall, impact and rest of 1,000 spheres: the largest overlap, from a dump of every step."""
     deck, variables, allowed = SCENES[name]
-    steps = {
+    timestep = float(variables.get("dt", 0.01))
+    # The overlaps are those of the first two phases. The set-up of the others, which have no steps,
+    # projects too: with longer steps a moving floor would throw spheres out of the list there.
+    values: dict[str, object] = {
+        "dump_every": 1,
         "steps_agitated": 250,
         "steps_settling": 100,
         "steps_resting": 0,
+        "dt_resting": timestep,
         "steps_tightening": 0,
         "steps_measuring": 0,
+        "dt_measuring": timestep,
+        "tolerance_measuring": 0.0005,
     }
-    # The last phase's tolerance is another; the overlaps here are all of the first two.
-    run_deck(tmp_path, deck, {"dump_every": 1, **steps, "tolerance_measuring": 0.0005, **variables})
-    timestep = float(variables.get("dt", 0.01))
+    run_deck(tmp_path, deck, {**values, **variables})
     worst, frames = 0.0, 0
     for frame in ParticleDump(tmp_path / "particles.lammpsdump"):
         pair = largest_pair_overlap(frame.positions, frame.radii).depth
@@ -166,11 +170,7 @@ STAGES = (20, 60, 80, 100, 120, 150, 600)
 @pytest.fixture(scope="module")
 def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
     """One problem of 1,000 spheres at each stage, solved to 2e-10 r."""
-    # Spheres that jam between walls have taken 160,000 iterations in one such step.
-    deck, patient = re.subn(
-        r"(variable most +equal) 100000\b", r"\1 1000000", shipped_deck("spheres")
-    )
-    assert patient == 1
+    deck = shipped_deck("spheres")
     problems = []
     for steps in STAGES:
         folder = tmp_path_factory.mktemp("tight")
