@@ -3,7 +3,7 @@
 # make test-all  the same, then the slow tests (five minutes more)
 # make report    set up, write the report of the paper's studies from the results kept here
 # make validate  set up, check the physics (minutes)
-# make bench     set up, measure speed and accuracy (an hour and more; bench-quick: 9 minutes)
+# make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
 # make clean     remove the environment, build and out; results of hours stay (paper, benchmark, and studies of one's own)
