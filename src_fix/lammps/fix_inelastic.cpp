@@ -339,7 +339,8 @@ void FixInelastic::advance(int vflag, Kick kick)
   const PhaseClock::Within within(clock_, PhaseClock::CHECK);
   v_init(vflag);
   if (check_.goes_on_without_setup()) check_scene();
-  if (step_.has_bodies && step_.largest_radius == 0.0)
+  // Where all atoms have left the box LAMMPS says so itself.
+  if (step_.has_bodies && step_.largest_radius == 0.0 && group->count(igroup) > 0)
     error->all(
         FLERR,
         "Fix inelastic: no atom of group {} has a radius: set diameters before a run of more "

@@ -198,6 +198,17 @@ def test_bodies_without_diameters(tmp_path: Path, lmp: Runner, refused: Refused)
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
+def test_without_atoms(ranks: int, tmp_path: Path, lmp: Runner, refused: Refused) -> None:
+    """Bodies that are all gone have no diameters, and need none."""
+    text = deck(tmp_path) + "run 1\n"
+    for run in ("run 5\n", "run 5 pre no\n"):
+        lmp(text + "delete_atoms group all\n" + run, ranks=ranks)
+    # That is far out of the box, which has no boundary that would follow them.
+    error = refused(text + "displace_atoms all move 1000 0 0\nrun 5\n", ranks=ranks)
+    assert "Lost atoms: original 30 current 0" in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_a_negative_molecule_id(ranks: int, tmp_path: Path, refused: Refused) -> None:
     """LAMMPS reads any. Of one body only, which one rank alone may own."""
     error = refused(with_molecule(tmp_path, -3) + "run 3\n", ranks=ranks)
