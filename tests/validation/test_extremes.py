@@ -634,7 +634,7 @@ def test_no_room(name: str, ranks: int, options: str, tmp_path: Path) -> None:
     assert "leaves no room" in error or (turning and name == "dimers" and not options)
     assert float(found[2]) > EPS
     assert seconds < 60  # not minutes, on a busy machine either
-    # Spheres can be so fast in the end that nothing is certain: in 4 of 16 such scenes (measured).
+    # Many spheres can be so fast in the end that the iterations run out before it is certain.
     if name != "spheres":
         assert certain, error
     if name == "one sphere" and not options:
@@ -839,7 +839,7 @@ def test_long_rest(tmp_path: Path) -> None:
     )
     assert max(drift) <= 1
     assert moved.max() <= 0.01
-    # 0.1 was measured.
+    # A bed that gives way once more would have 0.1; one that is at rest has 0, which was measured.
     assert speed <= 0.2 * EPS / STEP
     assert max(depth / EPS, said) <= SLACK
 
