@@ -2,7 +2,7 @@
 # make test      set up, check style and types, run the tests (three minutes on two cores)
 # make test-all  the same, then the slow tests (five minutes more)
 # make report    set up, write the report of the paper's studies from the results kept here
-# make validate  set up, check the physics (minutes)
+# make validate  set up, check the physics (an hour)
 # make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
