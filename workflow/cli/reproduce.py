@@ -38,7 +38,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add_out(reproduce, "paper")
     which = reproduce.add_mutually_exclusive_group()
     which.add_argument(
-        "--quick", action="store_true", help="fewer cases and smaller packings: ten to twenty minutes"
+        "--quick", action="store_true", help="fewer cases and smaller packings: 10 to 20 minutes"
     )
     which.add_argument(
         "--stored",
