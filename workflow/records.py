@@ -53,12 +53,13 @@ class Recorded:
 
     @property
     def contact_laws(self) -> dict[str, Any]:
-        """The arguments of `core.project` for contacts at rest, and for those that may pull."""
-        arguments = {"compliance": self.arrays["compliance"]}
-        # Records of the inelastic law have no such array.
-        if "least_impulse" in self.arrays:
-            arguments["least_impulse"] = self.arrays["least_impulse"]
-        return arguments
+        """The arguments of `core.project` for contacts that give way or may pull.
+
+        Records of the inelastic law have no least impulses, and only those of version 0.2 have
+        compliances, of contacts at rest.
+        """
+        names = ("compliance", "least_impulse")
+        return {name: self.arrays[name] for name in names if name in self.arrays}
 
     @property
     def bodies(self) -> dict[str, Any]:

@@ -60,8 +60,9 @@ namespace {
   packed::Passed over_ranks(const packed::Passed &mine, Host &host)
   {
     double sums[3] = {mine.uphill, mine.curved, mine.steep};
-    double maxima[4] = {-mine.least_gap, mine.most_under_force, mine.heaviest, mine.farthest};
-    host.reduce(sums, 3, maxima, 4);
+    double maxima[6] = {-mine.least_gap, mine.most_under_force, mine.heaviest,
+                        mine.farthest,   mine.unsolved,         mine.unsolved_beyond_blur};
+    host.reduce(sums, 3, maxima, 6);
     packed::Passed all;
     all.uphill = sums[0];
     all.curved = sums[1];
@@ -70,33 +71,21 @@ namespace {
     all.most_under_force = maxima[1];
     all.heaviest = maxima[2];
     all.farthest = maxima[3];
+    all.unsolved = maxima[4];
+    all.unsolved_beyond_blur = maxima[5];
     return all;
-  }
-
-  // The first guess is first made as large as the dual function likes it along its own direction.
-  // This costs no product with A, since w is affine: the minimum over s of the dual function at s
-  // lambda is at s = -lambda . w(0) / lambda . (w(lambda) - w(0)). It saves a tenth of the
-  // iterations (measured), within these bounds. (Where contacts pull, a larger guess could be below the
-  // least impulses.)
-  double scale(const Guess &guess)
-  {
-    constexpr double LEAST_SCALE = 0.9, MOST_SCALE = 1.1;
-    const double curved_along = guess.along - guess.along_free;
-    return curved_along > 0.0 && !guess.pulls
-        ? std::clamp(-guess.along_free / curved_along, LEAST_SCALE, MOST_SCALE)
-        : 1.0;
   }
 
 }    // namespace
 
-bool AcceleratedProjectedGradient::judge(const ContactProblem &problem, Host &host,
-                                         SolverResult &result)
+bool AcceleratedProjectedGradient::judge(const ContactProblem &problem, const SolverLimits &limits,
+                                         Host &host, SolverResult &result)
 {
   const std::vector<double> &impulse = problem.contacts.impulse;
   gap_.resize(impulse.size());
   gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
   result.residual = residual_over_ranks(gap_.data(), problem.contacts, host);
-  return result.residual.largest() <= result.target;
+  return targets_.judge(problem, limits, gap_operator_, gap_, host) <= 1.0;
 }
 
 std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const ContactProblem &problem,
@@ -109,25 +98,22 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   // length (measured in columns, heaps and crystals of 2 to 600 particles).
   constexpr double BELOW_ROUND_OFF = 0.5;
   // A residual that came down by less than a tenth over half of so many iterations comes down no more:
-  // where there is hardly any room, the target is not to be had, but the tolerance may be.
+  // where there is hardly any room, the targets are not to be had, but the tolerance may be.
   constexpr long LONG = 5000;
   constexpr double STUCK = 0.9;
   const bool infeasible = is_infeasible(problem, gap_operator_, limits, host);
-  const bool blurred = result.target < BELOW_ROUND_OFF * result.round_off;
+  const bool blurred = limits.tolerance < BELOW_ROUND_OFF * result.round_off;
   const bool stuck =
-      result.iterations >= LONG && result.trend.least() > STUCK * result.trend.earlier();
+      result.iterations >= LONG && trend_of_targets_.least() > STUCK * trend_of_targets_.earlier();
   if (!infeasible && !blurred && !stuck) return std::nullopt;
-  if (judge(problem, host, result)) return Status::CONVERGED;
+  if (judge(problem, limits, host, result)) return Status::CONVERGED;
   if (infeasible) return Status::INFEASIBLE;
   if (blurred) return Status::ROUND_OFF;
-  if (!(result.residual.largest() <= limits.tolerance)) {
-    // It may be round-off that keeps it.
-    if (!single_precision) return std::nullopt;
-    result.trend = ResidualTrend();
-    return Status::OUT_OF_ITERATIONS;
-  }
-  result.target = result.residual.largest();
-  return Status::CONVERGED;
+  if (result.residual.largest() <= limits.tolerance) return Status::CONVERGED;
+  // It may be round-off that keeps it.
+  if (!single_precision) return std::nullopt;
+  result.trend = trend_of_targets_ = ResidualTrend();
+  return Status::OUT_OF_ITERATIONS;
 }
 
 void AcceleratedProjectedGradient::raise_curvature(const packed::Passed &passed)
@@ -155,17 +141,30 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   constexpr double IDLE_GAP = 5.0;
   constexpr bool SINGLE = sizeof(Real) < sizeof(double);
 
+  // Changes of velocity, and with them the targets, move most in the first iterations of a search.
+  constexpr long TARGETS_EVERY = 20;
+  const auto sets_targets = [](long iteration) {
+    return iteration == 2 || iteration == 4 || iteration == 8 || iteration == 14 ||
+        iteration % TARGETS_EVERY == 0;
+  };
+  // In a chain residuals add up. So a search goes on where velocities differ by more than this part of what
+  // targets are a part of from those that a half to two thirds as many iterations had found.
+  constexpr double MOST_MOVED = 0.05;
+  const bool by_velocity = limits.accuracy > 0.0;
+
   iterations.prepare(problem, diagonal_, gap_,
-                     IDLE_GAP * std::max(limits.tolerance, result.residual.largest()), scales);
+                     IDLE_GAP * std::max(limits.tolerance, result.residual.largest()), scales,
+                     targets_, gap_operator_.change(), limits.tolerance);
   std::vector<double> &impulse = problem.contacts.impulse;
-  const double target = result.target / scales.length;
   Momentum momentum;
-  long next_check = 0;
+  long next_check = 0, next_kept = result.iterations + 2, in_search = 0;
   long failures = 0;
+  double blur = 0.0;
   while (result.iterations < limits.max_iterations) {
     const packed::Passed passed =
-        over_ranks(iterations.advance(momentum.next(curvature_), 1.0 / curvature_), host);
+        over_ranks(iterations.advance(momentum.next(curvature_), 1.0 / curvature_, blur), host);
     ++result.iterations;
+    ++in_search;
     if (!std::isfinite(passed.steep)) {
       result.residual = UNSOLVED;
       return Status::NOT_FINITE;
@@ -173,15 +172,24 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     raise_curvature(passed);
     const double packed_residual = std::max(-passed.least_gap, passed.most_under_force);
     result.trend.see(result.iterations, scales.length * packed_residual);
+    trend_of_targets_.see(result.iterations, passed.unsolved);
 
-    const double least = least_residual<Real>(passed.farthest);
-    if (packed_residual <= std::max(target, least) && result.iterations >= next_check) {
+    blur = least_residual<Real>(passed.farthest);
+    bool solved = passed.unsolved_beyond_blur <= 1.0 && result.iterations >= next_check;
+    if (solved && by_velocity) {
+      iterations.set_targets();
+      double moved = iterations.moved_since_kept(limits.accuracy);
+      host.reduce(nullptr, 0, &moved, 1);
+      solved = moved <= MOST_MOVED;
+      if (!solved) next_check = result.iterations + std::max(3L, result.iterations / 10);
+    }
+    if (solved) {
       iterations.impulses_before(scales, impulse);
-      if (judge(problem, host, result)) return Status::CONVERGED;
-      if (packed_residual > target) return Status::OUT_OF_ITERATIONS;
+      if (judge(problem, limits, host, result)) return Status::CONVERGED;
+      if (passed.unsolved > 1.0) return Status::OUT_OF_ITERATIONS;
       iterations.join(gap_, scales);
       // The residuals so far were not those of all constraints.
-      result.trend = ResidualTrend();
+      result.trend = trend_of_targets_ = ResidualTrend();
       if (++failures == MOST_FAILURES && SINGLE) return Status::OUT_OF_ITERATIONS;
       next_check = result.iterations + failures;
     }
@@ -194,11 +202,16 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
 
     if (passed.uphill > 0.0) momentum.restart();
     iterations.finish(host);
+    if (by_velocity && result.iterations >= next_kept) {
+      iterations.keep_velocities();
+      next_kept = result.iterations + result.iterations / 2 + 4;
+    }
+    if (by_velocity && sets_targets(in_search)) iterations.set_targets();
     if (result.iterations % LOOK_EVERY == 0)
       iterations.look(IDLE_GAP * std::max(limits.tolerance / scales.length, packed_residual));
   }
   iterations.impulses(scales, impulse);
-  if (judge(problem, host, result)) return Status::CONVERGED;
+  if (judge(problem, limits, host, result)) return Status::CONVERGED;
   return std::isfinite(result.residual.feasibility) ? Status::OUT_OF_ITERATIONS
                                                     : Status::NOT_FINITE;
 }
@@ -206,7 +219,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
 SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
                                                  const SolverLimits &limits, Host &host)
 {
-  // A first guess whose residual is above so many targets is left to double precision. Otherwise at most so
+  // A first guess with a residual above so many of its targets is left to double precision. Otherwise at most so
   // many searches in single precision come first.
   constexpr double WITHIN_SINGLE = 1.0e12;
   constexpr int MOST_SEARCHES = 3;
@@ -221,23 +234,17 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   gap_operator_.prepare(problem);
 
   SolverResult result;
-  const Guess guess = judge_first_guess(problem, host);
+  trend_of_targets_ = ResidualTrend();
+  const Guess guess = judge_first_guess(problem, limits, host);
   result.residual = guess.residual;
-  result.target = target_residual(limits, guess);
-  result.change = guess.change();
-  if (result.residual.largest() <= result.target)
+  const double unsolved = targets_.judge(problem, limits, gap_operator_, gap_, host);
+  if (unsolved <= 1.0)
     result.status = Status::CONVERGED;
   else if (!std::isfinite(result.residual.feasibility))
     result.status = Status::NOT_FINITE;
   if (limits.max_iterations <= 0) settle_for_tolerance(limits, result.residual.largest(), result);
   if (result.status != Status::OUT_OF_ITERATIONS || limits.max_iterations <= 0) return result;
 
-  const double factor = scale(guess);
-  const std::vector<double> &free_gap = gap_operator_.free_gap();
-  for (std::size_t c = 0; c < impulse.size(); ++c) {
-    impulse[c] *= factor;
-    gap_[c] = free_gap[c] + factor * (gap_[c] - free_gap[c]);
-  }
   curvature_ = curvature_ == 0.0 ? FIRST_CURVATURE : std::max(1.0, RELAXATION * curvature_);
 
   Scales scales;
@@ -248,7 +255,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
     return result.status == Status::CONVERGED || result.status == Status::INFEASIBLE ||
         result.iterations >= limits.max_iterations;
   };
-  const bool of_use = guess.residual.largest() < WITHIN_SINGLE * result.target;
+  const bool of_use = unsolved < WITHIN_SINGLE;
   for (int search = 0; of_use && search < MOST_SEARCHES && !settled(); ++search) {
     result.status = iterate(single_, problem, limits, scales, host, result);
     // All other ends of a search have judged what they leave.

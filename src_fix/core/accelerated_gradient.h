@@ -45,17 +45,18 @@ class AcceleratedProjectedGradient final : public Solver {
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
 
  private:
-  // Iterates from the impulses in `problem`, whose gaps are gap_, until the residual, judged in double
-  // precision, is at most the target, or more iterations in this precision are of no use. Returns
+  // Iterates from the impulses in `problem`, whose gaps are gap_, until all residuals, judged in double
+  // precision, are at most their targets and velocities settle, or more iterations in this precision are of no use. Returns
   // OUT_OF_ITERATIONS also if iterations are left and this precision does not suffice.
   template <typename Real>
   Status iterate(PackedIterations<Real> &iterations, ContactProblem &problem,
                  const SolverLimits &limits, const Scales &scales, Host &host,
                  SolverResult &result);
 
-  // Sets the gaps gap_ and the residual of the impulses in `problem`. Returns whether it is at most the
-  // target.
-  bool judge(const ContactProblem &problem, Host &host, SolverResult &result);
+  // Sets the gaps gap_, the residual and the targets of the impulses in `problem`. Returns whether every
+  // residual is at most its target.
+  bool judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
+             SolverResult &result);
 
   // Returns how the search ends if more iterations from the impulses in `problem` are of no use, in the
   // precision that it has.
@@ -65,7 +66,8 @@ class AcceleratedProjectedGradient final : public Solver {
   // Raises L if the last change of the impulses shows it too small.
   void raise_curvature(const packed::Passed &passed);
 
-  double curvature_ = 0.0;    // L; 0 = not yet known
+  double curvature_ = 0.0;            // L; 0 = not yet known
+  ResidualTrend trend_of_targets_;    // of the largest residual as a part of its target
   PackedIterations<float> single_;
   PackedIterations<double> double_;
 };

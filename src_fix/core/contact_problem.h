@@ -56,6 +56,14 @@ struct ContactProblem {
         : bodies.mobility(particle, direction);
   }
 
+  // Tells whether impulses move a particle; not the dummy particle.
+  bool is_mobile(int particle) const
+  {
+    return bodies.empty() || particle == particles || bodies.body[particle] < 0
+        ? inverse_mass[particle] > 0.0
+        : bodies.inverse_mass[bodies.body[particle]] > 0.0;
+  }
+
   // Returns the diagonal entry of A for constraint c [time / mass]: what a unit impulse of the
   // constraint adds to its own w.
   double diagonal(std::size_t c) const

@@ -11,11 +11,12 @@ void ContactSet::clear()
   impulse.clear();
   compliance.clear();
   least.clear();
+  refinement.clear();
 }
 
 void ContactSet::add(int first_particle, int second_particle, const double *unit_normal,
                      double gap_value, double impulse_guess, double compliance_value,
-                     double least_impulse)
+                     double least_impulse, double refinement_value)
 {
   first.push_back(first_particle);
   second.push_back(second_particle);
@@ -24,6 +25,7 @@ void ContactSet::add(int first_particle, int second_particle, const double *unit
   impulse.push_back(impulse_guess);
   compliance.push_back(compliance_value);
   least.push_back(least_impulse);
+  refinement.push_back(refinement_value);
 }
 
 }    // namespace inelastic

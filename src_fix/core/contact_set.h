@@ -16,6 +16,8 @@
 // Each constraint carries one impulse lambda_c [mass length / time]: +lambda_c n_c acts on the first
 // particle and -lambda_c n_c on the second. It is at least l_c <= 0: where l_c is 0 a contact only
 // pushes; elsewhere it may also pull, by up to -l_c, and opens only where it pulls by as much.
+//
+// Solvers resolve each constraint to a target of its own (contact_targets.h), which the refinement makes smaller.
 
 #pragma once
 
@@ -32,11 +34,13 @@ struct ContactSet {
   std::vector<double> impulse;    // [mass length / time]
   std::vector<double> compliance;    // [time / mass]
   std::vector<double> least;         // l [mass length / time], <= 0
+  std::vector<double> refinement;    // > 0, at most 1
 
   std::size_t size() const { return gap.size(); }
   void clear();
   void add(int first_particle, int second_particle, const double *unit_normal, double gap_value,
-           double impulse_guess, double compliance_value = 0.0, double least_impulse = 0.0);
+           double impulse_guess, double compliance_value = 0.0, double least_impulse = 0.0,
+           double refinement_value = 1.0);
 };
 
 }    // namespace inelastic

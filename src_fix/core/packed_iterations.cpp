@@ -21,6 +21,9 @@ namespace {
   // A gap is known to a few units of round-off of the largest change.
   constexpr double ROUND_OFFS = 2.0;
 
+  // A velocity, which is a sum of some impulses, to so many units of its own round-off.
+  constexpr int BLURRED = 16;
+
   struct RodShape {
     double axis[3];    // unit vector
     double arm[2];     // of the two members along the axis [length]
@@ -68,6 +71,13 @@ namespace {
                                              static_cast<Real>(z), static_cast<Real>(fourth)};
   }
 
+  template <typename Real> Real length(const typename packed::Vector<Real>::Lanes &a)
+  { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
+
+  // Returns the particle whose vector is at a place, in bytes.
+  template <typename Real> std::size_t index(std::uint32_t place)
+  { return place / sizeof(packed::Vector<Real>); }
+
   // Returns the place of a particle's vector, in bytes.
   template <typename Real> std::uint32_t place(int particle)
   { return static_cast<std::uint32_t>(particle * sizeof(packed::Vector<Real>)); }
@@ -78,7 +88,8 @@ template <typename Real>
 void PackedIterations<Real>::prepare(const ContactProblem &problem,
                                      const std::vector<double> &diagonal,
                                      const std::vector<double> &gap, double idle_gap,
-                                     const Scales &scales)
+                                     const Scales &scales, const ContactTargets &targets,
+                                     const std::vector<double> &change, double tolerance)
 {
   idle_gap_ = static_cast<Real>(idle_gap / scales.length);
   looks_ = 0;
@@ -88,8 +99,8 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   for (std::size_t c = 0; c < gap.size(); ++c)
     (start_[c] > bound_[c] || !(gap[c] > idle_gap) ? near : far).push_back(c);
   inverse_diagonals_ = 0.0;
-  pack(problem.contacts, near, diagonal, gap, scales, working_);
-  pack(problem.contacts, far, diagonal, gap, scales, idle_);
+  pack(problem.contacts, near, diagonal, gap, scales, targets, working_);
+  pack(problem.contacts, far, diagonal, gap, scales, targets, idle_);
   for (std::vector<Real> *const state : states()) state->assign(near.size(), 0);
 
   const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
@@ -100,17 +111,80 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   pack_bodies(problem.bodies, mobility_unit);
   sum_.assign(particles, Vector{});
   velocity_.assign(particles, Vector{});
+  kept_before_ = kept_ = velocity_;
+
+  const double per_length = problem.timestep / scales.length;
+  const std::vector<double> &guess = targets.change_by_guess();
+  at_start_.resize(particles);
+  since_guess_.resize(particles);
+  for (std::size_t i = 0; i < particles; ++i) {
+    const double *const v = &change[3 * i], *const g = &guess[3 * i];
+    set_lanes(at_start_[i], per_length * v[0], per_length * v[1], per_length * v[2], 0.0);
+    set_lanes(since_guess_[i], per_length * (v[0] - g[0]), per_length * (v[1] - g[1]),
+              per_length * (v[2] - g[2]), 0.0);
+  }
+  mobile_.resize(particles);
+  for (std::size_t i = 0; i < particles; ++i) mobile_[i] = problem.is_mobile(static_cast<int>(i));
+  most_target_ = static_cast<Real>(tolerance / scales.length);
+  set_targets();
+}
+
+template <typename Real> void PackedIterations<Real>::set_targets()
+{
+  changed_.resize(velocity_.size());
+  for (std::size_t i = 0; i < changed_.size(); ++i)
+    changed_[i] = !mobile_[i] ? std::numeric_limits<Real>::max()
+                              : std::max(length<Real>(at_start_[i].lanes + velocity_[i].lanes),
+                                         length<Real>(since_guess_[i].lanes + velocity_[i].lanes));
+  for (Constraints *const some : {&working_, &idle_})
+    for (std::size_t k = 0; k < some->size(); ++k)
+      some->inverse_target[k] = 1 / std::min(most_target_, free_target(*some, k));
+}
+
+template <typename Real> void PackedIterations<Real>::keep_velocities()
+{
+  kept_before_.swap(kept_);
+  kept_ = velocity_;
+}
+
+template <typename Real> double PackedIterations<Real>::moved_since_kept(double accuracy) const
+{
+  std::vector<Real> moved(velocity_.size());
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    const Real blur =
+        BLURRED * std::numeric_limits<Real>::epsilon() * length<Real>(velocity_[i].lanes);
+    moved[i] = std::max(Real(0), length<Real>(velocity_[i].lanes - kept_before_[i].lanes) - blur);
+  }
+  Real most = 0;
+  for (std::size_t k = 0; k < working_.size(); ++k) {
+    if (!(unbound_[k] > working_.least[k])) continue;
+    const Real by = std::max(moved[index<Real>(working_.ends[k].first)],
+                             moved[index<Real>(working_.ends[k].second)]);
+    most = std::max(most, by / free_target(working_, k));
+  }
+  return accuracy * static_cast<double>(most);
+}
+
+// Returns the target of a constraint without the bound by the tolerance.
+template <typename Real>
+Real PackedIterations<Real>::free_target(const Constraints &constraints, std::size_t k) const
+{
+  const packed::Ends &ends = constraints.ends[k];
+  return std::max(
+      constraints.least_target[k],
+      constraints.part[k] *
+          std::min(changed_[index<Real>(ends.first)], changed_[index<Real>(ends.second)]));
 }
 
 template <typename Real>
-packed::Passed PackedIterations<Real>::advance(const Weights &weights, double step)
+packed::Passed PackedIterations<Real>::advance(const Weights &weights, double step, double blur)
 {
   packed::Passed passed = packed::advance_impulses(packed::Pass<Real>{
       working_.size(), working_.ends.data(), working_.normal.data(), working_.diagonal.data(),
-      working_.compliance.data(), working_.least.data(), velocity_.data(), unbound_.data(),
-      change_before_.data(), gap_before_.data(), sum_.data(), static_cast<Real>(step),
-      static_cast<Real>(step_before_), static_cast<Real>(weights.along),
-      static_cast<Real>(weights.beyond), static_cast<Real>(weights.back)});
+      working_.compliance.data(), working_.least.data(), working_.inverse_target.data(),
+      velocity_.data(), unbound_.data(), change_before_.data(), gap_before_.data(), sum_.data(),
+      static_cast<Real>(step), static_cast<Real>(step_before_), static_cast<Real>(weights.along),
+      static_cast<Real>(weights.beyond), static_cast<Real>(weights.back), static_cast<Real>(blur)});
   step_before_ = step;
   // Where gaps change by no more than round-off, squares of the changes tell nothing.
   const double round_off = ROUND_OFFS * std::numeric_limits<Real>::epsilon() * passed.farthest;
@@ -213,6 +287,9 @@ template <typename Real> void PackedIterations<Real>::Constraints::resize(std::s
   diagonal.resize(count);
   compliance.resize(count);
   least.resize(count);
+  least_target.resize(count);
+  part.resize(count);
+  inverse_target.resize(count);
 }
 
 template <typename Real>
@@ -225,6 +302,9 @@ void PackedIterations<Real>::Constraints::copy(const Constraints &other, std::si
   diagonal[to] = other.diagonal[k];
   compliance[to] = other.compliance[k];
   least[to] = other.least[k];
+  least_target[to] = other.least_target[k];
+  part[to] = other.part[k];
+  inverse_target[to] = other.inverse_target[k];
 }
 
 template <typename Real>
@@ -232,7 +312,7 @@ void PackedIterations<Real>::pack(const ContactSet &contacts,
                                   const std::vector<std::size_t> &places,
                                   const std::vector<double> &diagonal,
                                   const std::vector<double> &gap, const Scales &scales,
-                                  Constraints &packed)
+                                  const ContactTargets &targets, Constraints &packed)
 {
   packed.resize(places.size());
   packed.source = places;
@@ -247,6 +327,8 @@ void PackedIterations<Real>::pack(const ContactSet &contacts,
     inverse_diagonals_ += 1.0 / packed.diagonal[k];
     packed.compliance[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
     packed.least[k] = static_cast<Real>((contacts.least[c] - contacts.impulse[c]) / scales.impulse);
+    packed.least_target[k] = static_cast<Real>(targets.least()[c] * per_length);
+    packed.part[k] = static_cast<Real>(targets.part()[c]);
   }
 }
 

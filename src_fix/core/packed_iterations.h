@@ -17,6 +17,7 @@
 #pragma once
 
 #include "contact_problem.h"
+#include "contact_targets.h"
 #include "host.h"
 #include "packed_kernels.h"
 
@@ -41,13 +42,30 @@ template <typename Real> class PackedIterations {
  public:
   // Packs a problem, whose impulses are the start. `diagonal` is that of A, `gap` has the gaps w of
   // these impulses, one number per constraint each (contact_problem.h). Constraints without an
-  // impulse whose gap is above `idle_gap` [length] are idle.
+  // impulse whose gap is above `idle_gap` [length] are idle. `change` are the changes of velocity by these
+  // impulses (GapOperator::change), and the targets were judged with them. No target is above the tolerance
+  // [length].
   void prepare(const ContactProblem &problem, const std::vector<double> &diagonal,
-               const std::vector<double> &gap, double idle_gap, const Scales &scales);
+               const std::vector<double> &gap, double idle_gap, const Scales &scales,
+               const ContactTargets &targets, const std::vector<double> &change, double tolerance);
+
+  // Sets the targets by the present changes of velocity (contact_targets.h). Call it between finish and
+  // advance.
+  void set_targets();
+
+  // Keeps the present changes of velocity; the last two that were kept can be compared with.
+  void keep_velocities();
+
+  // Returns by how much velocities have changed since those that were kept last but one: the largest over both
+  // sides of the working constraints with an impulse, as a part of what the target is the accuracy's part of.
+  // Before two were kept it is the change since the start of the search. What may be round-off of a velocity
+  // does not count. `accuracy` is above 0. Call it after finish and set_targets.
+  double moved_since_kept(double accuracy) const;
 
   // Begins an iteration with a step of 1 / L: the next impulses become the present ones. Returns sums
-  // and maxima over this rank's constraints; those of gaps and changes are of the impulses before.
-  packed::Passed advance(const Weights &weights, double step);
+  // and maxima over this rank's constraints; those of gaps and changes are of the impulses before. Residuals
+  // below `blur`, in packed units, may be round-off.
+  packed::Passed advance(const Weights &weights, double step, double blur);
 
   // Ends an iteration: computes the changes of velocity of the present impulses. Collective. The host must
   // know which ghosts are in constraints (Host::choose_ghosts).
@@ -77,6 +95,7 @@ template <typename Real> class PackedIterations {
     std::vector<packed::Ends> ends;
     std::vector<Vector> normal;    // the fourth number: the gap of the impulses at the start
     std::vector<Real> diagonal, compliance, least;
+    std::vector<Real> least_target, part, inverse_target;    // contact_targets.h
 
     std::size_t size() const { return source.size(); }
     void resize(std::size_t count);
@@ -86,7 +105,8 @@ template <typename Real> class PackedIterations {
 
   void pack(const ContactSet &contacts, const std::vector<std::size_t> &places,
             const std::vector<double> &diagonal, const std::vector<double> &gap,
-            const Scales &scales, Constraints &packed);
+            const Scales &scales, const ContactTargets &targets, Constraints &packed);
+  Real free_target(const Constraints &constraints, std::size_t k) const;
   void wake(const std::vector<std::size_t> &near, const Real *gap);
   void set_idle();
   void pack_bodies(const RigidBodies &bodies, double mobility_unit);
@@ -110,6 +130,14 @@ template <typename Real> class PackedIterations {
   Real idle_gap_ = 0;                 // above it a constraint without an impulse is idle
   std::vector<Real> inverse_mass_;    // per particle; 1 for particles in bodies
   std::vector<Vector> sum_, velocity_;
+  // Per particle: the change of velocity by the impulses at the start of the search, in all and since the
+  // first guess of the solve
+  std::vector<Vector> at_start_, since_guess_;
+  std::vector<char> mobile_;    // per particle
+  std::vector<Real>
+      changed_;    // per particle that can move, what targets are a part of, as set_targets found it
+  std::vector<Vector> kept_, kept_before_;    // of velocity_
+  Real most_target_ = 0;
   std::vector<packed::Rod<Real>> rods_;
   std::vector<packed::Body<Real>> bodies_;       // bodies that are no rods
   std::vector<packed::Member<Real>> members_;    // of all bodies, as in RigidBodies::member

@@ -89,17 +89,19 @@ namespace {
                                                         std::size_t size, const Real *gap,
                                                         Real *next, Passed &passed)
   {
-    Real uphill = 0, curved = 0, steep = 0, lowest = 0, most = 0, heaviest = 0, farthest = 0;
+    Real uphill = 0, curved = 0, steep = 0, lowest = 0, most = 0, heaviest = 0, farthest = 0,
+         unsolved = 0, beyond_blur = 0;
     const Real *const diagonal = pass.diagonal + begin;
     const Real *const compliance = pass.compliance + begin;
     const Real *const least = pass.least + begin;
+    const Real *const inverse_target = pass.inverse_target + begin;
     Real *const unbound = pass.unbound + begin;
     Real *const change_before = pass.change_before + begin;
     Real *const gap_before = pass.gap_before + begin;
     const Real step = pass.step, step_before = pass.step_before, along = pass.along,
-               beyond = pass.beyond, back = pass.back;
+               beyond = pass.beyond, back = pass.back, blur = pass.blur;
 #pragma omp simd simdlen(16) reduction(+ : uphill, curved, steep) reduction(min : lowest) \
-    reduction(max : most, heaviest, farthest)
+    reduction(max : most, heaviest, farthest, unsolved, beyond_blur)
     for (std::size_t k = 0; k < size; ++k) {
       const Real present = unbound[k] > least[k] ? unbound[k] : least[k];
       const Real here = gap[k] + compliance[k] * present;
@@ -122,6 +124,11 @@ namespace {
       heaviest = load > heaviest ? load : heaviest;
       const Real far = (value > 0 ? value : -value) * diagonal[k];
       farthest = far > farthest ? far : farthest;
+      const Real left = here < 0 ? -here : under_force;
+      const Real part = left * inverse_target[k];
+      unsolved = part > unsolved ? part : unsolved;
+      const Real clear = (left - blur) * inverse_target[k];
+      beyond_blur = clear > beyond_blur ? clear : beyond_blur;
       unbound[k] = free;
       change_before[k] = present;
       gap_before[k] = here;
@@ -134,6 +141,9 @@ namespace {
     passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
     passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
     passed.farthest = std::max(passed.farthest, static_cast<double>(farthest));
+    passed.unsolved = std::max(passed.unsolved, static_cast<double>(unsolved));
+    passed.unsolved_beyond_blur =
+        std::max(passed.unsolved_beyond_blur, static_cast<double>(beyond_blur));
   }
 
   template <typename Real>

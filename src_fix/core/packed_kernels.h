@@ -41,6 +41,7 @@ template <typename Real> struct Pass {
   const Real *diagonal;      // of A
   const Real *compliance;    // 0 for rigid constraints
   const Real *least;         // the change that leaves the least impulse
+  const Real *inverse_target;      // 1 / the target of the residual
   const Vector<Real> *velocity;    // per particle: change of velocity of the present changes
   Real *unbound;               // the present changes before projection; replaced by the next ones
   Real *change_before;         // the changes before; replaced by the present ones
@@ -48,6 +49,7 @@ template <typename Real> struct Pass {
   Vector<Real> *sum;           // per particle: sum of the next changes; zero before
   Real step, step_before;      // 1 / L, and that of the pass before
   Real along, beyond, back;    // the weights of accelerated_gradient.h
+  Real blur;                   // a residual below this may be round-off
 };
 
 // A pass returns these sums and maxima over the constraints. D is the diagonal of A: the algorithm
@@ -61,6 +63,8 @@ struct Passed {
   double most_under_force = 0.0;    // largest present gap where an impulse acts, at least 0
   double heaviest = 0.0;            // largest of the next impulses, times D: a length
   double farthest = 0.0;            // largest of the next changes, times D
+  // Largest present residual as a part of its target; the same with the residual less the blur
+  double unsolved = 0.0, unsolved_beyond_blur = 0.0;
 };
 
 // Makes a gradient step from the present changes and the step of the momentum, and projects. `sum`

@@ -55,14 +55,11 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
   while (true) {
     SolverLimits remaining = limits;
     remaining.max_iterations -= result.iterations;
-    remaining.least_target = std::max(limits.least_target, result.target);
     const SolverResult solved = solver.solve(problem, remaining, host);
     ++result.rounds;
     result.status = solved.status;
     result.iterations += solved.iterations;
     result.residual = solved.residual;
-    result.target = std::max(result.target, solved.target);
-    result.change = std::max(result.change, solved.change);
     result.round_off = solved.round_off;
     result.trend = solved.trend;
 

@@ -36,8 +36,6 @@ struct ProjectionResult {
   long iterations = 0;    // over all rounds
   int rounds = 0;
   Residual residual;         // over all constraints that came to light, on all ranks
-  double target = 0.0;       // [length] the largest that a round asked for: see SolverResult
-  double change = 0.0;       // [length] the largest of all rounds: see SolverResult
   double round_off = 0.0;    // [length] of the last solve: see SolverResult
   ResidualTrend trend;       // of the last solve
 

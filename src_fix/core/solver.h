@@ -14,6 +14,7 @@
 #pragma once
 
 #include "contact_problem.h"
+#include "contact_targets.h"
 #include "gap_operator.h"
 #include "host.h"
 
@@ -88,49 +89,28 @@ struct SolverLimits {
   long max_iterations = 0;
   // [length] Steps that move particles further than this are not sensible (infeasibility.h).
   double reach = std::numeric_limits<double>::infinity();
-  // The largest residual of a solution as a part of what contacts change in the step
-  // (target_residual); 0 = only the tolerance counts.
+  // The part of what contacts change to which they are resolved (contact_targets.h); 0 = only the tolerance
+  // counts.
   double accuracy = 0.0;
-  // [length] The target is not below this: that of an earlier round of the step, or a part of that of the
-  // step before.
-  double least_target = 0.0;
 };
 
 // What is known before the iterations, from the first guess of the impulses; over all ranks.
 struct Guess {
   Residual residual;
-  // [length] The mean, over the constraints with impulse, of the length by which the impulse opens
-  // its own gap.
-  double mean_change = 0.0;
-  // [length] The largest gap without impulses, or change by an impulse.
-  double largest_length = 0.0;
+  double largest_length =
+      0.0;    // [length] The largest gap without impulses, or change by an impulse.
   double largest_diagonal = 0.0;    // [time / mass] of A
-  // [length] What contacts change in the step: what the guess does, or what it lacks.
-  double change() const { return std::max(mean_change, residual.largest()); }
-
-  bool pulls = false;    // some contact may pull
-  // lambda . w(lambda) and lambda . w(0) [mass length^2 / time]
-  double along = 0.0, along_free = 0.0;
 };
-
-// Returns the residual [length] at which the iterations end: the accuracy times what the first guess
-// lacks, or times a tenth of what it does, whichever is more. It is not below 8 machine epsilons of the
-// largest length, nor below limits.least_target, and at most the tolerance. Where the accuracy is 0 it is
-// the tolerance.
-double target_residual(const SolverLimits &limits, const Guess &guess);
 
 struct SolverResult {
   Status status = Status::OUT_OF_ITERATIONS;
   long iterations = 0;
   Residual residual;         // over all ranks
-  double target = 0.0;       // [length] the residual that was asked for; reached if CONVERGED
-  double change = 0.0;       // [length] what contacts change in the step (Guess::change)
   double round_off = 0.0;    // [length] of the gaps where impulses act; no residual gets below it
   ResidualTrend trend;
 };
 
-// Makes a search that has ended above its target, but within the tolerance, a solution: the target
-// becomes what was reached.
+// Makes a search that has ended above its targets, but within the tolerance, a solution.
 void settle_for_tolerance(const SolverLimits &limits, double reached, SolverResult &result);
 
 class Solver {
@@ -145,11 +125,12 @@ class Solver {
   GapOperator &gap_operator() { return gap_operator_; }
 
  protected:
-  // Judges the impulses of the problem, of which those below the least become that, and sets the diagonal. The
-  // operator must be prepared for the problem. Collective.
-  Guess judge_first_guess(ContactProblem &problem, Host &host);
+  // Judges the impulses of the problem, of which those below the least become that, and sets the diagonal and
+  // what the targets need of the first guess. The operator must be prepared for the problem. Collective.
+  Guess judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host);
 
   GapOperator gap_operator_;
+  ContactTargets targets_;
   std::vector<double> gap_;         // [length] at the end of the step, one per constraint
   std::vector<double> diagonal_;    // of A [time / mass]
 };

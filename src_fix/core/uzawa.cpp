@@ -14,9 +14,7 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
   gap_operator_.prepare(problem);
 
   SolverResult result;
-  const Guess guess = judge_first_guess(problem, host);
-  result.target = target_residual(limits, guess);
-  result.change = guess.change();
+  judge_first_guess(problem, limits, host);
   std::fill(contacts.impulse.begin(), contacts.impulse.end(), 0.0);
   const auto ended = [&](Status status) {
     result.status = status;
@@ -27,7 +25,8 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
   while (true) {
     gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
     result.residual = residual_over_ranks(gap_.data(), contacts, host);
-    if (result.residual.feasibility <= result.target) return ended(Status::CONVERGED);
+    if (targets_.judge_feasibility(problem, limits, gap_operator_, gap_, host) <= 1.0)
+      return ended(Status::CONVERGED);
     if (!std::isfinite(result.residual.feasibility)) return ended(Status::NOT_FINITE);
     if (result.iterations >= limits.max_iterations) return ended(Status::OUT_OF_ITERATIONS);
     if (result.iterations > 0) result.trend.see(result.iterations, result.residual.feasibility);

@@ -33,20 +33,10 @@ void AtomState::remember_contacts(GhostExchange &ranks)
     if (problem.contacts.impulse[c] == 0.0) continue;
     const int i = problem.contacts.first[c];
     const int j = problem.contacts.second[c];
-    const Side &side = step_.sides[c];
-    const int wall = side.wall;
+    const int wall = step_.sides[c].wall;
     const double force = problem.contacts.impulse[c] * force_per_impulse;
-    const double compliance = problem.contacts.compliance[c];
-    const double spring_gap = compliance > 0.0
-        ? compliance * step_.impulse_per_force * (side.preload - force)
-        : ContactMemory::NONE;
-    // No time passes in the half kick with which a run starts.
-    const double sustained = step_.kick == Kick::WHOLE
-        ? ContactMemory::next_sustained(side.sustained, force)
-        : std::min(side.sustained, force);
-    const ContactMemory::Contact contact = {force, sustained, spring_gap};
-    memory_.remember(i, wall ? -wall : atom->tag[j], contact);
-    if (!wall) memory_.remember(j, atom->tag[i], contact);
+    memory_.remember(i, wall ? -wall : atom->tag[j], force);
+    if (!wall) memory_.remember(j, atom->tag[i], force);
   }
   ranks.gather(memory_);
   measure_messages(ranks);

@@ -36,6 +36,9 @@ class AtomState : protected Pointers {
   // At the end of a run: velocities are momentum alone from here on.
   void take_out_pushes();
 
+  // For how many steps a particle has been quiet (rest.h).
+  double &quiet_steps(int i) { return state_[i][QUIET_STEPS]; }
+
   ContactMemory &contact_memory() { return memory_; }
   LawMemory &law_memory() { return law_memory_; }
   CarriedMomenta &momenta() { return momenta_; }
@@ -77,7 +80,8 @@ class AtomState : protected Pointers {
     PUSH_NEXT = 6,
     PUSH_HELD = 9,
     EXPECTED_RADIUS = 12,
-    STATE_SIZE = 13
+    QUIET_STEPS = 13,
+    STATE_SIZE = 14
   };
   int carried_size() const
   { return STATE_SIZE + (step_.has_bodies ? CarriedMomenta::PACKED_SIZE : 0); }

@@ -65,7 +65,6 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   double sums[3] = {static_cast<double>(added), static_cast<double>(relinearised),
                     static_cast<double>(changed)};
   ranks_.reduce(sums, 3, &step_.excess, 1);
-  if (sums[2] > 0.0) rules_.make_overloaded_rigid(velocity);
   came_back_ = came_back_ || sums[0] > 0.0;
   relinearised_ = relinearised_ || sums[1] > 0.0;
   ranks_.fail_together(step_.problem_found);

@@ -48,7 +48,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     constraints_(lmp, step_, ranks_, clock_, state_.contact_memory(), laws_, bodies_.get()),
     solver_(inelastic::make_solver(settings_.solver)),
     push_apart_(step_, constraints_, bodies_.get()), length_(lmp, step_, ranks_),
-    rest_(lmp, step_, ranks_), check_(lmp, this, step_, ranks_, state_, bodies_.get()),
+    rest_(lmp, step_, ranks_, state_), hold_still_(step_, ranks_, bodies_.get()),
+    check_(lmp, this, step_, ranks_, state_, bodies_.get()),
     unsolved_(lmp, step_, constraints_, ranks_, bodies_.get()), output_(lmp, step_, ranks_),
     summary_(lmp, step_, clock_), record_(lmp, step_, ranks_, state_.contact_memory())
 {
@@ -349,19 +350,29 @@ void FixInelastic::advance(int vflag, Kick kick)
   length_.restore();
   step_.kick = kick;
   check_.before_step();
-  const inelastic::ProjectionResult result = solve();
-  rest_.judge(result);
-  if (step_.at_rest) stop();
+  inelastic::ProjectionResult result = solve();
+  if (rest_.look(result)) refine(result);
+  std::vector<char> at_rest;    // one mark per particle
+  if (rest_.decide(at_rest)) {
+    const PhaseClock::Within solving(clock_, PhaseClock::SOLVE);
+    result.iterations += hold_still_.run(at_rest);
+  }
   finish(result);
 }
 
-// The scene is at rest: nothing moves in this step.
-void FixInelastic::stop()
+// Solves the step once more, from its solution, where contacts are to be known better (rest.h).
+void FixInelastic::refine(inelastic::ProjectionResult &result)
 {
-  if (bodies_) bodies_->stop(step_.problem, step_.velocity);
-  for (int i = 0; i < step_.problem.particles; ++i)
-    if (step_.problem.inverse_mass[i] > 0.0) std::fill_n(&step_.velocity[3 * i], 3, 0.0);
-  if (bodies_) bodies_->turn(step_.problem, step_.velocity, step_.motion_of_bodies);
+  const inelastic::ProjectionResult refined = project(settings_.max_iterations - result.iterations);
+  result.iterations += refined.iterations;
+  result.status = refined.status;
+  result.residual = refined.residual;
+  if (refined.status == inelastic::Status::CONVERGED) {
+    rest_.look_again();
+    return;
+  }
+  summary_.add_unconverged();
+  unsolved_.report(result);
 }
 
 // Finds the velocities of the step, whose length may become shorter on the way.
@@ -375,7 +386,6 @@ inelastic::ProjectionResult FixInelastic::solve()
     predict();
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
-    const double target = result.target, change = result.change;
     constraints_.overlaps().share();
     if (settings_.record_every > 0 && step_.kick == Kick::WHOLE &&
         update->ntimestep % settings_.record_every == 0)
@@ -395,11 +405,7 @@ inelastic::ProjectionResult FixInelastic::solve()
       summary_.add_unconverged();
       unsolved_.report(result);
     }
-    if (length_.accepts(unsolved_.named())) {
-      step_.resolution = target / step_.problem.timestep;
-      step_.change = change / step_.kicks();
-      return result;
-    }
+    if (length_.accepts(unsolved_.named())) return result;
   }
 }
 
@@ -426,11 +432,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   const double reach = (settings_.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
   inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
   // A push is no momentum.
-  if (step_.phase == Phase::CONTACT) {
-    constexpr double LEAST = 0.5;    // of the last resolution: GapRules::contact_gap
-    limits.accuracy = rest_.accuracy();
-    limits.least_target = LEAST * step_.resolution * step_.problem.timestep;
-  }
+  if (step_.phase == Phase::CONTACT) limits.accuracy = settings_.accuracy;
   const inelastic::ProjectionResult result = inelastic::project(
       step_.problem, constraints_, *solver_, limits, MAX_ROUNDS, ranks_, step_.velocity);
   if (result.status != inelastic::Status::CONVERGED) unsolved_.note_worst(result);

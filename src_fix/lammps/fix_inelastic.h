@@ -21,6 +21,7 @@ FixStyle(inelastic,FixInelastic);
 #include "contact_output.h"
 #include "fix_settings.h"
 #include "ghost_exchange.h"
+#include "hold_still.h"
 #include "law_contacts.h"
 #include "motion_check.h"
 #include "phase_clock.h"
@@ -96,6 +97,7 @@ class FixInelastic : public Fix {
   PushApart push_apart_;
   StepLength length_;
   Rest rest_;
+  HoldStill hold_still_;
   MotionCheck check_;
   UnsolvedStep unsolved_;
   ContactOutput output_;
@@ -115,9 +117,9 @@ class FixInelastic : public Fix {
   void begin_summary();
   void advance(int vflag, Kick kick);
   inelastic::ProjectionResult solve();
+  void refine(inelastic::ProjectionResult &result);
   void predict();
   inelastic::ProjectionResult project(long max_iterations);
-  void stop();
   void finish(const inelastic::ProjectionResult &result);
 };
 

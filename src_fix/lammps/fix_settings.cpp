@@ -17,7 +17,7 @@ using namespace LAMMPS_NS;
 namespace {
 
 constexpr const char *KEYWORDS[] = {"region",  "rigid",  "law",    "accuracy", "solver",
-                                    "maxiter", "frozen", "record", "shorten"};
+                                    "maxiter", "frozen", "record", "shorten",  "rest"};
 
 bool is_keyword(const char *word)
 {
@@ -62,7 +62,7 @@ void Reader::read_keywords()
     if (!is_keyword(arg_[at_]))
       error_at(error_, FLERR, at_,
                "Unknown fix inelastic keyword {}: use region, rigid, law, accuracy, solver, "
-               "maxiter, frozen, record or shorten",
+               "maxiter, frozen, record, shorten or rest",
                keyword);
     if (at_ + 2 > narg_) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error_);
     refuse_twice(keyword);
@@ -84,6 +84,8 @@ void Reader::read_keywords()
       read_frozen(value);
     else if (keyword == "record")
       read_record(value);
+    else if (keyword == "rest")
+      settings_.rest = utils::logical(FLERR, value, false, lmp_) == 1;
     else
       settings_.shorten = utils::logical(FLERR, value, false, lmp_) == 1;
   }

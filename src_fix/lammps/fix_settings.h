@@ -30,6 +30,8 @@ struct Settings {
   bool warn_only = false;
   // A step may be made shorter than `timestep` where the whole step leaves an overlap.
   bool shorten = false;
+  // What contacts hold comes to rest (rest.h).
+  bool rest = true;
   // The group of the fix, and the group of spheres that nothing moves (0 = none).
   int group_bit = 0;
   std::string frozen_group;    // empty: there is none

@@ -9,86 +9,73 @@ namespace {
 
 // In tolerances: a smaller overlap at the end of the step changes no constraint.
 constexpr double RELINEARISE_BEYOND = 1.1;
-// The gap of a contact at rest differs from zero by at most this part of the tolerance.
-constexpr double ELASTIC_RANGE = 0.5;
+// In tolerances: a contact is closed, whatever its exact gap, within this distance from touching.
+constexpr double CLOSED = 0.5;
 
 }    // namespace
 
-// What an overlap gives back in a step stays in the velocities: it is no more than what velocities are
-// resolved to. Where a force acted, a gap of a quarter of the target counts as closed. There the constraint
-// asks for more than the geometry does, which may have no room for it, but for less than the residual that
-// is allowed: velocities of this step are resolved to at least half of what they were in the last one
-// (FixInelastic::project).
+void GapRules::begin(Side &side, double force, int i, int j, const double *normal) const
+{
+  constexpr double PART_OF_LOAD = 0.1;
+  side.force = force;
+  const inelastic::ContactProblem &problem = step_.problem;
+  const double *const v = problem.predicted_velocity.data();
+  double opening = 0.0;
+  for (int d = 0; d < 3; ++d) opening += normal[d] * (v[3 * i + d] - v[3 * j + d]);
+  const double load = step_.impulse_per_force * force * problem.mobility_of_pair(i, j, normal);
+  side.to_stop =
+      std::max({PART_OF_LOAD * load, side.wall_motion - problem.timestep * opening, 0.0});
+}
+
+// A gap under a force, and an overlap, count as closed where they are at most half a tolerance: positions are not
+// known better, and what they would give or take in a step would be velocities that nothing gives. Where that
+// adds up along a chain, or differs from step to step, a bed would never be quiet. Beyond it a gap closes, and an
+// overlap is given back little by little.
 double GapRules::contact_gap(const Side &side) const
 {
-  const double tolerance = step_.settings.tolerance;
-  const double target = std::min(step_.resolution * step_.problem.timestep, tolerance);
+  const double closed = CLOSED * step_.settings.tolerance;
   const double gap = side.gap_now;
-  if (side.compliance > 0.0) return std::max(gap, -ELASTIC_RANGE * tolerance - target);
-  if (gap < 0.0) return std::max(gap, -target);
-  constexpr double CLOSED = 0.25;    // of a target
-  return side.force > 0.0 ? std::max(0.0, gap - std::min(CLOSED * target, tolerance - target))
-                          : gap;
+  if (gap <= 0.0) return -given_back(side);
+  const bool under_force = side.force > 0.0 && gap <= step_.settings.tolerance;
+  return under_force ? std::max(0.0, gap - closed) : gap;
+}
+
+// [length] What is given back in the step of an overlap. It begins smoothly, with the accuracy's part of what the
+// contact has to stop where the overlap is 0.8 tolerances. What turning bodies and curved walls leave beyond the
+// tolerance is given back at once: with the next step's it could become a bad start.
+double GapRules::given_back(const Side &side) const
+{
+  constexpr double FULL = 0.8;    // tolerances
+  const double tolerance = step_.settings.tolerance;
+  const double beyond = -side.gap_now - CLOSED * tolerance;
+  if (beyond <= 0.0) return 0.0;
+  const double x = beyond / ((FULL - CLOSED) * tolerance);
+  const double softly = step_.settings.accuracy * side.to_stop * x * std::max(1.0, x * x);
+  return std::min(beyond, std::max(softly, -side.gap_now - tolerance));
 }
 
 double GapRules::gap_by_law(const Side &side, const LawContact &contact) const
 {
-  if (contact.demand.least_impulse < 0.0) return held_gap(side.gap_now, contact.predicted_speed);
+  if (contact.demand.least_impulse < 0.0) return held_gap(side, contact.predicted_speed);
   const double gap = contact_gap(side);
   return contact.demand.parts
       ? std::min(gap, -step_.problem.timestep * contact.demand.parting_speed)
       : gap;
 }
 
-double GapRules::held_gap(double gap, double predicted_speed) const
+// A held contact is under a force, push or pull, whatever the force was.
+double GapRules::held_gap(const Side &side, double predicted_speed) const
 {
-  const double h = step_.problem.timestep;
-  const double target = std::min(step_.resolution * h, step_.settings.tolerance);
-  return std::clamp(gap, -target, most_closed(predicted_speed));
+  if (side.gap_now <= 0.0) return -given_back(side);
+  const double open = std::max(0.0, side.gap_now - CLOSED * step_.settings.tolerance);
+  return std::min(open, most_closed(side, predicted_speed));
 }
 
 // [length] The surfaces of a held contact are brought back to one another by no more than velocities are resolved
 // to, or as fast as they would part: this adds nothing to the kinetic energy.
-double GapRules::most_closed(double predicted_speed) const
+double GapRules::most_closed(const Side &side, double predicted_speed) const
 {
-  const double h = step_.problem.timestep;
-  const double target = std::min(step_.resolution * h, step_.settings.tolerance);
-  return std::max(target, h * predicted_speed);
-}
-
-void GapRules::rest(Side &side, const ContactMemory::Contact &known, int i, int j,
-                    const double *normal) const
-{
-  // A softer contact costs fewer iterations, but its gap reaches the elastic range with a smaller change
-  // of its force. With a PER_TOLERANCE of 0.6 springs slide all the time, and a bed of 1,000 spheres does
-  // not come to rest; with half the elastic range it takes twice as long (measured). The other two bound
-  // what springs give back when their load goes: 3 % of the change of the impulse, less in a finer run.
-  constexpr double MOST_COMPLIANCE = 0.03, PER_ACCURACY = 30.0, PER_TOLERANCE = 0.3;
-  const double tolerance = step_.settings.tolerance;
-  constexpr double AT_REST = 0.5;    // of the force is sustained
-  side.force = known.force;
-  side.sustained = known.sustained;
-  const bool at_rest = known.force > 0.0 && known.sustained >= AT_REST * known.force;
-  if (!at_rest || !(step_.change > 0.0) || overlaps_.is_bad(side.gap_now)) return;
-  const LawContact *const law = step_.law_contact(side);
-  if (law && !law->demand.is_inelastic()) return;
-  // The same force is half of the impulse in half a kick.
-  side.compliance = step_.problem.mobility_of_pair(i, j, normal) / step_.kicks() *
-      std::min({MOST_COMPLIANCE, PER_ACCURACY * step_.settings.accuracy,
-                PER_TOLERANCE * tolerance / step_.change});
-  const double length_per_force = side.compliance * step_.impulse_per_force;
-  const double range = ELASTIC_RANGE * tolerance / length_per_force;
-  const double preload = known.spring_gap == ContactMemory::NONE
-      ? known.sustained + side.gap_now / length_per_force
-      : known.force + known.spring_gap / length_per_force;
-  side.preload = std::clamp(preload, known.sustained - range, known.sustained + range);
-}
-
-double GapRules::asked_gap(const Side &side) const
-{
-  const double rigid = effective_gap(side) - side.wall_motion;
-  return side.compliance > 0.0 ? rigid - side.compliance * step_.impulse_per_force * side.preload
-                               : rigid;
+  return std::max(step_.settings.accuracy * side.to_stop, step_.problem.timestep * predicted_speed);
 }
 
 double GapRules::effective_gap(const Side &side) const
@@ -118,22 +105,24 @@ bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
   const double allowed = bad ? side.gap_now : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
   const double wanted = bad ? wanted_gap(side) : 0.0;
-  // A spring can give way by more than the residual.
-  const double beyond = side.compliance > 0.0 ? 1.0 : RELINEARISE_BEYOND;
-  return wanted - gap_at_end > beyond * tolerance;
+  return wanted - gap_at_end > RELINEARISE_BEYOND * tolerance;
 }
 
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
+  constexpr double LEFT = 0.75;    // tolerances
   const double tolerance = step_.settings.tolerance;
+  // Where one has to change, those that are near to it change with it: in a chain each would be the next round's.
+  double allowed = tolerance;
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     Side &side = step_.sides[c];
-    // Gaps that were set by the end of the step are kept there by follow().
     const double linear_gap = side.gap_now - side.wall_motion;
-    const bool asks_for_all = contacts.gap[c] == linear_gap && contacts.compliance[c] == 0.0;
-    if (!side.as_at_start || asks_for_all || overlaps_.is_bad(side.gap_now)) continue;
+    const double lessened = linear_gap + LEFT * tolerance;
+    // Gaps that were set by the end of the step are kept there by follow().
+    if (!side.as_at_start && contacts.gap[c] != lessened) continue;
+    if (contacts.gap[c] == linear_gap || overlaps_.is_bad(side.gap_now)) continue;
     if (step_.is_member(contacts.first[c])) continue;
     if (side.wall == 0 && step_.is_member(contacts.second[c])) continue;
     const LawContact *const law = step_.law_contact(side);
@@ -142,10 +131,11 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     // A held contact is closed no faster than its gap asks for.
     const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
     const bool may_stay = holds || contacts.impulse[c] == 0.0;
-    if (at_end >= -tolerance && (at_end <= tolerance || may_stay)) continue;
+    if (at_end >= -allowed && (at_end <= allowed || may_stay)) continue;
+    allowed = LEFT * tolerance;
     if (contacts.impulse[c] > 0.0) contacts.least[c] = 0.0;
-    contacts.gap[c] = linear_gap;
-    contacts.compliance[c] = side.compliance = 0.0;
+    const bool first_time = side.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
+    contacts.gap[c] = first_time ? lessened : linear_gap;
     side.as_at_start = false;
     ++changed;
   }
@@ -169,7 +159,8 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
       // What approaches across a gap needs no pull, and no push before it touches.
       contacts.least[c] = 0.0;
     } else {
-      gap = std::min(gap, most_closed(step_.law_contact(side)->predicted_speed) - side.wall_motion);
+      gap = std::min(
+          gap, most_closed(side, step_.law_contact(side)->predicted_speed) - side.wall_motion);
       if (gap <= contacts.gap[c]) return 0;
     }
   }
@@ -191,38 +182,22 @@ double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) 
   return side.gap_now - side.wall_motion + step_.problem.timestep * opening;
 }
 
-void GapRules::make_overloaded_rigid(const std::vector<double> &velocity)
-{
-  constexpr double MOST_GROWTH = 2.0;    // of a spring's force in a step
-  inelastic::ContactSet &contacts = step_.problem.contacts;
-  for (std::size_t c = 0; c < contacts.size(); ++c) {
-    Side &side = step_.sides[c];
-    if (contacts.compliance[c] == 0.0) continue;
-    const double before = step_.impulse_per_force * side.force;
-    const bool carries_more = contacts.impulse[c] > MOST_GROWTH * before;
-    if (!carries_more &&
-        std::abs(gap_at_end(c, velocity)) <= ELASTIC_RANGE * step_.settings.tolerance)
-      continue;
-    contacts.compliance[c] = side.compliance = 0.0;
-    contacts.gap[c] = asked_gap(side);
-  }
-}
-
 long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
   Side &side = step_.sides[c];
   const double linear_gap = effective_gap(side) - side.wall_motion;
-  const double gap = std::min(exact_gap, linear_gap);
+  double gap = std::min(exact_gap, linear_gap);
+  // What may keep its overlap, and with the residual still gets too deep, is to give it back.
+  if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(side.gap_now))
+    gap = std::min(gap, side.gap_now - side.wall_motion);
   if (!too_deep) {
-    const double asked = contacts.gap[c] + contacts.compliance[c] * contacts.impulse[c];
     const bool worth_it = contacts.impulse[c] > 0.0 &&
-        gap - asked > RELINEARISE_BEYOND * step_.settings.tolerance &&
+        gap - contacts.gap[c] > RELINEARISE_BEYOND * step_.settings.tolerance &&
         step_.relinearisations <= MAX_RELINEARISATIONS / 2;
     if (!worth_it) return 0;
   }
   contacts.gap[c] = gap;
-  contacts.compliance[c] = side.compliance = 0.0;
   side.as_at_start = false;
   side.followed = step_.is_member(contacts.first[c]) ||
       (side.wall == 0 && step_.is_member(contacts.second[c]));

@@ -22,18 +22,14 @@ class GapRules {
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Side &side) const;
 
-  // Takes what is known of a contact of particles i and j, and makes it a spring if it is at rest, of the
-  // compliance A_cc min(0.03, 30 accuracy, 0.3 tolerance / change of the last step). A_cc is the length by
-  // which a unit impulse along the unit normal opens the gap [time / mass]. A bed of rigid contacts is held by
-  // just as many as it needs: none can take over from another, a small error of any force lets some of them open, and
-  // the bed hums. A spring changes its force by little where its gap changes by little. Its gap is zero
-  // at the preload, the force when the contact came to rest, which slides where the force has changed
-  // so much that the gap would leave the elastic range.
-  void rest(Side &side, const ContactMemory::Contact &known, int i, int j,
-            const double *normal) const;
+  // Takes the force [force] that the last step left between particles i and j, and finds what the contact has to
+  // stop in this step: the length by which the two approach one another without contacts, or a tenth of that by
+  // which the force opens the gap, whichever is more. What a position error gives back in a step is at most the
+  // accuracy's part of it, so that it is no more than the errors of velocities.
+  void begin(Side &side, double force, int i, int j, const double *normal) const;
 
-  // The gap [length] of the constraint, the wall's motion and the preload in it (contact_set.h).
-  double asked_gap(const Side &side) const;
+  // The gap [length] of the constraint, the wall's motion in it (contact_set.h).
+  double asked_gap(const Side &side) const { return effective_gap(side) - side.wall_motion; }
 
   // The gap [length] at the end of the step for which the constraint is just met: negative where an overlap
   // need not be given back in one step, of which at most half a tolerance may be left.
@@ -58,24 +54,19 @@ class GapRules {
   // many constraints changed.
   long hold(std::size_t c, double gap_at_end, double opening, double along);
 
-  // Lets constraints of free spheres that these velocities leave beyond the tolerance ask for their
-  // present gap, as rigid contacts: what they asked for at the start went by what velocities of the last
-  // step were resolved to, and those of this step may be known less well. Returns how many.
+  // Changes constraints of free spheres that these velocities leave beyond the tolerance, since gaps that count
+  // as closed may be open or overlap: they ask for their present gap, in the case of an overlap first for as much
+  // as leaves most of the tolerance. Returns how many.
   long keep_within_tolerance(const std::vector<double> &velocity);
-
-  // Makes all springs rigid, those of bodies, too, whose force has grown to more than twice that of the last
-  // step, or whose gap would leave the elastic range. To be called on all ranks where a constraint of any
-  // rank was not kept within the tolerance: in an impact on a bed, and where it is shaken, springs would give
-  // way one after the other.
-  void make_overloaded_rigid(const std::vector<double> &velocity);
 
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
   double contact_gap(const Side &side) const;
+  double given_back(const Side &side) const;
   double gap_by_law(const Side &side, const LawContact &contact) const;
-  double held_gap(double gap, double predicted_speed) const;
-  double most_closed(double predicted_speed) const;
+  double held_gap(const Side &side, double predicted_speed) const;
+  double most_closed(const Side &side, double predicted_speed) const;
   // [length] of constraint c with these velocities, along a straight line.
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 

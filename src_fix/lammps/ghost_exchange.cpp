@@ -57,6 +57,12 @@ void GhostExchange::sum_over_ghosts(double *per_particle)
   exchange(Exchange::VECTORS, true, true);
 }
 
+void GhostExchange::least_over_ghosts(double *per_particle)
+{
+  exchanged_ = per_particle;
+  exchange(Exchange::LEAST, true, true);
+}
+
 void GhostExchange::share_with_ghosts(double *per_particle)
 {
   exchanged_ = per_particle;
@@ -91,8 +97,6 @@ void GhostExchange::gather(ContactMemory &memory)
 void GhostExchange::gather(LawMemory &memory)
 {
   if (!has_ghosts()) return;
-  static_assert(LawMemory::packed_size(LawMemory::ENTRIES_PER_MESSAGE) <= REVERSE_SIZE,
-                "LAMMPS sizes its buffers by REVERSE_SIZE");
   exchanged_law_memory_ = &memory;
   while (true) {
     double unsent =
@@ -157,6 +161,7 @@ int GhostExchange::pack_reverse(int n, int first, double *buffer)
     case Exchange::CHOSEN_SINGLE:
       return chosen_ghosts_.pack_ghosts(first, exchanged_single_, buffer);
     case Exchange::VECTORS:
+    case Exchange::LEAST:
       break;
   }
   std::copy_n(exchanged_ + 3 * first, 3 * n, buffer);
@@ -181,6 +186,11 @@ void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
       return;
     case Exchange::CHOSEN_SINGLE:
       chosen_ghosts_.add_to_owned(list, buffer, exchanged_single_);
+      return;
+    case Exchange::LEAST:
+      for (int k = 0; k < n; ++k)
+        for (int d = 0; d < 3; ++d)
+          exchanged_[3 * list[k] + d] = std::min(exchanged_[3 * list[k] + d], buffer[3 * k + d]);
       return;
     case Exchange::VECTORS:
       break;
@@ -245,5 +255,18 @@ std::vector<double> GhostExchange::gather(std::vector<double> mine) const
   std::vector<double> all(comm->me == 0 ? offsets.back() + counts.back() : 0);
   MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(), MPI_DOUBLE,
               0, world);
+  return all;
+}
+
+std::vector<double> GhostExchange::gather_on_all(const std::vector<double> &mine) const
+{
+  int count = static_cast<int>(mine.size());
+  std::vector<int> counts(comm->nprocs), offsets(comm->nprocs, 0);
+  MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+  for (int rank = 1; rank < comm->nprocs; ++rank)
+    offsets[rank] = offsets[rank - 1] + counts[rank - 1];
+  std::vector<double> all(offsets.back() + counts.back());
+  MPI_Allgatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(),
+                 MPI_DOUBLE, world);
   return all;
 }

@@ -12,6 +12,7 @@
 
 #include "pointers.h"
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,9 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
 
   // The largest messages, in numbers per atom: LAMMPS sizes its buffers by these.
   static constexpr int FORWARD_SIZE = 3;
-  static constexpr int REVERSE_SIZE = ContactMemory::packed_size(ContactMemory::SHARED_PARTNERS);
+  static constexpr int REVERSE_SIZE =
+      std::max(ContactMemory::packed_size(ContactMemory::SHARED_PARTNERS),
+               LawMemory::packed_size(LawMemory::ENTRIES_PER_MESSAGE));
 
   void sum_over_ghosts(double *per_particle) override;
   void choose_ghosts(const std::vector<char> &chosen) override;
@@ -39,6 +42,9 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   void share_with_ghosts(double *per_particle) override;
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override;
   bool has_ghosts() const override;
+
+  // Gives an owned atom and all its ghosts the least of their values, 3 numbers per particle. Collective.
+  void least_over_ghosts(double *per_particle);
 
   // Adds to each owned atom the contacts that its ghosts remember.
   void gather(ContactMemory &memory);
@@ -61,10 +67,12 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
 
   // Collective: the values of all ranks one after the other, on rank 0; nothing on other ranks.
   std::vector<double> gather(std::vector<double> mine) const;
+  // The same on every rank.
+  std::vector<double> gather_on_all(const std::vector<double> &mine) const;
 
  private:
   // The pack and unpack functions work on one of these.
-  enum class Exchange { VECTORS, MEMORY, LAW_MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
+  enum class Exchange { VECTORS, LEAST, MEMORY, LAW_MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
 
   void exchange(Exchange what, bool reverse, bool forward);
 
@@ -73,7 +81,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
   Exchange exchanging_ = Exchange::VECTORS;
-  double *exchanged_ = nullptr;          // VECTORS: 3 numbers per particle; CHOSEN: 4
+  double *exchanged_ = nullptr;          // VECTORS, LEAST: 3 numbers per particle; CHOSEN: 4
   float *exchanged_single_ = nullptr;    // 4 numbers per particle
   ContactMemory *exchanged_memory_ = nullptr;
   LawMemory *exchanged_law_memory_ = nullptr;

@@ -119,10 +119,6 @@ ProblemRecord::Table ProblemRecord::contacts() const
        [&set](int c, double *out) {
          *out = set.gap[c];
        }},
-      {"compliance", 1, Column::REAL,
-       [&set](int c, double *out) {
-         *out = set.compliance[c];
-       }},
       {"gap_now", 1, Column::REAL,
        [&sides](int c, double *out) {
          *out = sides[c].gap_now;
@@ -137,7 +133,7 @@ ProblemRecord::Table ProblemRecord::contacts() const
        }},
       {"impulse_guess", 1, Column::REAL,
        [this, &set, partner](int c, double *out) {
-         *out = step_.impulse_per_force * memory_.find(set.first[c], partner(c)).force;
+         *out = step_.impulse_per_force * memory_.find(set.first[c], partner(c));
        }},
   };
 }

@@ -34,9 +34,9 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   if (bodies_) constraints_.entangled().find();
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     const Side &side = step_.sides[c];
-    if (side.gap_now < 0.0 || problem.contacts.compliance[c] > 0.0)
-      problem.contacts.gap[c] = constraints_.rules().effective_gap(side) - side.wall_motion;
-    problem.contacts.compliance[c] = 0.0;
+    // A gap that counts as closed is one here.
+    if (side.gap_now <= step_.settings.tolerance)
+      problem.contacts.gap[c] = constraints_.rules().asked_gap(side);
     problem.contacts.impulse[c] = 0.0;
   }
   if (bodies_) constraints_.entangled().disentangle(atom, constraints_.overlaps());

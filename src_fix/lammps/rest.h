@@ -1,51 +1,96 @@
-// This room tells when the whole scene is at rest. Contacts then take away all that forces give to any
-// particle but for what velocities are resolved to, and that is taken away as well: nothing moves, and the
-// contact forces of one step solve the next one without an iteration, until something changes.
+// This room tells which particles are at rest: those that their own contacts hold, in a cluster (clusters.h) whose
+// motion is nothing but errors of the solver. Their velocities are taken away, the contact forces of one step
+// solve the next one without an iteration, and this lasts until something changes.
+//
+// A velocity of particle i [length / time] is small if it is small beside
+//
+//   u_i = min(what contacts change of its velocity, the mean speed that the particles of the cluster would have
+//         without contacts)
+//
+// The particle is held if contacts resist its motion: if the sum of lambda (n . v)^2 over its contacts is at least
+// a tenth of u_i m v^2. Others, which slide, roll or fly, keep their velocities. A cluster is quiet if it is
+// supported by something that does not move, its held particles move little, and contacts with walls and frozen
+// particles resist its motion as a whole: its velocity and angular velocity, as if it were one rigid body.
+//
+// After some quiet steps the held particles are stopped, and some steps are solved more accurately. If nothing held
+// then moves, the forces balance and the cluster is at rest; if not it goes on, and is looked at again later. A
+// cluster at rest in which something would move is solved more accurately, too, before it is let go.
 
 #ifndef INELASTIC_REST_H
 #define INELASTIC_REST_H
 
+#include "clusters.h"
 #include "projection.h"
 #include "step.h"
 
 #include "pointers.h"
 
+#include <array>
+#include <vector>
+
 namespace LAMMPS_NS {
 
+class AtomState;
 class GhostExchange;
 
 class Rest : protected Pointers {
  public:
-  Rest(class LAMMPS *lmp, Step &step, GhostExchange &ranks);
+  Rest(class LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state);
 
-  // The accuracy with which the next step is to be solved: the setting, or a finer one while it is being
-  // found out whether what is left of the motion are errors of the solver.
-  double accuracy() const { return part_of_accuracy_ * step_.settings.accuracy; }
+  // Looks at a step that is solved. Returns whether it is to be solved once more, with refined contacts, which are
+  // marked in the problem; it is then looked at again. Collective.
+  bool look(const inelastic::ProjectionResult &result);
+  void look_again();
 
-  // Judges a step that is solved, and notes in it whether the scene is at rest. Collective.
-  void judge(const inelastic::ProjectionResult &result);
+  // Decides after that which particles are stopped in the step, one mark per particle. Returns whether any is, on
+  // any rank, and notes in the step whether the whole scene is at rest. Collective.
+  bool decide(std::vector<char> &stopped);
 
  private:
-  // What is left of the motion, on all ranks.
+  // Of a particle, or of the body that it belongs to.
   struct Motion {
-    // The largest velocity of a particle, as a part of the mean that particles would have without
-    // contacts, or of what contacts have taken away from it, whichever is more.
-    double fastest = 0.0;
-    bool supported = false;    // some contact is with a wall or a frozen particle
-    bool driven = false;       // some wall or frozen particle moves
+    double speed = 0.0;       // [length / time] root mean square by mass
+    double taken = 0.0;       // [length / time] what contacts change of its velocity
+    double resisted = 0.0;    // [length / time] sum of lambda (n . v)^2 / (m v^2)
+  };
+  // Of a cluster, from all ranks.
+  struct ClusterMotion {
+    double mass = 0.0;
+    double without_contacts = 0.0;                  // [length / time] the mean speed
+    std::array<double, 3> centre = {};              // [length]
+    std::array<double, 3> velocity = {};            // of the centre of mass
+    std::array<double, 3> angular_velocity = {};    // of the motion as a rigid body
+    double speed = 0.0;    // [length / time] of that motion, root mean square by mass
+    double quiet_steps = 0.0;
+    bool supported = false, driven = false;
+    // What needs the above:
+    double resisted = 0.0;      // [length / time] of the motion as a rigid body, as in Motion
+    double held_speed = 0.0;    // [length / time] root mean square of the held particles
+    bool held_moves = false;
   };
 
-  Motion measure() const;
-  bool find_out(const Motion &motion);
-  void wake();
+  void measure_resistance();
+  Motion motion_of(int i) const;
+  bool is_held(int i, const Motion &motion) const;
+  double unit(int i, const Motion &motion) const;
+  void measure_clusters();
+  void measure_clusters_by_motion();
+  bool is_quiet(const ClusterMotion &cluster) const;
+  bool moves(const ClusterMotion &cluster) const;
+  bool needs_refinement(const ClusterMotion &cluster) const;
+  void forget();
+  double limit() const;
+  bool counts(int i) const;
+  const double *velocity(int i) const { return &step_.velocity[3 * static_cast<std::size_t>(i)]; }
 
   Step &step_;
   GhostExchange &ranks_;
-  bool at_rest_ = false;
-  long quiet_steps_ = 0;    // in a row
-  long patience_;           // quiet steps before it is found out whether the scene is at rest
-  long finer_steps_ = 0;    // in which this is being found out
-  double part_of_accuracy_ = 1.0;
+  AtomState &state_;
+  Clusters clusters_;
+  std::vector<double>
+      resistance_;    // 3 per particle, of which the first is the sum of lambda (n . v)^2
+  std::vector<ClusterMotion> motions_;
+  bool looks_ = false;    // in this step
 };
 
 }    // namespace LAMMPS_NS

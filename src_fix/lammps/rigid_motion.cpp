@@ -236,13 +236,13 @@ void RigidMotion::note_push(const inelastic::ContactProblem &problem,
         difference(problem.bodies, b, velocity.data(), problem.predicted_velocity.data());
 }
 
-void RigidMotion::stop(const inelastic::ContactProblem &problem,
-                       const std::vector<double> &velocity)
+void RigidMotion::note_stop(const inelastic::ContactProblem &problem,
+                            const std::vector<double> &by_contacts,
+                            const std::vector<double> &wanted)
 {
   stopping_ = true;
-  const std::vector<double> nothing(velocity.size(), 0.0);
   for (std::size_t b = 0; b < bodies_.size(); ++b)
-    bodies_[b].stop = difference(problem.bodies, b, nothing.data(), velocity.data());
+    bodies_[b].stop = difference(problem.bodies, b, wanted.data(), by_contacts.data());
 }
 
 void RigidMotion::apply(const double *contact_force)

@@ -70,8 +70,9 @@ class RigidMotion final : public Mover, protected Pointers {
   // momentum.
   void note_push(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
 
-  // Takes the velocities that contacts have left to the members away, all of them.
-  void stop(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
+  // The members are to have other velocities than contact forces give them (hold_still.h).
+  void note_stop(const inelastic::ContactProblem &problem, const std::vector<double> &by_contacts,
+                 const std::vector<double> &wanted);
 
  private:
   struct Body {
@@ -82,7 +83,7 @@ class RigidMotion final : public Mover, protected Pointers {
     double angular_momentum_end[3];
     double angular_velocity_end[3];    // as LAMMPS has it after the step
     Push push;
-    Push stop;    // beyond what contacts do; see stop()
+    Push stop;    // beyond what contacts do; see note_stop()
   };
 
   void gather_momenta(double kick);

@@ -38,16 +38,12 @@ constexpr double EXTREME = 1.0e300;
 
 // The row beside each constraint of the problem.
 struct Side {
-  int wall;                  // the wall's number; 0 = the second side is a particle
-  double gap_now;            // [length] at the present positions
-  double size;               // [length] the sum of the two radii; the radius at a wall
-  double wall_motion;        // [length] by how much the wall closes the gap during the step
-  double force = 0.0;        // [force] that the last step left
-  double sustained = 0.0;    // [force] see contact_memory.h
-  // Of a contact at rest, which is a spring (gap_rules.h):
-  double compliance = 0.0;    // [time / mass] 0 = rigid
-  // [force] at which its gap is zero; negative: it overlaps without a force
-  double preload = 0.0;
+  int wall;                   // the wall's number; 0 = the second side is a particle
+  double gap_now;             // [length] at the present positions
+  double size;                // [length] the sum of the two radii; the radius at a wall
+  double wall_motion;         // [length] by how much the wall closes the gap during the step
+  double force = 0.0;         // [force] that the last step left
+  double to_stop = 0.0;       // [length] what the contact has to stop (gap_rules.h)
   bool as_at_start = true;    // the constraint asks for what it asked for at the start of the step
   bool followed = false;      // the gap was set by where an earlier solution of the step ends
   int law_contact = -1;       // in Step::law_contacts; -1: there is no law
@@ -88,13 +84,6 @@ struct Step {
   std::vector<double> velocity;    // 3 per particle, the projection
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
-
-  // [length / time] To this the velocities of the last step are resolved: its target (core/solver.h) over
-  // its length. Before the first step, at which nothing is known, overlaps give nothing back.
-  double resolution = 0.0;
-
-  // [length] What contacts changed in the last step (core/solver.h).
-  double change = 0.0;
 
   // This is known after constraints were collected.
   Phase phase = Phase::CONTACT;

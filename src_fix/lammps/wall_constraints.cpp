@@ -176,10 +176,9 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
   if (laws_.has_law())
     laws_.ask(side, i, problem.particles, -view.wall, view.normal,
               rules_.overlaps().is_bad(gap_now));
-  rules_.rest(side, memory_.find(i, -view.wall), i, problem.particles, view.normal);
+  rules_.begin(side, memory_.find(i, -view.wall), i, problem.particles, view.normal);
   problem.contacts.add(i, problem.particles, view.normal, rules_.asked_gap(side),
-                       step_.impulse_per_force * side.force, side.compliance,
-                       step_.least_impulse(side));
+                       step_.impulse_per_force * side.force, 0.0, step_.least_impulse(side));
   step_.sides.push_back(side);
 }
 
@@ -232,6 +231,7 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   side.followed = step_.is_member(i);
   if (known) side.gap_now = step_.sides[existing->second].gap_now;
   if (known) side.force = step_.sides[existing->second].force;
+  if (known) side.to_stop = step_.sides[existing->second].to_stop;
   if (known) side.law_contact = step_.sides[existing->second].law_contact;
   rules_.overlaps().note(side.gap_now, i, -view.wall);
   // This makes it exact for this motion, also where a body turns.

@@ -90,10 +90,10 @@ def project(
 ) -> Projection:
     """Project ``predicted_velocity`` (n, 3) onto the velocities that keep every contact apart.
 
-    The solver stops when both residuals, or with "uzawa" the feasibility alone, are within
-    ``tolerance`` [length] and within what the ``accuracy`` A, at least 0 and below 1, asks for: A
-    max(m/10, r), with m and r as on the page of fix inelastic (what each tolerance bounds), but not
-    less than round-off; 0 asks for nothing.
+    The solver stops when the residual of every contact, or with "uzawa" what is lacking of its gap,
+    is within ``tolerance`` [length] and within what the ``accuracy`` A, at least 0 and below 1,
+    asks for: the contact's own target, as on the page of fix inelastic (what each tolerance
+    bounds), but not less than round-off; 0 asks for nothing.
     It gives up after ``max_iterations``, or earlier if the tolerance is out of reach; ``converged``
     is then False. ``impulse`` (m,) is a first guess for "apgd". ``compliance`` (m,) [time / mass],
     not negative, makes contacts springs; without it all are rigid. ``least_impulse`` (m,)

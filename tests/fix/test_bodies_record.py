@@ -83,15 +83,12 @@ def followed_gaps(record: Record) -> dict[tuple[int, int], float]:
 
     The gap of two spheres of turning bodies is not that of straight motion: where a step would end
     in an overlap, the fix sets the constraint's gap to what makes it exact for the step's end. What
-    differs by less than two tolerances is taken from the positions: that are the gap rules, and
-    contacts at rest, which are springs (with its impulse, which adds to the gap, a spring is like a
-    rigid contact).
+    differs by less than two tolerances is taken from the positions: that are the gap rules.
     """
-    springs = record["compliance"] * record["impulse"]
     return {
         (min(first, second), max(first, second)): float(gap)
         for first, second, gap, now in zip(
-            record["id1"], record["id2"], record["gap"] + springs, record["gap_now"], strict=True
+            record["id1"], record["id2"], record["gap"], record["gap_now"], strict=True
         )
         if abs(gap - now) > 2 * record["tolerance"]
     }

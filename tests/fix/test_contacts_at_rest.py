@@ -1,6 +1,6 @@
-"""Contacts at rest are springs: how far they give way, what they give back, and quiet beds.
+"""Columns at rest stay where they are and give nothing back, and beds are quiet.
 
-See "Contacts at rest" in src_fix/doc/fix_inelastic.md.
+See "What each tolerance bounds" and "What is at rest" in src_fix/doc/fix_inelastic.md.
 """
 
 from __future__ import annotations
@@ -28,11 +28,8 @@ STEP = 0.0025
 EPS = 1e-3 * 2 * RADIUS
 WEIGHT = float(mass(RADIUS)) * GRAVITY
 COLUMN = [[0.5, RADIUS * (1 + 2 * k), 0.5] for k in range(8)]
-# Steps after which every contact of a column is a spring.
+# Steps after which a column is at rest.
 RESTED = 60
-# In g h: C / A_cc of the page times the sum of lambda_c A_cc / h over the springs of the column.
-# Each spring opens its own gap by no more than C lambda.
-GIVEN_BACK = 0.03 * (len(COLUMN) + 2 * sum(range(1, len(COLUMN))))
 
 
 def column(folder: Path, **settings: object) -> str:
@@ -47,20 +44,18 @@ def test_a_column_stays_where_it_is(tmp_path: Path, lmp: Runner) -> None:
     start, end = frames[RESTED].positions, frames[-1].positions
     with np.load(tmp_path / "step400.npz") as file:
         record = dict(file)
-    # Eight contacts in a row, each of which may give way by half of a tolerance.
-    assert np.abs(end - start).max() <= 0.5 * EPS * len(COLUMN)
-    # A tenth of the accuracy of the mean contact, which carries eight weights and has two masses in
-    # A_cc at seven of eight places, is 0.8e-3 g h; springs let it add up a few times.
-    assert np.abs(frames[-1].velocities).max() <= 5e-3 * GRAVITY * STEP
-    assert (record["compliance"] > 0).all()
+    # At rest nothing moves, to round-off.
+    assert np.abs(end - start).max() <= 1e-15
+    assert np.abs(frames[-1].velocities).max() <= 1e-12 * GRAVITY * STEP
     assert np.abs(record["gap_now"]).max() <= 0.5 * EPS
     # Each contact carries what is above it, to the accuracy of the mean contact.
     above = np.sort(record["impulse"])[::-1] / (WEIGHT * STEP)
-    assert above == pytest.approx(np.arange(len(COLUMN), 0, -1), abs=1e-3 * len(COLUMN))
+    exact = np.arange(len(COLUMN), 0, -1)
+    assert above == pytest.approx(exact, abs=1e-3 * exact.mean())
 
 
 def test_an_impact_elsewhere_is_not_felt(tmp_path: Path, lmp: Runner) -> None:
-    """The compliance depends on what contacts of the whole scene change in the step before."""
+    """What is at rest has no velocity, whatever happens beside it."""
     points = [*COLUMN, [0.8, RADIUS + 0.4, 0.8]]
     velocities = np.zeros((len(points), 3))
     velocities[-1, 1] = -0.5
@@ -73,17 +68,18 @@ def test_an_impact_elsewhere_is_not_felt(tmp_path: Path, lmp: Runner) -> None:
     assert fastest > 2.0
     assert np.linalg.norm(frames[-1].velocities[-1]) < 0.01  # it has met the floor
     speeds = [np.abs(frame.velocities[:-1]).max() for frame in frames[RESTED:]]
-    # Velocities of a step are resolved to a part of what contacts change in it.
-    assert max(speeds) <= 1e-3 * fastest
+    # Round-off of a velocity that gravity gives and the column takes away.
+    assert max(speeds) <= 1e-12 * GRAVITY * STEP
 
 
-def test_what_a_column_gives_back(tmp_path: Path, lmp: Runner) -> None:
+def test_a_column_gives_nothing_back(tmp_path: Path, lmp: Runner) -> None:
     """Its weight goes from one step to the next."""
     lmp(column(tmp_path) + DUMP_PARTICLES + "run 200\nunfix gravity\nrun 200\n")
     frames = read_dump(tmp_path / "particles.dump")
     fastest = max(np.abs(frame.velocities).max() for frame in frames[201:])
     print(f"its spheres leave at up to {fastest / (GRAVITY * STEP):.2f} g h")
-    assert fastest <= GIVEN_BACK * GRAVITY * STEP
+    # Round-off of the velocities that its weight gave in a step.
+    assert fastest <= 1e-12 * GRAVITY * STEP
 
 
 @pytest.mark.parametrize(("above", "velocity"), [(0.02, 1.0), (0.05, 1.0), (0.8, -2.5)])
@@ -114,9 +110,8 @@ def test_what_a_column_gives_back_of_an_impact(
         upward = np.array([frame.velocities[:, 1] for frame in frames[hit:]])
         rebounds.append(float(upward.max()))
         opening = np.diff(upward, axis=1, prepend=0.0).max()
-        # Each contact leaves 1e-3 of the approach; the springs' load may go within a step.
-        load = GIVEN_BACK * GRAVITY * STEP / shorter
-        assert opening <= 1e-3 * fastest + load
+        # Each contact leaves 1e-3 of the approach.
+        assert opening <= 1e-3 * fastest
         for frame in frames:
             depth = deepest_pair(frame.positions, frame["radius"])
             assert depth <= EPS * (1 + 1e-9)  # round-off
@@ -142,15 +137,16 @@ def test_a_bed_is_quiet_and_cheap(ranks: int, tmp_path: Path, lmp: Runner) -> No
     )
     deck = deck.replace("thermo 1\n", "thermo 50\n")
     result = lmp(deck + "run 5000\n" + DUMP_PARTICLES + "thermo 1\nrun 200\n", ranks=ranks)
-    # That a run begins, with half a kick, disturbs nothing: the energy is that of
-    # its own scatter.
-    assert result.runs[-1]["KinEng"].max() <= 5 * result.runs[-2]["KinEng"][-20:].mean()
+    # That a run begins, with half a kick, disturbs nothing: the energy is that of its own scatter,
+    # and of a sphere that moves no faster than what may be at rest.
+    slow = 0.5 * float(mass(RADIUS)) * (5e-3 * GRAVITY * STEP) ** 2
+    assert result.runs[-1]["KinEng"].max() <= 5 * result.runs[-2]["KinEng"][-20:].mean() + slow
     mean = np.sqrt(2 * result.runs[-1]["KinEng"].mean() / (300 * float(mass(RADIUS))))
     # The bound of the validation of beds at rest
     assert mean <= 0.02 * GRAVITY * STEP
     counts = re.findall(r"Fix inelastic: (\d+) projections, (\d+) iterations", result.screen)
     projections, iterations = map(int, counts[-1])
-    # 13 were measured with 1,000 spheres; a bed of rigid contacts takes 60 and more.
+    # A bed at rest takes none; one that is not found at rest some hundred.
     assert iterations <= 30 * projections
     frames = read_dump(tmp_path / "particles.dump")
     for frame in frames:

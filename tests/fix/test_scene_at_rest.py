@@ -1,6 +1,6 @@
 """A scene at rest does not move and costs no iteration; what disturbs it moves it at once.
 
-See "A scene at rest" in src_fix/doc/fix_inelastic.md.
+See "What is at rest" in src_fix/doc/fix_inelastic.md.
 """
 
 from __future__ import annotations
@@ -53,32 +53,40 @@ def one_on_the_floor(folder: Path, **settings: object) -> str:
 
 
 def until_rest(result: Run, run: int = 0) -> int:
-    """The first step at rest of one of the runs; the scene stays there until that run ends."""
-    at_rest = result.runs[run]["f_contact[13]"]
-    first = int(np.argmax(at_rest))
-    assert at_rest[first:].all()
-    assert at_rest.any()
+    """The step from which on the scene is at rest in one of the runs, until that run ends.
+
+    A bed that is at rest may give way again, where a sphere that nothing holds rolls on.
+    """
+    moves = np.flatnonzero(result.runs[run]["f_contact[13]"] == 0)
+    first = int(moves[-1]) + 1 if moves.size else 0
+    assert first < len(result.runs[run]["f_contact[13]"])
     return first
+
+
+def drift(steps: int) -> float:
+    """How far what nothing holds may go in a scene at rest [length]."""
+    return UNNOTICED * GRAVITY * STEP**2 * steps
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_bed_at_rest_costs_nothing(ranks: int, tmp_path: Path, lmp: Runner) -> None:
     result = lmp(
         bed(tmp_path) + DUMP_PARTICLES + "variable floor equal f_contact[3][2]\n"
-        "thermo_style custom step ke f_contact[1] f_contact[13] v_floor\nrun 4000\n",
+        "thermo_style custom step ke f_contact[1] f_contact[13] v_floor\nrun 6000\n",
         ranks=ranks,
     )
     first = until_rest(result)
     print(f"at rest after {first} steps")
-    assert first < 3500
-    # Contacts adapt to the rest for some steps.
-    assert result.thermo["f_contact[1]"][first + 200 :].sum() == 0
+    # Single spheres that roll on may end a rest, and begin another one.
+    assert first < 5500
+    # What rolls on beside it costs single iterations.
+    assert result.thermo["f_contact[1]"][first + 200 :].mean() <= 0.1
     frames = read_dump(tmp_path / "particles.dump")
-    # Round-off: positions do not change, velocities are that of what forces add in a step.
     still = frames[first + 1].positions
-    assert max(np.abs(frame.positions - still).max() for frame in frames[first + 1 :]) <= 1e-13
-    fastest = max(np.abs(frame.velocities).max() for frame in frames[first + 2 :])
-    assert fastest <= 1e-12 * GRAVITY * STEP
+    moved = np.max([np.abs(frame.positions - still) for frame in frames[first + 1 :]], axis=(0, 2))
+    # Round-off: but for the few that nothing holds positions do not change.
+    assert np.count_nonzero(moved > 1e-13) <= 5
+    assert moved.max() <= drift(len(frames) - first)
     # What is not noticed of each sphere's weight.
     weight = 100 * float(mass(RADIUS)) * GRAVITY
     floor = -result.thermo["v_floor"][first + 1 :]
@@ -108,12 +116,10 @@ def test_a_bed_of_dimers(inertia: str, ranks: int, tmp_path: Path, lmp: Runner) 
     assert result.thermo["f_contact[1]"][first + 200 :].sum() == 0
     frames = read_dump(tmp_path / "particles.dump")
     still = frames[first + 1].positions
+    moved = np.max([np.abs(frame.positions - still) for frame in frames[first + 1 :]], axis=(0, 2))
     # Round-off of bodies, whose spheres are placed anew in every step.
-    assert max(np.abs(frame.positions - still).max() for frame in frames[first + 1 :]) <= 1e-11
-    assert (
-        max(np.abs(frame.velocities).max() for frame in frames[first + 2 :])
-        <= 1e-9 * GRAVITY * STEP
-    )
+    assert np.count_nonzero(moved > 1e-11) <= 5
+    assert moved.max() <= drift(len(frames) - first)
 
 
 def test_a_run_that_is_divided_stays_at_rest(tmp_path: Path, lmp: Runner) -> None:
@@ -126,21 +132,20 @@ def test_a_run_that_is_divided_stays_at_rest(tmp_path: Path, lmp: Runner) -> Non
 
 def test_a_restarted_run_comes_to_rest_again(tmp_path: Path, lmp: Runner) -> None:
     deck = bed(tmp_path)
-    before = lmp(deck + "run 4000\nwrite_restart bed.restart\n")
+    before = lmp(deck + "run 6000\nwrite_restart bed.restart\n")
     until_rest(before)
     head, tail = deck.split("read_data spheres.data")
     units = head[: head.index("units")] + "units lj\natom_modify map array\n"
-    after = lmp(units + "read_restart bed.restart" + tail + "run 1000\n")
+    after = lmp(units + "read_restart bed.restart" + tail + "run 6000\n")
     assert after.thermo["f_contact[13]"][-1] == 1
     assert after.thermo["f_contact[1]"][-1] == 0
 
 
 @pytest.mark.parametrize(
-    ("slope", "settings", "moves"),
-    [(0.02, "", True), (0.002, "", False), (0.002, " accuracy 1e-4", True)],
+    ("slope", "settings"), [(0.02, ""), (0.002, ""), (0.002, " accuracy 1e-4")]
 )
-def test_a_slope(slope: float, settings: str, moves: bool, tmp_path: Path, lmp: Runner) -> None:
-    """Gravity turns while a sphere rests: it slides as it would, or notices nothing."""
+def test_a_slope(slope: float, settings: str, tmp_path: Path, lmp: Runner) -> None:
+    """Gravity turns while a sphere rests: no contact holds it along the floor, and it slides."""
     deck = one_on_the_floor(tmp_path, options="region container" + settings)
     across = f"fix gravity all gravity {GRAVITY} vector {slope} -1 0\n"
     result = lmp(deck + "run 200\n" + across + DUMP_PARTICLES + "run 60\n")
@@ -148,8 +153,7 @@ def test_a_slope(slope: float, settings: str, moves: bool, tmp_path: Path, lmp: 
     speed = read_dump(tmp_path / "particles.dump")[-1].velocities[0, 0]
     down = GRAVITY * slope / np.hypot(1, slope)
     # All 60 kicks count; of the half kick at the start of a run half of a velocity is shown.
-    expected = 60 * STEP * down if moves else 0.0
-    assert speed == pytest.approx(expected, abs=1.01 * STEP * down if moves else 1e-12)
+    assert speed == pytest.approx(60 * STEP * down, abs=1.01 * STEP * down)
 
 
 def test_a_slope_from_the_start(tmp_path: Path, lmp: Runner) -> None:

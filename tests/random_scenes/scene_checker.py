@@ -666,11 +666,12 @@ class _Part:
             slack = 10 * ROUND_OFF * (scale + inertia + 1e-300)[:, None]
             held = (new.kind == FROZEN) | (new.kind == OUTSIDE)
             wanted = np.where(held[:, None], 0.0, listed["total"])
-            alike = np.ones(len(new.id), dtype=bool)
+            # Of what is at rest the velocity is taken away, which no contact force does.
+            alike = np.linalg.norm(after, axis=1) > 10 * ROUND_OFF * sizes
             if self.has_pushed and new.bodies is not None:
                 # What a push has left in bodies in a line is still being taken away.
                 for _, mine, arm in self.members(new):
-                    alike[mine] = not self.is_in_line(arm)
+                    alike[mine] &= not self.is_in_line(arm)
             self.close(
                 "force added to a sphere", added[alike], wanted[alike], slack[alike], new.id[alike]
             )

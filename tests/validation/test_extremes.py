@@ -95,17 +95,16 @@ def residuals(path: Path, box: object) -> tuple[float, float, float]:
     two = np.searchsorted(p["id"], p["id2"]).clip(max=len(x) - 1)
     relative = v[one] - np.where(p["id2"][:, None] > 0, v[two], 0.0)
     under_force = p["impulse"] > 0
-    # A contact at rest is a spring: its gap without impulses and what its impulse leaves of it.
-    asked = p["gap"] + p["compliance"] * p["impulse"]
+    asked = p["gap"]
     w = (asked + h * np.sum(p["normal"] * relative, axis=1))[under_force]
     energy = [0.5 * float(p["mass"] @ (u**2).sum(axis=1)) for u in (p["predicted_velocity"], v)]
-    # What constraints may give back: of rigid spheres the present overlap, of springs and of
-    # turning bodies, whose surfaces do not move along straight lines, what they ask for. Then what
-    # gap is left where a force acts.
-    rigid = p["compliance"] == 0
+    # What constraints may give back: of spheres the present overlap, of turning bodies, whose
+    # surfaces do not move along straight lines, what they ask for. Then what gap is left where a
+    # force acts.
+    straight = np.ones(p["impulse"].shape, dtype=bool)
     if "molecule" in p:
-        rigid &= (p["molecule"][one] == 0) & ((p["id2"] <= 0) | (p["molecule"][two] == 0))
-    given = np.where(rigid, p["wall_motion"] - p["gap_now"], -asked)
+        straight = (p["molecule"][one] == 0) & ((p["id2"] <= 0) | (p["molecule"][two] == 0))
+    given = np.where(straight, p["wall_motion"] - p["gap_now"], -asked)
     left = max([0.0, *w])
     explained = float(p["impulse"] @ (np.maximum(0.0, given) + left)) / h
     gained = (energy[1] - energy[0] - explained) / max(energy[0], 1e-300)

@@ -448,10 +448,11 @@ def test_recorded_states_show_the_accuracy(finished: tuple[list[str], Path]) -> 
             mine = [row for row in rows if chosen.items() <= row.items()]
             first, last = mine[0], mine[-1]
             assert int(last["iterations"]) > int(first["iterations"])
-            # Errors are in proportion to the residual, which falls by five decades, to 5e-7 r. The
-            # forces of the last step are within 1e-2 from the start at rest.
+            # Errors are in proportion to the residual, which falls by five decades, to 5e-7 r. From
+            # the start at rest the forces of the last step are within 3e-2; there 5e-7 r is 3e-5
+            # g h^2, of which a bed makes some fifty times as much.
             for name in ("velocity_error", "force_error"):
-                assert 0 <= float(last[name]) <= max(1e-2 * float(first[name]), 1e-3), chosen
+                assert 0 <= float(last[name]) <= max(1e-2 * float(first[name]), 1.5e-3), chosen
             assert float(last["missed"]) + float(last["false"]) <= 0.01
     assert "| apgd from the last forces | 0.0005 |" in (out / "tradeoff.md").read_text()
 
@@ -466,7 +467,7 @@ def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str],
         given = Problem(
             velocity, inverse_mass, first, second, normal, gap, problem.timestep, no_bodies(number)
         )
-        reference_velocity, impulse = reference(given, problem.arrays["compliance"], 1e-12)
+        reference_velocity, impulse = reference(given, None, 1e-12)
         exact = core.project(
             *problem.spheres,
             timestep=problem.timestep,

@@ -1,0 +1,125 @@
+#include "contact_targets.h"
+
+#include "solver.h"
+#include "vector3.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace inelastic {
+
+namespace {
+
+  // In a bed of many contacts residuals make velocities of some ten times their size, in a chain of n up to n times
+  // (which accelerated_gradient.h looks at).
+  constexpr double IN_NETWORKS = 0.25;
+  // Of what a contact carries, where that changes no velocity.
+  constexpr double PART_OF_LOAD = 0.001;
+  // Gaps are known to a few units of round-off of what they are added up from.
+  constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();
+
+  // The particle that stands for all those that move together with this one.
+  int mover(const ContactProblem &problem, int i)
+  {
+    const RigidBodies &bodies = problem.bodies;
+    return bodies.empty() || i == problem.particles || bodies.body[i] < 0
+        ? i
+        : bodies.member[bodies.start[bodies.body[i]]];
+  }
+
+}    // namespace
+
+void ContactTargets::begin(const ContactProblem &problem, const SolverLimits &limits,
+                           const GapOperator &gap_operator, const std::vector<double> &gap,
+                           const std::vector<double> &diagonal)
+{
+  const ContactSet &contacts = problem.contacts;
+  diagonal_ = diagonal;
+  change_by_guess_ = gap_operator.change();
+  of_guess_.resize(contacts.size());
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    of_guess_[c] = std::max(residual_of_one(gap[c], contacts.impulse[c], contacts.least[c]),
+                            PART_OF_LOAD * std::abs(contacts.impulse[c]) * diagonal[c]);
+  set_least(problem, limits, gap_operator);
+}
+
+void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits &limits,
+                               const GapOperator &gap_operator)
+{
+  const ContactSet &contacts = problem.contacts;
+  const std::size_t count = contacts.size();
+  least_.resize(count);
+  part_.resize(count);
+  if (limits.accuracy == 0.0) {
+    std::fill(least_.begin(), least_.end(), limits.tolerance);
+    std::fill(part_.begin(), part_.end(), 0.0);
+    return;
+  }
+  carried_.assign(static_cast<std::size_t>(problem.particles) + 1, 0.0);
+  for (std::size_t c = 0; c < count; ++c) {
+    const double load = std::abs(contacts.impulse[c]) * diagonal_[c];
+    carried_[mover(problem, contacts.first[c])] += load;
+    carried_[mover(problem, contacts.second[c])] += load;
+  }
+  carried_[problem.particles] = 0.0;
+  const double *const v = problem.predicted_velocity.data();
+  const auto length_of = [&](int i) {
+    return carried_[mover(problem, i)] +
+        problem.timestep * norm(v + 3 * static_cast<std::size_t>(i));
+  };
+  for (std::size_t c = 0; c < count; ++c) {
+    part_[c] = IN_NETWORKS * limits.accuracy * contacts.refinement[c];
+    const double length = std::abs(gap_operator.free_gap()[c]) + length_of(contacts.first[c]) +
+        length_of(contacts.second[c]);
+    least_[c] = std::max(ROUND_OFF * length, part_[c] * of_guess_[c]);
+  }
+}
+
+double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &limits,
+                             const GapOperator &gap_operator, const std::vector<double> &gap,
+                             Host &host)
+{ return judge(problem, limits, gap_operator, gap, Counts::ALL, host); }
+
+double ContactTargets::judge_feasibility(const ContactProblem &problem, const SolverLimits &limits,
+                                         const GapOperator &gap_operator,
+                                         const std::vector<double> &gap, Host &host)
+{ return judge(problem, limits, gap_operator, gap, Counts::FEASIBILITY, host); }
+
+double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &limits,
+                             const GapOperator &gap_operator, const std::vector<double> &gap,
+                             Counts counts, Host &host)
+{
+  const ContactSet &contacts = problem.contacts;
+  const std::vector<double> &change = gap_operator.change();
+  constexpr double NEAR = 5.0;    // tolerances
+  set_least(problem, limits, gap_operator);
+  constexpr double NONE = std::numeric_limits<double>::max();
+  std::vector<double> of_particle(static_cast<std::size_t>(problem.particles) + 1, NONE);
+  for (std::size_t i = 0; limits.accuracy > 0.0 && i + 1 < of_particle.size(); ++i) {
+    if (!problem.is_mobile(static_cast<int>(i))) continue;
+    const double *const now = &change[3 * i], *const before = &change_by_guess_[3 * i];
+    const double added[3] = {now[0] - before[0], now[1] - before[1], now[2] - before[2]};
+    of_particle[i] = problem.timestep * std::max(norm(now), norm(added));
+  }
+  double maxima[2] = {0.0, 0.0};    // the largest part of a target, the largest target
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const double by_velocity =
+        part_[c] * std::min(of_particle[contacts.first[c]], of_particle[contacts.second[c]]);
+    const double target = std::min(limits.tolerance, std::max(least_[c], by_velocity));
+    // What may pull is open where it does not pull by as much as it may (solver.h).
+    const bool all = counts == Counts::ALL || contacts.least[c] < 0.0;
+    const double left = all ? residual_of_one(gap[c], contacts.impulse[c], contacts.least[c])
+                            : std::max(0.0, -gap[c]);
+    const bool finite = std::isfinite(gap[c]) && std::isfinite(contacts.impulse[c]);
+    maxima[0] =
+        std::max(maxima[0], finite ? left / target : std::numeric_limits<double>::infinity());
+    if (contacts.impulse[c] > contacts.least[c] || gap[c] < NEAR * limits.tolerance)
+      maxima[1] = std::max(maxima[1], target);
+  }
+  host.reduce(nullptr, 0, maxima, 2);
+  largest_ = maxima[1];
+  return maxima[0];
+}
+
+}    // namespace inelastic

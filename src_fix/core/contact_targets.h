@@ -1,0 +1,82 @@
+// The accuracy to which each contact is resolved, which belongs to the contact and not to the scene.
+//
+// A search for the impulses ends when the residual of every contact (solver.h) is at most its target
+//
+//   t_c = min(tolerance, max(round-off, A/4 max(v_c, r_c, l_c / 1000)))                        [length]
+//   v_c = min over its particles that can move of max(s_i, n_i)
+//
+// for contact c, with the accuracy A and, of particle i,
+//
+//   s_i   h times the change of its velocity by all of its contacts together. At rest that is what its
+//         forces would give it, whatever it carries: its weight alone, under a column as well as on top
+//   n_i   the part of it that this search has added to the first guess: what is new. In a chain that is hit
+//         at one end the targets so follow the impact
+//   r_c   the residual of the first guess: for two spheres that meet, by how much they would overlap
+//   l_c   the length by which the contact's own impulse of the first guess opens its gap. It matters where
+//         forces balance and change no velocity, and tells there what is small
+//
+// Changes of velocity are those of the present impulses. A contact whose refinement (contact_set.h) is below 1 has
+// that part of A.
+
+#pragma once
+
+#include "contact_problem.h"
+#include "gap_operator.h"
+#include "host.h"
+
+#include <vector>
+
+namespace inelastic {
+
+struct SolverLimits;
+
+// Returns the residual of one constraint: what is lacking of its gap, or what its gap is open under a force.
+inline double residual_of_one(double gap_at_end, double impulse, double least)
+{ return impulse > least && gap_at_end > 0.0 ? gap_at_end : gap_at_end < 0.0 ? -gap_at_end : 0.0; }
+
+class ContactTargets {
+ public:
+  // Takes the first guess: the operator was last applied to it, and `gap` are its gaps at the end of the step.
+  // `diagonal` is that of A, one number per constraint as well.
+  void begin(const ContactProblem &problem, const SolverLimits &limits,
+             const GapOperator &gap_operator, const std::vector<double> &gap,
+             const std::vector<double> &diagonal);
+
+  // Sets the targets for the present impulses, to which the operator was last applied. Returns the largest residual
+  // as a part of its target, over all ranks; infinity if a number is not finite. Collective.
+  double judge(const ContactProblem &problem, const SolverLimits &limits,
+               const GapOperator &gap_operator, const std::vector<double> &gap, Host &host);
+
+  // Does the same for the feasibility alone (solver.h), to which Uzawa's method looks.
+  double judge_feasibility(const ContactProblem &problem, const SolverLimits &limits,
+                           const GapOperator &gap_operator, const std::vector<double> &gap,
+                           Host &host);
+
+  // What follows is as judge() left it, without what changes of velocity add.
+  // [length] The target is at least that.
+  const std::vector<double> &least() const { return least_; }
+  // By this a change of velocity counts: A/4 times the refinement.
+  const std::vector<double> &part() const { return part_; }
+  // [length / time] The changes of velocity by the first guess, 3 per particle.
+  const std::vector<double> &change_by_guess() const { return change_by_guess_; }
+  // [length] The largest target of a constraint with impulse, or near it, on all ranks.
+  double largest() const { return largest_; }
+
+ private:
+  enum class Counts { ALL, FEASIBILITY };    // of the residuals
+
+  double judge(const ContactProblem &problem, const SolverLimits &limits,
+               const GapOperator &gap_operator, const std::vector<double> &gap, Counts counts,
+               Host &host);
+  void set_least(const ContactProblem &problem, const SolverLimits &limits,
+                 const GapOperator &gap_operator);
+
+  std::vector<double> diagonal_;
+  std::vector<double> of_guess_;    // [length] max(r_c, l_c / 1000)
+  std::vector<double> change_by_guess_;
+  std::vector<double> least_, part_;
+  std::vector<double> carried_;    // [length] per particle: the impulses on it, for the round-off
+  double largest_ = 0.0;
+};
+
+}    // namespace inelastic

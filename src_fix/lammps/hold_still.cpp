@@ -1,0 +1,86 @@
+#include "hold_still.h"
+
+#include "ghost_exchange.h"
+#include "make_solver.h"
+#include "rigid_motion.h"
+
+#include <algorithm>
+
+using namespace LAMMPS_NS;
+
+HoldStill::HoldStill(Step &step, GhostExchange &ranks, RigidMotion *bodies) :
+    step_(step), ranks_(ranks), bodies_(bodies), solver_(inelastic::make_solver("apgd"))
+{
+}
+
+std::vector<char> HoldStill::with_ghosts(const std::vector<char> &stopped) const
+{
+  std::vector<double> marks(3 * stopped.size(), 0.0);
+  for (std::size_t i = 0; i < stopped.size(); ++i) marks[3 * i] = stopped[i];
+  ranks_.share_with_ghosts(marks.data());
+  std::vector<char> all(stopped.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = marks[3 * i] != 0.0;
+  const inelastic::RigidBodies &bodies = step_.problem.bodies;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const auto first = bodies.member.begin() + bodies.start[b];
+    const auto last = bodies.member.begin() + bodies.start[b + 1];
+    const bool any = std::any_of(first, last, [&all](int i) {
+      return all[i] != 0;
+    });
+    std::for_each(first, last, [&all, any](int i) {
+      all[i] = any;
+    });
+  }
+  return all;
+}
+
+long HoldStill::run(const std::vector<char> &stopped)
+{
+  const inelastic::ContactProblem &problem = step_.problem;
+  const std::vector<char> still = with_ghosts(stopped);
+  moving_.timestep = problem.timestep;
+  moving_.resize(problem.particles);
+  moving_.inverse_mass = problem.inverse_mass;
+  moving_.bodies = problem.bodies;
+  std::copy_n(step_.velocity.begin(), step_.velocity.size(), moving_.predicted_velocity.begin());
+  for (std::size_t i = 0; i < still.size(); ++i) {
+    if (!still[i]) continue;
+    moving_.inverse_mass[i] = 0.0;
+    std::fill_n(&moving_.predicted_velocity[3 * i], 3, 0.0);
+    if (!step_.is_member(static_cast<int>(i))) continue;
+    const auto b = static_cast<std::size_t>(problem.bodies.body[i]);
+    moving_.bodies.inverse_mass[b] = 0.0;
+    std::fill_n(&moving_.bodies.inverse_inertia[6 * b], 6, 0.0);
+  }
+  inelastic::ContactSet &contacts = moving_.contacts;
+  contacts.clear();
+  std::vector<std::size_t> source;
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+    const double *const n = &problem.contacts.normal[3 * c];
+    const int i = problem.contacts.first[c], j = problem.contacts.second[c];
+    if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
+    // What pushes now goes on pushing; what may pull may do so by as much in all.
+    const double least = problem.contacts.least[c];
+    contacts.add(i, j, n, problem.contacts.gap[c], 0.0, 0.0,
+                 least < 0.0 ? std::min(0.0, least - problem.contacts.impulse[c]) : 0.0);
+    source.push_back(c);
+  }
+  // What moves was solved for: only what ends deeper by so much, because something is at rest, is to be changed.
+  constexpr double DEEPER = 0.1;    // tolerances
+  inelastic::SolverLimits limits;
+  limits.tolerance = DEEPER * step_.settings.tolerance;
+  limits.max_iterations = step_.settings.max_iterations;
+  const inelastic::SolverResult result = solver_->solve(moving_, limits, ranks_);
+  if (result.status != inelastic::Status::CONVERGED) return result.iterations;
+  solver_->gap_operator().velocity_applied(moving_, step_.velocity.data());
+  for (std::size_t k = 0; k < source.size(); ++k)
+    step_.problem.contacts.impulse[source[k]] += contacts.impulse[k];
+  if (!bodies_) return result.iterations;
+  std::vector<double> by_contacts(step_.velocity.size());
+  inelastic::GapOperator gap_operator;
+  gap_operator.prepare(problem);
+  gap_operator.velocity(problem, problem.contacts.impulse.data(), by_contacts.data(), ranks_);
+  bodies_->note_stop(problem, by_contacts, step_.velocity);
+  bodies_->turn(problem, step_.velocity, step_.motion_of_bodies);
+  return result.iterations;
+}

@@ -1,0 +1,41 @@
+// This room takes the velocities of particles at rest away (rest.h). What moves beside them was solved for with these
+// velocities: it is projected once more, with the particles at rest as obstacles, so that nothing moves into them.
+
+#ifndef INELASTIC_HOLD_STILL_H
+#define INELASTIC_HOLD_STILL_H
+
+#include "solver.h"
+#include "step.h"
+
+#include <memory>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class GhostExchange;
+class RigidMotion;
+
+class HoldStill {
+ public:
+  // `bodies` is null in a scene of free spheres.
+  HoldStill(Step &step, GhostExchange &ranks, RigidMotion *bodies);
+
+  // Changes velocities and impulses of the step, which is solved. The marks are one per particle, those of ghosts
+  // are not read; of a body any marked member will do. Returns the number of iterations that it took. Where what
+  // moves finds no room nothing is changed. Collective.
+  long run(const std::vector<char> &stopped);
+
+ private:
+  std::vector<char> with_ghosts(const std::vector<char> &stopped) const;
+
+  Step &step_;
+  GhostExchange &ranks_;
+  RigidMotion *bodies_;
+  std::unique_ptr<inelastic::Solver>
+      solver_;    // apart from that of the steps, which learns from them
+  inelastic::ContactProblem moving_;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
