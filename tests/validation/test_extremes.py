@@ -129,7 +129,7 @@ def assert_sound(result: Measured, allowed: float = 1.0, round_off: float = 0.0)
     """Overlap within `allowed` tolerances, residuals within one. `round_off` in tolerances."""
     # The residual here is added up in another order than the solver's.
     assert result.overlap <= allowed * SLACK + round_off
-    # A body's contact at rest may give way by half of a tolerance before the residual is added.
+    # A body's overlap of half a tolerance counts as closed, to which the residual is added.
     assert result.feasibility <= min(allowed, 1.5) * SLACK + round_off
     assert result.complementarity <= SLACK + round_off
     # Energies are sums of squares of some thousand velocities.

@@ -254,7 +254,7 @@ def test_projection_against_a_quadratic_programming_library(tight_records: list[
         further = core.project(
             *problem.spheres,
             timestep=problem.timestep,
-            tolerance=1e-12,
+            tolerance=1e-13,
             max_iterations=1_000_000,
             impulse=problem.arrays["impulse"],
             **problem.contact_laws,
