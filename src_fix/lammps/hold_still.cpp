@@ -8,6 +8,14 @@
 
 using namespace LAMMPS_NS;
 
+namespace {
+
+// What moves was solved for: only what ends deeper by so many tolerances, because something is at rest, is to be
+// changed.
+constexpr double DEEPER = 0.1;
+
+}    // namespace
+
 HoldStill::HoldStill(Step &step, GhostExchange &ranks, RigidMotion *bodies) :
     step_(step), ranks_(ranks), bodies_(bodies), solver_(inelastic::make_solver("apgd"))
 {
@@ -59,14 +67,16 @@ long HoldStill::run(const std::vector<char> &stopped)
     const double *const n = &problem.contacts.normal[3 * c];
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
     if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
+    // What counts as closed, and overlaps, is to end within the tolerance, the residual included.
+    const Side &side = step_.sides[c];
+    const double ends_within =
+        side.gap_now - side.wall_motion + (1.0 - DEEPER) * step_.settings.tolerance;
     // What pushes now goes on pushing; what may pull may do so by as much in all.
     const double least = problem.contacts.least[c];
-    contacts.add(i, j, n, problem.contacts.gap[c], 0.0, 0.0,
+    contacts.add(i, j, n, std::min(problem.contacts.gap[c], ends_within), 0.0, 0.0,
                  least < 0.0 ? std::min(0.0, least - problem.contacts.impulse[c]) : 0.0);
     source.push_back(c);
   }
-  // What moves was solved for: only what ends deeper by so much, because something is at rest, is to be changed.
-  constexpr double DEEPER = 0.1;    // tolerances
   inelastic::SolverLimits limits;
   limits.tolerance = DEEPER * step_.settings.tolerance;
   limits.max_iterations = step_.settings.max_iterations;

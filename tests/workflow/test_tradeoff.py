@@ -450,9 +450,11 @@ def test_recorded_states_show_the_accuracy(finished: tuple[list[str], Path]) -> 
             assert int(last["iterations"]) > int(first["iterations"])
             # Errors are in proportion to the residual, which falls by five decades, to 5e-7 r. From
             # the start at rest the forces of the last step are within 3e-2; there 5e-7 r is 3e-5
-            # g h^2, of which a bed makes some fifty times as much.
+            # g h^2, of which a bed, whose contacts are just as many as it needs, makes some hundred
+            # times as much.
+            least = 1e-2 if moment == "rest" else 1e-3
             for name in ("velocity_error", "force_error"):
-                assert 0 <= float(last[name]) <= max(1e-2 * float(first[name]), 1.5e-3), chosen
+                assert 0 <= float(last[name]) <= max(1e-2 * float(first[name]), least), chosen
             assert float(last["missed"]) + float(last["false"]) <= 0.01
     assert "| apgd from the last forces | 0.0005 |" in (out / "tradeoff.md").read_text()
 
