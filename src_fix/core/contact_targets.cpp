@@ -72,7 +72,9 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
     part_[c] = IN_NETWORKS * limits.accuracy * contacts.refinement[c];
     const double length = std::abs(gap_operator.free_gap()[c]) + length_of(contacts.first[c]) +
         length_of(contacts.second[c]);
-    least_[c] = std::max(ROUND_OFF * length, part_[c] * of_guess_[c]);
+    least_[c] = std::max({ROUND_OFF * length, limits.least_length,
+                          std::numeric_limits<double>::epsilon() * limits.tolerance,
+                          part_[c] * of_guess_[c]});
   }
 }
 

@@ -92,6 +92,8 @@ struct SolverLimits {
   // The part of what contacts change to which they are resolved (contact_targets.h); 0 = only the tolerance
   // counts.
   double accuracy = 0.0;
+  // [length] Shorter lengths are round-off of positions: no target is below it, unless it is the tolerance.
+  double least_length = 0.0;
 };
 
 // What is known before the iterations, from the first guess of the impulses; over all ranks.

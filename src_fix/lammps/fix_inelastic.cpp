@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
@@ -431,6 +432,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   constexpr double BEYOND_REACH = 10.0;
   const double reach = (settings_.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
   inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
+  limits.least_length = std::numeric_limits<double>::epsilon() * length_.smallest_radius();
   // A push is no momentum.
   if (step_.phase == Phase::CONTACT) limits.accuracy = settings_.accuracy;
   const inelastic::ProjectionResult result = inelastic::project(
