@@ -11,9 +11,9 @@ namespace inelastic {
 
 namespace {
 
-  // In a bed of many contacts residuals make velocities of some ten times their size, in a chain of n up to n times
-  // (which accelerated_gradient.h looks at).
-  constexpr double IN_NETWORKS = 0.25;
+  // In a bed of many contacts residuals make velocities of some hundred times their size, in a chain of n up to n
+  // times (which accelerated_gradient.h looks at).
+  constexpr double IN_NETWORKS = 0.125;
   // Of what a contact carries, where that changes no velocity.
   constexpr double PART_OF_LOAD = 0.001;
   // Gaps are known to a few units of round-off of what they are added up from.
@@ -69,7 +69,7 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
         problem.timestep * norm(v + 3 * static_cast<std::size_t>(i));
   };
   for (std::size_t c = 0; c < count; ++c) {
-    part_[c] = IN_NETWORKS * limits.accuracy * contacts.refinement[c];
+    part_[c] = IN_NETWORKS * limits.accuracy * limits.coarseness * contacts.refinement[c];
     const double length = std::abs(gap_operator.free_gap()[c]) + length_of(contacts.first[c]) +
         length_of(contacts.second[c]);
     least_[c] = std::max({ROUND_OFF * length, limits.least_length,

@@ -21,6 +21,9 @@ namespace {
   // A gap is known to a few units of round-off of the largest change.
   constexpr double ROUND_OFFS = 2.0;
 
+  // What a particle moves alone counts by so much of what it moves together with one that it touches.
+  constexpr double ALONE = 0.5;
+
   // A velocity, which is a sum of some impulses, to so many units of its own round-off.
   constexpr int BLURRED = 16;
 
@@ -158,8 +161,12 @@ template <typename Real> double PackedIterations<Real>::moved_since_kept(double 
   Real most = 0;
   for (std::size_t k = 0; k < working_.size(); ++k) {
     if (!(unbound_[k] > working_.least[k])) continue;
-    const Real by = std::max(moved[index<Real>(working_.ends[k].first)],
-                             moved[index<Real>(working_.ends[k].second)]);
+    const std::size_t i = index<Real>(working_.ends[k].first);
+    const std::size_t j = index<Real>(working_.ends[k].second);
+    const Real both = !mobile_[i] ? moved[j]
+        : !mobile_[j]             ? moved[i]
+                                  : std::min(moved[i], moved[j]);
+    const Real by = std::max(both, static_cast<Real>(ALONE) * std::max(moved[i], moved[j]));
     most = std::max(most, by / free_target(working_, k));
   }
   return accuracy * static_cast<double>(most);

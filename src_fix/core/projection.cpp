@@ -52,9 +52,13 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
   ProjectionResult result;
   GapOperator &gap_operator = solver.gap_operator();
   velocity.resize(3 * static_cast<std::size_t>(problem.particles));
+  // Constraints of bodies, which turn, are linearised anew in many rounds: until none changes, coarse solutions do.
+  constexpr double COARSE = 32.0;
+  bool coarse = limits.accuracy > 0.0 && !problem.bodies.empty();
   while (true) {
     SolverLimits remaining = limits;
     remaining.max_iterations -= result.iterations;
+    if (coarse) remaining.coarseness = COARSE;
     const SolverResult solved = solver.solve(problem, remaining, host);
     ++result.rounds;
     result.status = solved.status;
@@ -71,7 +75,8 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
       gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
     double changed = static_cast<double>(source.refine(velocity, problem));
     host.reduce(&changed, 1, nullptr, 0);
-    if (converged && changed == 0.0) return result;
+    if (converged && changed == 0.0 && !coarse) return result;
+    if (changed == 0.0) coarse = false;
     if (converged && result.rounds < max_rounds) continue;
     if (converged) result.status = Status::OUT_OF_ROUNDS;
     judge_failure(problem, gap_operator, solved_for, limits.tolerance, host, result);

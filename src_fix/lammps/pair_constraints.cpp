@@ -180,7 +180,7 @@ void PairConstraints::take(std::size_t slot, int i, int j)
   if (laws_.has_law()) laws_.ask(side, i, j, atom->tag[j], normal, rules_.overlaps().is_bad(gap));
   rules_.begin(side, memory_.find(i, atom->tag[j]), i, j, normal);
   problem.contacts.add(i, j, normal, rules_.asked_gap(side), step_.impulse_per_force * side.force,
-                       0.0, step_.least_impulse(side));
+                       0.0, step_.least_impulse(side), step_.refinement(side));
   step_.sides.push_back(side);
 }
 

@@ -111,6 +111,14 @@ struct Step {
   double least_impulse(const Side &side) const
   { return side.law_contact < 0 ? 0.0 : law_contacts[side.law_contact].demand.least_impulse; }
 
+  // By this a constraint is solved more accurately than others (contact_set.h). A law asks for a speed with which
+  // surfaces part where they collide, maybe hundreds of times: errors of it add up.
+  double refinement(const Side &side) const
+  {
+    constexpr double PARTING = 1.0 / 16.0;
+    return side.law_contact >= 0 && law_contacts[side.law_contact].demand.parts ? PARTING : 1.0;
+  }
+
   // Tells whether the law lets a constraint pull.
   bool may_hold(std::size_t c) const { return least_impulse(sides[c]) < 0.0; }
 

@@ -178,7 +178,8 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
               rules_.overlaps().is_bad(gap_now));
   rules_.begin(side, memory_.find(i, -view.wall), i, problem.particles, view.normal);
   problem.contacts.add(i, problem.particles, view.normal, rules_.asked_gap(side),
-                       step_.impulse_per_force * side.force, 0.0, step_.least_impulse(side));
+                       step_.impulse_per_force * side.force, 0.0, step_.least_impulse(side),
+                       step_.refinement(side));
   step_.sides.push_back(side);
 }
 
