@@ -149,7 +149,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   };
   // In a chain residuals add up. So a search goes on where velocities differ by more than this part of what
   // targets are a part of from those that a half to two thirds as many iterations had found.
-  constexpr double MOST_MOVED = 0.2;
+  constexpr double MOST_MOVED = 0.4;
   const bool by_velocity = limits.accuracy > 0.0 && limits.coarseness == 1.0;
 
   iterations.prepare(problem, diagonal_, gap_,

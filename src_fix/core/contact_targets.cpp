@@ -13,9 +13,9 @@ namespace {
 
   // In a bed of many contacts residuals make velocities of some hundred times their size, in a chain of n up to n
   // times (which accelerated_gradient.h looks at).
-  constexpr double IN_NETWORKS = 0.125;
+  constexpr double IN_NETWORKS = 1.0 / 16.0;
   // Of what a contact carries, where that changes no velocity.
-  constexpr double PART_OF_LOAD = 0.001;
+  constexpr double PART_OF_LOAD = 2.0e-5;
   // Gaps are known to a few units of round-off of what they are added up from.
   constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();
 

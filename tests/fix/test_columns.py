@@ -24,17 +24,9 @@ KINDS: dict[str, dict[str, Any]] = {
 CASES = [(1e-3, 0.005), (1e-2, 0.005), (1e-6, 0.005), (1e-3, 0.001), (1e-3, 0.02), (1e-6, 0.02)]
 
 
-@pytest.mark.parametrize(
-    ("n", "kind", "load"),
-    # Not a hundred that lean and carry little: the uppermost contacts there are off by up to 3 %.
-    [
-        (n, kind, load)
-        for n in (10, 100)
-        for kind in KINDS
-        for load in (0.0, 5.0, 500.0)
-        if not (n == 100 and kind == "leans" and load < 500)
-    ],
-)
+@pytest.mark.parametrize("n", [10, 100])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("load", [0.0, 5.0, 500.0])
 @pytest.mark.parametrize(("tolerance", "timestep"), CASES)
 def test_a_column(
     n: int, kind: str, tolerance: float, timestep: float, load: float, tmp_path: Path
@@ -45,20 +37,10 @@ def test_a_column(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("n", "kind", "load"),
-    # Not a thousand that lean under 500 weights: there single spheres reach 0.26 g h.
-    [
-        (n, kind, load)
-        for n in (300, 1000)
-        for kind in KINDS
-        for load in (0.0, 500.0)
-        if not (n == 1000 and kind == "leans" and load > 0)
-    ],
-)
-# Not a tolerance of 1e-6 radii: forces of a thousand are off by up to 33 %, and under 500 weights
-# rounds of constraints run out.
-@pytest.mark.parametrize(("tolerance", "timestep"), [(1e-3, 0.005), (1e-2, 0.001)])
+@pytest.mark.parametrize("n", [300, 1000])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("load", [0.0, 500.0])
+@pytest.mark.parametrize(("tolerance", "timestep"), CASES)
 def test_a_high_column(
     n: int, kind: str, tolerance: float, timestep: float, load: float, tmp_path: Path
 ) -> None:

@@ -13,16 +13,8 @@ from tests.fix.exact_scenes import UNLOADING, Column, assert_nothing_leaps
 from tests.fix.scenes import GRAVITY
 
 
-@pytest.mark.parametrize(
-    ("weights", "way"),
-    # Not in steps from 1e5 weights on: between two steps up to 0.11 g h are left, of 1e6 4 g h.
-    [
-        (weights, way)
-        for weights in (10.0, 1e2, 1e3, 1e4, 1e5, 1e6)
-        for way in UNLOADING
-        if not (way == "in steps" and weights > 1e4)
-    ],
-)
+@pytest.mark.parametrize("weights", [10.0, 1e2, 1e3, 1e4, 1e5, 1e6])
+@pytest.mark.parametrize("way", UNLOADING)
 @pytest.mark.parametrize("tolerance", [2e-3, 1e-5])
 def test_a_column_that_was_pressed(
     weights: float, tolerance: float, way: str, tmp_path: Path
