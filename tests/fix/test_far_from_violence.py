@@ -22,12 +22,13 @@ def column_beside_gases(
     """Return a deck of ten spheres that lie on one another, and boxes of 64 that fly, with E = 1.
 
     The gases have a temperature of the square of `speed`. Walls between the boxes, and one above
-    the floor of the gases, keep that floor, wall 3, for the column.
+    the floor of the gases, keep that floor, wall 3, for the column. It is higher than they fly in a
+    step: where both ask for a bounce it is of no matter to the gases which of them carries it.
     """
     edges = 1.45 + 1.9 * np.arange(4)
     gas = np.stack(np.meshgrid(edges, edges, edges), axis=-1).reshape(-1, 3)
     points = [np.column_stack([np.full(10, 15.0), RADIUS + np.arange(10), np.full(10, 5.0)])]
-    points += [gas - [10.0 * k, 0, 0] for k in range(gases)]
+    points += [gas + np.array([-10.0 * k, 4.0, 0.0]) for k in range(gases)]
     random = np.random.default_rng(4711).normal(size=(gases, 64, 3))
     random -= random.mean(axis=1, keepdims=True)
     flying = random.reshape(-1, 3) * speed / np.sqrt(MASS)
@@ -35,7 +36,7 @@ def column_beside_gases(
         f"region wall{k} block {10 - 10 * k} {11 - 10 * k} -5 35 -5 15 side out\n"
         for k in range(gases)
     )
-    walls += f"region under block {-10 * gases} 10.5 -5 0.3 -5 15 side out\n"
+    walls += f"region under block {-10 * gases} 10.5 -5 4.3 -5 15 side out\n"
     names = " ".join(f"wall{k}" for k in range(gases)) + " under"
     return spheres_of(
         np.vstack(points),
@@ -83,8 +84,7 @@ def test_a_column_beside_a_gas(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
-# Not 40: where the step becomes a thousandth of its length what is left of a velocity is a force.
-@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0, 40.0])
 @pytest.mark.parametrize("gases", [1, 2, 10])
 def test_a_column_beside_gases(
     gases: int, speed: float, ranks: int, tmp_path: Path, lmp: Runner

@@ -52,7 +52,6 @@ CLUSTERS = {
     "pair-oblique": Cluster([[-0.24, -0.18, -0.4], [0.24, 0.18, 0.4]], (("1", "2"),)),
 }
 LYING = ("pair-x", "row", "dimers")
-TURNING = ("dimers", 1e4)
 
 
 def moved(
@@ -126,11 +125,8 @@ def test_grains_that_attract_one_another_fall(
 
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("speed", [0.01, 0.4, 4.0])
-@pytest.mark.parametrize(
-    ("name", "weights"),
-    # Not dimers under 1e4 weights: what is left of their spins throws them out of the line.
-    [(name, weights) for name in LYING for weights in (250, 1e4) if (name, weights) != TURNING],
-)
+@pytest.mark.parametrize("name", LYING)
+@pytest.mark.parametrize("weights", [250, 1e4])
 def test_grains_that_attract_one_another_slide(
     name: str, weights: float, speed: float, ranks: int, tmp_path: Path, lmp: Runner
 ) -> None:
