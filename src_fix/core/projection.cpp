@@ -52,13 +52,11 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
   ProjectionResult result;
   GapOperator &gap_operator = solver.gap_operator();
   velocity.resize(3 * static_cast<std::size_t>(problem.particles));
-  // Constraints of bodies, which turn, are linearised anew in many rounds: until none changes, coarse solutions do.
-  constexpr double COARSE = 32.0;
-  bool coarse = limits.accuracy > 0.0 && !problem.bodies.empty();
+  bool coarse = limits.coarseness > 1.0;
   while (true) {
     SolverLimits remaining = limits;
     remaining.max_iterations -= result.iterations;
-    if (coarse) remaining.coarseness = COARSE;
+    if (!coarse) remaining.coarseness = 1.0;
     const SolverResult solved = solver.solve(problem, remaining, host);
     ++result.rounds;
     result.status = solved.status;

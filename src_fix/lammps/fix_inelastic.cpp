@@ -434,7 +434,12 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
   limits.least_length = std::numeric_limits<double>::epsilon() * length_.smallest_radius();
   // A push is no momentum.
-  if (step_.phase == Phase::CONTACT) limits.accuracy = settings_.accuracy;
+  if (step_.phase == Phase::CONTACT) {
+    // Bodies turn: their constraints are linearised anew in many rounds, of which only the last ones matter.
+    constexpr double COARSE = 32.0;
+    limits.accuracy = settings_.accuracy;
+    if (step_.has_bodies) limits.coarseness = COARSE;
+  }
   const inelastic::ProjectionResult result = inelastic::project(
       step_.problem, constraints_, *solver_, limits, MAX_ROUNDS, ranks_, step_.velocity);
   if (result.status != inelastic::Status::CONVERGED) unsolved_.note_worst(result);

@@ -71,10 +71,9 @@ long HoldStill::run(const std::vector<char> &stopped)
     const Side &side = step_.sides[c];
     const double ends_within =
         side.gap_now - side.wall_motion + (1.0 - DEEPER) * step_.settings.tolerance;
-    // What pushes now goes on pushing; what may pull may do so by as much in all.
-    const double least = problem.contacts.least[c];
+    // In all a contact still pushes, or pulls by as much as it may.
     contacts.add(i, j, n, std::min(problem.contacts.gap[c], ends_within), 0.0, 0.0,
-                 least < 0.0 ? std::min(0.0, least - problem.contacts.impulse[c]) : 0.0);
+                 std::min(0.0, problem.contacts.least[c] - problem.contacts.impulse[c]));
     source.push_back(c);
   }
   inelastic::SolverLimits limits;

@@ -30,7 +30,7 @@ constexpr double TRIAL = 4.0;
 // velocities of some fifty times their size.
 constexpr double REFINED = 1.0 / 16.0;
 // After a trial in which something held moved the next one comes so many quiet steps later.
-constexpr double PAUSE = 200.0;
+constexpr double PAUSE = 50.0;
 // What is at rest is no faster than so many accuracies, of a finer one where the accuracy is coarse.
 constexpr double AT_REST = 5.0;
 constexpr double COARSEST_ACCURACY = 1.0e-3;
@@ -170,14 +170,13 @@ bool Rest::is_held(int i, const Motion &motion) const
 void Rest::measure_clusters()
 {
   const inelastic::ContactProblem &problem = step_.problem;
-  enum { MASS, CENTRE, MOMENTUM = 4, ANGULAR = 7, INERTIA = 10, SPEEDS = 16, NUMBER, SUMS };
-  enum { LOUDNESS, SUPPORTED, DRIVEN, MAXIMA };
+  enum { MASS, CENTRE, MOMENTUM = 4, ANGULAR = 7, INERTIA = 10, SPEEDS = 16, STEPS, NUMBER, SUMS };
+  enum { SUPPORTED, DRIVEN, MAXIMA };
   std::vector<double> sums(SUMS * clusters_.size(), 0.0);
   std::vector<double> maxima(MAXIMA * clusters_.size(), -EXTREME);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!counts(i)) continue;
     double *const s = &sums[SUMS * static_cast<std::size_t>(clusters_.of(i))];
-    double *const m = &maxima[MAXIMA * static_cast<std::size_t>(clusters_.of(i))];
     const double mass = mass_of(atom, i);
     const double *const x = atom->x[i], *const v = velocity(i);
     double moment[3];
@@ -194,8 +193,8 @@ void Rest::measure_clusters()
     s[INERTIA + 4] -= mass * x[0] * x[2];
     s[INERTIA + 5] -= mass * x[1] * x[2];
     s[SPEEDS] += norm(&problem.predicted_velocity[3 * static_cast<std::size_t>(i)]);
+    s[STEPS] += state_.quiet_steps(i);
     s[NUMBER] += 1.0;
-    m[LOUDNESS] = std::max(m[LOUDNESS], -state_.quiet_steps(i));
   }
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
@@ -214,7 +213,8 @@ void Rest::measure_clusters()
     if (!(s[MASS] > 0.0)) continue;
     cluster.mass = s[MASS];
     cluster.without_contacts = s[SPEEDS] / s[NUMBER];
-    cluster.quiet_steps = -m[LOUDNESS];
+    // Of most of its particles: single ones that come to it, and have not been quiet, do not begin the count anew.
+    cluster.quiet_steps = std::round(s[STEPS] / s[NUMBER]);
     cluster.supported = m[SUPPORTED] > 0.0;
     cluster.driven = m[DRIVEN] > 0.0;
     for (int d = 0; d < 3; ++d) {
@@ -325,7 +325,7 @@ bool Rest::decide(std::vector<char> &stopped)
     // No time passes in the half kick with which a run starts.
     if (step_.kick == Kick::HALF) continue;
     double &own = state_.quiet_steps(i);
-    own = is_quiet(cluster) ? steps + 1.0 : std::min(steps, 0.0);
+    own = is_quiet(cluster) ? std::min(steps, PATIENCE + TRIAL) + 1.0 : std::min(steps, 0.0);
     if (at_rest && !goes_on) own = std::min(own, 0.0);
     // The forces of the last step of a trial decide.
     if (own == PATIENCE + TRIAL && moves(cluster)) own = -PAUSE;

@@ -887,6 +887,9 @@ class _Part:
             return
         if "law restitution" in self.facts["words"]:
             return
+        # Glued surfaces that turn are not followed any further after so many rounds, as below.
+        if "law gluey" in self.facts["words"] and new.thermo["f_contact[8]"] > 20:
+            return
         i, j, pair, n = listed["i"], listed["j"], listed["pair"], listed["n"]
         relative = velocity[i] - np.where(pair[:, None], velocity[j], 0.0)
         asked = np.where(listed["gap"] < -REGULAR * self.eps, 0.0, listed["gap"])
