@@ -1012,8 +1012,9 @@ class _Part:
     ) -> None:
         """(c) T(V+) <= T(V*) + sum lambda (max(0, -D) + EPS) / h + the work of what moves.
 
-        With restitution also by half of lambda (n.u* - D / h) where spheres were parting: what has
-        turned past one another parts faster, u*, than its gap D has grown in a step.
+        With restitution also by half of lambda (n.u* - D / h) where surfaces were parting: what has
+        turned past one another, or is pushed back to a wall, parts faster, u*, than its gap D has
+        grown in a step.
         """
         if new.bodies is not None or self.facts["warn"]:
             return
@@ -1028,10 +1029,13 @@ class _Part:
         deep = np.maximum(0, np.where(impulse > 0, -listed["gap"], listed["gap"]))
         allowed = (np.abs(impulse) * (deep + self.eps)).sum() / new.h
         if "law restitution" in self.facts["words"]:
-            # The normal points from j to i.
-            apart = (n[pair] * (predicted[i[pair]] - predicted[j[pair]])).sum(axis=1)
-            turned = np.where(apart > 0, apart - np.maximum(0, listed["gap"][pair]) / new.h, 0.0)
-            allowed += 0.5 * (np.maximum(0, impulse[pair]) * np.maximum(0, turned)).sum()
+            # The normal points from j, or from the wall, to i.
+            other = np.where(pair[:, None], predicted[np.where(pair, j, i)], 0.0)
+            apart = (n * (predicted[i] - other)).sum(axis=1)
+            for row in np.flatnonzero(~pair).tolist():
+                apart[row] -= self.wall_motion(new, listed, row) / new.h
+            turned = np.where(apart > 0, apart - np.maximum(0, listed["gap"]) / new.h, 0.0)
+            allowed += 0.5 * (np.maximum(0, impulse) * np.maximum(0, turned)).sum()
         for row in np.flatnonzero(~pair).tolist():
             allowed += max(0.0, impulse[row] * self.wall_motion(new, listed, row)) / new.h
         for side, sign in ((i, -1.0), (np.where(pair, j, i), 1.0)):
