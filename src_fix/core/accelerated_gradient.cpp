@@ -147,8 +147,9 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     return iteration == 2 || iteration == 4 || iteration == 8 || iteration == 14 ||
         iteration % TARGETS_EVERY == 0;
   };
-  // In a chain residuals add up. So a search goes on where velocities differ by more than this part of what
-  // targets are a part of from those that a half to two thirds as many iterations had found.
+  // In a chain residuals add up, and what is left of a velocity is many times what is left of a gap. So a search goes
+  // on where velocities differ by more than so many accuracies' part of their targets, that is by a fortieth of what
+  // targets are a sixteenth of A of, from those that a half to two thirds as many iterations had found.
   constexpr double MOST_MOVED = 0.4;
   const bool by_velocity = limits.accuracy > 0.0 && limits.coarseness == 1.0;
 

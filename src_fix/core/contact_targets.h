@@ -2,7 +2,7 @@
 //
 // A search for the impulses ends when the residual of every contact (solver.h) is at most its target
 //
-//   t_c = min(tolerance, max(round-off, A/4 max(v_c, r_c, l_c / 1000)))                        [length]
+//   t_c = min(tolerance, max(round-off, A/16 max(v_c, r_c, l_c / 50000)))                      [length]
 //   v_c = min over its particles that can move of max(s_i, n_i)
 //
 // for contact c, with the accuracy A and, of particle i,
@@ -55,7 +55,7 @@ class ContactTargets {
   // What follows is as judge() left it, without what changes of velocity add.
   // [length] The target is at least that.
   const std::vector<double> &least() const { return least_; }
-  // By this a change of velocity counts: A/4 times the refinement.
+  // By this a change of velocity counts: A/16 times the refinement.
   const std::vector<double> &part() const { return part_; }
   // [length / time] The changes of velocity by the first guess, 3 per particle.
   const std::vector<double> &change_by_guess() const { return change_by_guess_; }
@@ -72,7 +72,7 @@ class ContactTargets {
                  const GapOperator &gap_operator);
 
   std::vector<double> diagonal_;
-  std::vector<double> of_guess_;    // [length] max(r_c, l_c / 1000)
+  std::vector<double> of_guess_;    // [length] max(r_c, l_c / 50000)
   std::vector<double> change_by_guess_;
   std::vector<double> least_, part_;
   std::vector<double> carried_;    // [length] per particle: the impulses on it, for the round-off

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from tests.fix.bodies import body_scene, dimer, random_bodies
+from tests.fix.bodies import Bodies, body_scene, dimer, random_bodies
 from tests.fix.lammps_run import Runner
 from tests.fix.scenes import (
     DIVISIONS,
@@ -290,3 +290,27 @@ def test_a_step_through_a_whole_periodic_box(
     assert said in refused.screen
     result = lmp(text.replace("shorten no", "shorten yes") + "run 20\n", ranks=ranks)
     assert "21 shortened steps" in result.screen
+
+
+def test_a_rank_without_bodies(tmp_path: Path, lmp: Runner) -> None:
+    """Dimers fall on a floor in one half of the box, spheres in the other one: no rank waits."""
+    dimers = random_bodies([dimer(1.3)] * 6, RADIUS, ((0.1, 0.6), (0.1, 0.7), (0.1, 0.5)), seed=5)
+    free = random_points(10, ((1.5, 1.9), (0.07, 0.7), (0.07, 0.5)), 2 * RADIUS, seed=6)
+    placed = dimers.joined(Bodies(free, np.zeros(len(free), np.int64)))
+    deck = body_scene(
+        placed,
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        box=((0.0, 2.0), (0.0, 2.0), (0.0, 0.57)),
+        inertia="solid",
+        setup="processors 2 1 1",
+        options="region container shorten yes",
+    )
+    ends = []
+    for ranks in (1, 2):
+        run = deck if ranks == 2 else deck.replace("processors 2 1 1", "")
+        lmp(run + DUMP_PARTICLES + "run 60\n", ranks=ranks, timeout=60)
+        ends.append(read_dump(tmp_path / "particles.dump")[-1].positions)
+    # They agree within some tolerances: forces are resolved to the accuracy.
+    assert ends[0] == pytest.approx(ends[1], abs=0.05 * RADIUS)
