@@ -115,7 +115,8 @@ double Rest::limit() const
 bool Rest::counts(int i) const
 { return step_.in_group(atom, i) && clusters_.of(i) != Clusters::NONE; }
 
-// Adds up what contacts resist of the motion of each particle, ghosts included.
+// Adds up what contacts resist of the motion of each particle, and counts the gaps that they have still to close,
+// ghosts included.
 void Rest::measure_resistance()
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
@@ -123,10 +124,13 @@ void Rest::measure_resistance()
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double impulse = std::abs(contacts.impulse[c]);
     if (impulse == 0.0) continue;
+    const bool open = step_.sides[c].gap_now > step_.settings.tolerance;
     for (const int i : {contacts.first[c], contacts.second[c]}) {
       if (!clusters_.is_mobile(i)) continue;
       const double along = dot(&contacts.normal[3 * c], velocity(i));
-      resistance_[3 * static_cast<std::size_t>(i)] += impulse * along * along;
+      double *const of_particle = &resistance_[3 * static_cast<std::size_t>(i)];
+      of_particle[0] += impulse * along * along;
+      if (open) of_particle[1] += 1.0;
     }
   }
   ranks_.sum_over_ghosts(resistance_.data());
@@ -135,6 +139,7 @@ void Rest::measure_resistance()
 Rest::Motion Rest::motion_of(int i) const
 {
   const inelastic::ContactProblem &problem = step_.problem;
+  Motion motion;
   double mass = 0.0, square = 0.0, taken = 0.0, resisted = 0.0;
   const auto add = [&](int k) {
     const double m = mass_of(atom, k);
@@ -145,6 +150,7 @@ Rest::Motion Rest::motion_of(int i) const
     square += m * dot(v, v);
     taken += m * dot(change, change);
     resisted += resistance_[3 * static_cast<std::size_t>(k)];
+    if (resistance_[3 * static_cast<std::size_t>(k) + 1] > 0.0) motion.closes = true;
   };
   if (step_.is_member(i)) {
     const inelastic::RigidBodies &bodies = problem.bodies;
@@ -153,7 +159,6 @@ Rest::Motion Rest::motion_of(int i) const
       add(bodies.member[k]);
   } else
     add(i);
-  Motion motion;
   motion.speed = std::sqrt(square / mass);
   motion.taken = std::sqrt(taken / mass);
   motion.resisted = square > 0.0 ? resisted / square : 0.0;
@@ -163,9 +168,9 @@ Rest::Motion Rest::motion_of(int i) const
 double Rest::unit(int i, const Motion &motion) const
 { return std::min(motion.taken, motions_[clusters_.of(i)].without_contacts); }
 
-// What does not move is held as far as it is pressed.
+// What does not move is held as far as it is pressed. What still closes a gap is not: a force would stay across it.
 bool Rest::is_held(int i, const Motion &motion) const
-{ return motion.speed == 0.0 || motion.resisted >= HELD * unit(i, motion); }
+{ return !motion.closes && (motion.speed == 0.0 || motion.resisted >= HELD * unit(i, motion)); }
 
 void Rest::measure_clusters()
 {

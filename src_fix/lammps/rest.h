@@ -8,7 +8,8 @@
 //         without contacts)
 //
 // The particle is held if contacts resist its motion: if the sum of lambda (n . v)^2 over its contacts is at least
-// a tenth of u_i m v^2. Others, which slide, roll or fly, keep their velocities. A cluster is quiet if it is
+// a tenth of u_i m v^2, and if none of them has still to close a gap. Others, which slide, roll or fly, keep their
+// velocities. A cluster is quiet if it is
 // supported by something that does not move, its held particles move little, and contacts with walls and frozen
 // particles resist its motion as a whole: its velocity and angular velocity, as if it were one rigid body.
 //
@@ -52,6 +53,7 @@ class Rest : protected Pointers {
     double speed = 0.0;       // [length / time] root mean square by mass
     double taken = 0.0;       // [length / time] what contacts change of its velocity
     double resisted = 0.0;    // [length / time] sum of lambda (n . v)^2 / (m v^2)
+    bool closes = false;      // a contact with a force is open by more than the tolerance
   };
   // Of a cluster, from all ranks.
   struct ClusterMotion {
@@ -88,7 +90,7 @@ class Rest : protected Pointers {
   AtomState &state_;
   Clusters clusters_;
   std::vector<double>
-      resistance_;    // 3 per particle, of which the first is the sum of lambda (n . v)^2
+      resistance_;    // 3 per particle: the sum of lambda (n . v)^2, the number of gaps to close, and nothing
   std::vector<ClusterMotion> motions_;
   bool looks_ = false;    // in this step
 };
