@@ -148,8 +148,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
         iteration % TARGETS_EVERY == 0;
   };
   // In a chain residuals add up, and what is left of a velocity is many times what is left of a gap. So a search goes
-  // on where velocities differ by more than so many accuracies' part of their targets, that is by a fortieth of what
-  // targets are a sixteenth of A of, from those that a half to two thirds as many iterations had found.
+  // on where velocities differ from those that a half to two thirds as many iterations had found by more than a
+  // fortieth of what contacts change: this part of the sixteenth that targets are of it (contact_targets.cpp).
   constexpr double MOST_MOVED = 0.4;
   const bool by_velocity = limits.accuracy > 0.0 && limits.coarseness == 1.0;
 

@@ -73,8 +73,11 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
       gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
     double changed = static_cast<double>(source.refine(velocity, problem));
     host.reduce(&changed, 1, nullptr, 0);
-    if (converged && changed == 0.0 && !coarse) return result;
-    if (changed == 0.0) coarse = false;
+    if (converged && changed == 0.0) {
+      if (!coarse) return result;
+      coarse = false;
+      continue;
+    }
     if (converged && result.rounds < max_rounds) continue;
     if (converged) result.status = Status::OUT_OF_ROUNDS;
     judge_failure(problem, gap_operator, solved_for, limits.tolerance, host, result);

@@ -28,7 +28,7 @@ constexpr double PATIENCE = 8.0;
 constexpr double TRIAL = 4.0;
 // The part of the accuracy to which they are solved then. The residuals of a bed, which is isostatic, make
 // velocities of some fifty times their size.
-constexpr double REFINED = 1.0 / 16.0;
+constexpr double REFINED = 1.0 / 4.0;
 // After a trial in which something held moved the next one comes so many quiet steps later.
 constexpr double PAUSE = 50.0;
 // What is at rest is no faster than so many accuracies, of a finer one where the accuracy is coarse.
