@@ -13,6 +13,8 @@ namespace {
 // What moves was solved for: only what ends deeper by so many tolerances, because something is at rest, is to be
 // changed.
 constexpr double DEEPER = 0.1;
+// Where more iterations would be needed, what moves has no room beside what is at rest: nothing is stopped in the step.
+constexpr long MOST_ITERATIONS = 2000;
 
 }    // namespace
 
@@ -78,7 +80,7 @@ long HoldStill::run(const std::vector<char> &stopped)
   }
   inelastic::SolverLimits limits;
   limits.tolerance = DEEPER * step_.settings.tolerance;
-  limits.max_iterations = step_.settings.max_iterations;
+  limits.max_iterations = std::min(MOST_ITERATIONS, step_.settings.max_iterations);
   const inelastic::SolverResult result = solver_->solve(moving_, limits, ranks_);
   if (result.status != inelastic::Status::CONVERGED) return result.iterations;
   solver_->gap_operator().velocity_applied(moving_, step_.velocity.data());
