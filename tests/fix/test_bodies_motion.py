@@ -299,7 +299,7 @@ def test_spheres_do_not_notice_a_body_far_away(tmp_path: Path, lmp: Runner) -> N
     frames = [read_dump(tmp_path / name / "particles.dump") for name in ("alone", "with")]
     for one, two in zip(*frames, strict=True):
         # In a scene with bodies the first rounds of a step are coarse, and the last ones begin from
-        # there: what is left of forces differs, as between numbers of ranks, and grows with the steps.
+        # there: what is left of forces differs, as between numbers of ranks, and grows by the step.
         assert one.positions == pytest.approx(two.positions[: len(points)], abs=0.0005 * RADIUS)
     assert frames[0][-1].positions[:, 1].mean() < 0.7 * points[:, 1].mean()
 
