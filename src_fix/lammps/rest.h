@@ -9,11 +9,11 @@
 //
 // The particle is held if contacts resist its motion: if the sum of lambda (n . v)^2 over its contacts is at least
 // a tenth of u_i m v^2, and if none of them has still to close a gap. Others, which slide, roll or fly, keep their
-// velocities. A cluster is quiet if it is
-// supported by something that does not move, its held particles move little, and contacts with walls and frozen
-// particles resist its motion as a whole: its velocity and angular velocity, as if it were one rigid body.
+// velocities. A cluster is quiet if it is supported by something that does not move, its held particles move little,
+// and contacts with walls and frozen particles resist its motion as a whole: its velocity and angular velocity, as if
+// it were one rigid body.
 //
-// After some quiet steps the held particles are stopped, and some steps are solved more accurately. If nothing held
+// After some quiet steps, those of most of its particles, the held particles are stopped, and some steps are solved more accurately. If nothing held
 // then moves, the forces balance and the cluster is at rest; if not it goes on, and is looked at again later. A
 // cluster at rest in which something would move is solved more accurately, too, before it is let go.
 
