@@ -38,6 +38,8 @@ class AtomState : protected Pointers {
 
   // For how many steps a particle has been quiet (rest.h).
   double &quiet_steps(int i) { return state_[i][QUIET_STEPS]; }
+  // The load of a particle at rest in the last step, [force / mass]; 0 if it was not at rest (rest.h).
+  double &load_at_rest(int i) { return state_[i][LOAD_AT_REST]; }
 
   ContactMemory &contact_memory() { return memory_; }
   LawMemory &law_memory() { return law_memory_; }
@@ -81,7 +83,8 @@ class AtomState : protected Pointers {
     PUSH_HELD = 9,
     EXPECTED_RADIUS = 12,
     QUIET_STEPS = 13,
-    STATE_SIZE = 14
+    LOAD_AT_REST = 14,
+    STATE_SIZE = 15
   };
   int carried_size() const
   { return STATE_SIZE + (step_.has_bodies ? CarriedMomenta::PACKED_SIZE : 0); }

@@ -71,6 +71,16 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   return added + changed + relinearised;
 }
 
+long Constraints::add_violated()
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
+  step_.problem_found.clear();
+  double added = static_cast<double>(pairs_.add_violated() + wall_constraints_.add_violated());
+  ranks_.reduce(&added, 1, nullptr, 0);
+  ranks_.fail_together(step_.problem_found);
+  return static_cast<long>(added);
+}
+
 void Constraints::adapt_margin(double reach)
 {
   constexpr double MORE = 1.1, FEWER = 0.95;

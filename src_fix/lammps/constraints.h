@@ -44,6 +44,10 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   // walls curve. Returns how many constraints this rank added or changed. Collective, same errors.
   long refine(const std::vector<double> &velocity, inelastic::ContactProblem &problem) override;
 
+  // Adds what the velocities of the step violate. Returns how many constraints all ranks added. Collective, same
+  // errors.
+  long add_violated();
+
   // The first tells whether gaps were set by the end of the step, the second whether the last solve knew of
   // such gaps.
   bool relinearised() const { return relinearised_; }

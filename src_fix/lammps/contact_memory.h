@@ -1,6 +1,6 @@
-// The contact forces of the last step, kept per atom so that they follow the atoms through neighbour list
-// rebuilds and from rank to rank: the first guess of the next step, and what tells which contacts are closed
-// (gap_rules.h).
+// What is known of contacts from the last step, kept per atom so that it follows the atoms through neighbour list
+// rebuilds and from rank to rank: their forces, the first guess of the next step, and the gaps at which they are
+// closed (gap_rules.h).
 
 #ifndef INELASTIC_CONTACT_MEMORY_H
 #define INELASTIC_CONTACT_MEMORY_H
@@ -16,30 +16,36 @@ class ContactMemory {
  public:
   // The most contacts that a ghost tells its owned atom; what is beyond loses its first guess.
   static constexpr int SHARED_PARTNERS = 16;
+  // In place of a gap at which a contact is closed, which is not negative.
+  static constexpr double NOT_CLOSED = -1.0;
 
   void resize(int atoms) { remembered_.resize(atoms); }
 
   void forget(int atom) { remembered_[atom].clear(); }
 
-  // partner: the other atom's ID, or minus the wall's number; force: [force] of the last step.
-  void remember(int atom, tagint partner, double force)
-  { remembered_[atom].push_back({partner, force}); }
+  struct Entry {
+    tagint partner = 0;                // the other atom's ID, or minus the wall's number
+    double force = 0.0;                // [force] of the last step
+    double closed_gap = NOT_CLOSED;    // [length] the gap at which the contact is closed
+  };
 
-  // The force [force] of the last step, 0 when nothing is remembered. Of two contacts with one partner (in the
-  // tip of a cone, or through two periodic boundaries) nobody knows which is which, and both are the first one.
-  double find(int atom, tagint partner) const
+  void remember(int atom, const Entry &entry) { remembered_[atom].push_back(entry); }
+
+  // An entry without force that is not closed where nothing is remembered. Of two contacts with one partner (in
+  // the tip of a cone, or through two periodic boundaries) nobody knows which is which, and both are the first one.
+  Entry find(int atom, tagint partner) const
   {
     for (const Entry &entry : remembered_[atom])
-      if (entry.partner == partner) return entry.force;
-    return 0.0;
+      if (entry.partner == partner) return entry;
+    return {};
   }
 
   int number_of_partners(int atom) const { return static_cast<int>(remembered_[atom].size()); }
 
   void copy(int from, int to) { remembered_[to] = remembered_[from]; }
 
-  // Buffer layout: number of partners, then partner and force of each.
-  static constexpr int packed_size(int partners) { return 1 + 2 * partners; }
+  // Buffer layout: number of partners, then each one's entry.
+  static constexpr int packed_size(int partners) { return 1 + 3 * partners; }
 
   // At most `partners` of them.
   int pack(int atom, double *buffer, int partners) const
@@ -51,6 +57,7 @@ class ContactMemory {
       const Entry &entry = remembered_[atom][k];
       buffer[m++] = static_cast<double>(entry.partner);
       buffer[m++] = entry.force;
+      buffer[m++] = entry.closed_gap;
     }
     return m;
   }
@@ -60,16 +67,12 @@ class ContactMemory {
   {
     int m = 0;
     const int partners = static_cast<int>(buffer[m++]);
-    for (int k = 0; k < partners; ++k, m += 2)
-      remember(atom, static_cast<tagint>(buffer[m]), buffer[m + 1]);
+    for (int k = 0; k < partners; ++k, m += 3)
+      remember(atom, {static_cast<tagint>(buffer[m]), buffer[m + 1], buffer[m + 2]});
     return m;
   }
 
  private:
-  struct Entry {
-    tagint partner;
-    double force;
-  };
   std::vector<std::vector<Entry>> remembered_;
 };
 

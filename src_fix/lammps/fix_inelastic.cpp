@@ -52,7 +52,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     rest_(lmp, step_, ranks_, state_), hold_still_(step_, ranks_, bodies_.get()),
     check_(lmp, this, step_, ranks_, state_, bodies_.get()),
     unsolved_(lmp, step_, constraints_, ranks_, bodies_.get()), output_(lmp, step_, ranks_),
-    summary_(lmp, step_, clock_), record_(lmp, step_, ranks_, state_.contact_memory())
+    summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
   if (bodies_) movers_.push_back(bodies_.get());
   constraints_.walls().init();
@@ -356,7 +356,9 @@ void FixInelastic::advance(int vflag, Kick kick)
   std::vector<char> at_rest;    // one mark per particle
   if (rest_.decide(at_rest)) {
     const PhaseClock::Within solving(clock_, PhaseClock::SOLVE);
-    result.iterations += hold_still_.run(at_rest);
+    result.iterations += hold_still_.run(at_rest, [this] {
+      return constraints_.add_violated();
+    });
   }
   finish(result);
 }
@@ -385,6 +387,7 @@ inelastic::ProjectionResult FixInelastic::solve()
     unsolved_.begin_trial();
     length_.fit_to_list();
     predict();
+    rest_.compare_loads();
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
     constraints_.overlaps().share();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 using namespace LAMMPS_NS;
 
@@ -14,30 +15,61 @@ constexpr double CLOSED = 0.5;
 
 }    // namespace
 
-void GapRules::begin(Side &side, double force, int i, int j, const double *normal) const
+void GapRules::begin(Side &side, const ContactMemory::Entry &last, int i, int j,
+                     const double *normal) const
 {
   constexpr double PART_OF_LOAD = 0.1;
-  side.force = force;
+  side.force = last.force * load_change(i, j);
   const inelastic::ContactProblem &problem = step_.problem;
   const double *const v = problem.predicted_velocity.data();
   double opening = 0.0;
   for (int d = 0; d < 3; ++d) opening += normal[d] * (v[3 * i + d] - v[3 * j + d]);
-  const double load = step_.impulse_per_force * force * problem.mobility_of_pair(i, j, normal);
+  const double load = step_.impulse_per_force * side.force * problem.mobility_of_pair(i, j, normal);
   side.to_stop =
       std::max({PART_OF_LOAD * load, side.wall_motion - problem.timestep * opening, 0.0});
+  side.closed_gap = closed_gap(side, last.closed_gap);
 }
 
-// A gap under a force, and an overlap, count as closed where they are at most half a tolerance: positions are not
-// known better, and what they would give or take in a step would be velocities that nothing gives. Where that
-// adds up along a chain, or differs from step to step, a bed would never be quiet. Beyond it a gap closes, and an
-// overlap is given back little by little.
+// The factor by which the loads of both sides of a contact at rest have changed since the last step, walls and frozen
+// particles left out; 1 where they are not at rest, or have changed differently.
+double GapRules::load_change(int i, int j) const
+{
+  constexpr double SAME = 1.0e-9;    // round-off of forces
+  const inelastic::ContactProblem &problem = step_.problem;
+  if (step_.load_change.empty()) return 1.0;
+  const auto of = [this](int k) {
+    return step_.load_change[3 * static_cast<std::size_t>(k)];
+  };
+  if (problem.inverse_mass[i] == 0.0) std::swap(i, j);
+  const double change = of(i);
+  if (!(change > 0.0)) return 1.0;
+  if (j == problem.particles || problem.inverse_mass[j] == 0.0) return change;
+  return std::abs(of(j) - change) <= SAME * change ? change : 1.0;
+}
+
+// [length] A gap under a force is closed where it is, up to half a tolerance: positions are not known better, and
+// what they would give or take in a step would be velocities that nothing gives. Where that adds up along a chain,
+// or differs from step to step, a bed would never be quiet. Beyond it the gap closes, by no more than a small part of
+// what the contact has to stop: the force stays. When the force goes, the contact is still closed at that gap until
+// the two have parted: what lies on a contact that loses its force for a step does not fall.
+double GapRules::closed_gap(const Side &side, double last) const
+{
+  constexpr double CLOSING = 0.01;
+  const double tolerance = step_.settings.tolerance;
+  const double gap = std::max(0.0, side.gap_now);
+  if (side.force > 0.0 && gap <= tolerance)
+    return gap - std::clamp(gap - CLOSED * tolerance, 0.0, CLOSING * side.to_stop);
+  const bool parted = last == ContactMemory::NOT_CLOSED || gap > last + tolerance;
+  return parted ? ContactMemory::NOT_CLOSED : std::min(gap, last);
+}
+
+// [length] By how much a contact may close. An overlap of up to half a tolerance counts as closed, too; beyond it
+// it is given back little by little.
 double GapRules::contact_gap(const Side &side) const
 {
-  const double closed = CLOSED * step_.settings.tolerance;
   const double gap = side.gap_now;
   if (gap <= 0.0) return -given_back(side);
-  const bool under_force = side.force > 0.0 && gap <= step_.settings.tolerance;
-  return under_force ? std::max(0.0, gap - closed) : gap;
+  return gap - std::max(0.0, side.closed_gap);
 }
 
 // [length] What is given back in the step of an overlap. It begins smoothly, with the accuracy's part of what the

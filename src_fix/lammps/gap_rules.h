@@ -7,6 +7,8 @@
 #include "overlap_watch.h"
 #include "step.h"
 
+#include <vector>
+
 namespace LAMMPS_NS {
 
 class GapRules {
@@ -22,11 +24,12 @@ class GapRules {
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Side &side) const;
 
-  // Takes the force [force] that the last step left between particles i and j, and finds what the contact has to
-  // stop in this step: the length by which the two approach one another without contacts, or a tenth of that by
-  // which the force opens the gap, whichever is more. What a position error gives back in a step is at most the
-  // accuracy's part of it, so that it is no more than the errors of velocities.
-  void begin(Side &side, double force, int i, int j, const double *normal) const;
+  // Takes what is remembered of the contact of particles i and j, and finds the gap at which it is closed, and what
+  // it has to stop in this step: the length by which the two approach one another without contacts, or a tenth of
+  // that by which the force opens the gap, whichever is more. What a position error gives back in a
+  // step is at most the accuracy's part of it, so that it is no more than the errors of velocities.
+  void begin(Side &side, const ContactMemory::Entry &last, int i, int j,
+             const double *normal) const;
 
   // The gap [length] of the constraint, the wall's motion in it (contact_set.h).
   double asked_gap(const Side &side) const { return effective_gap(side) - side.wall_motion; }
@@ -62,6 +65,8 @@ class GapRules {
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
+  double load_change(int i, int j) const;
+  double closed_gap(const Side &side, double last) const;
   double contact_gap(const Side &side) const;
   double given_back(const Side &side) const;
   double gap_by_law(const Side &side, const LawContact &contact) const;

@@ -44,10 +44,39 @@ std::vector<char> HoldStill::with_ghosts(const std::vector<char> &stopped) const
   return all;
 }
 
-long HoldStill::run(const std::vector<char> &stopped)
+long HoldStill::run(const std::vector<char> &stopped, const std::function<long()> &add_violated)
+{
+  // What is stopped may be met by what was not to meet it, which may come to something else.
+  constexpr int MOST_ROUNDS = 20;
+  const std::vector<char> still = with_ghosts(stopped);
+  const std::vector<double> velocity = step_.velocity;
+  std::vector<double> &impulse = step_.problem.contacts.impulse;
+  std::vector<double> impulse_before = impulse;
+  long iterations = 0;
+  for (int round = 0; round < MOST_ROUNDS; ++round) {
+    const inelastic::SolverResult result = project(still);
+    iterations += result.iterations;
+    if (result.status != inelastic::Status::CONVERGED) break;
+    turn_bodies();
+    const std::size_t known = impulse.size();
+    if (add_violated() == 0) {
+      note_stop();
+      return iterations;
+    }
+    std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(known), impulse.end(), 0.0);
+  }
+  impulse_before.resize(impulse.size(), 0.0);
+  impulse = impulse_before;
+  step_.velocity = velocity;
+  turn_bodies();
+  return iterations;
+}
+
+// Projects the velocities of the step with the marked particles as obstacles; changes nothing if it does not
+// converge.
+inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
 {
   const inelastic::ContactProblem &problem = step_.problem;
-  const std::vector<char> still = with_ghosts(stopped);
   moving_.timestep = problem.timestep;
   moving_.resize(problem.particles);
   moving_.inverse_mass = problem.inverse_mass;
@@ -82,16 +111,27 @@ long HoldStill::run(const std::vector<char> &stopped)
   limits.tolerance = DEEPER * step_.settings.tolerance;
   limits.max_iterations = std::min(MOST_ITERATIONS, step_.settings.max_iterations);
   const inelastic::SolverResult result = solver_->solve(moving_, limits, ranks_);
-  if (result.status != inelastic::Status::CONVERGED) return result.iterations;
+  if (result.status != inelastic::Status::CONVERGED) return result;
   solver_->gap_operator().velocity_applied(moving_, step_.velocity.data());
   for (std::size_t k = 0; k < source.size(); ++k)
     step_.problem.contacts.impulse[source[k]] += contacts.impulse[k];
-  if (!bodies_) return result.iterations;
+  return result;
+}
+
+void HoldStill::turn_bodies()
+{
+  if (bodies_) bodies_->turn(step_.problem, step_.velocity, step_.motion_of_bodies);
+}
+
+// Bodies at rest are to have other velocities than the contact forces give them.
+void HoldStill::note_stop()
+{
+  if (!bodies_) return;
+  const inelastic::ContactProblem &problem = step_.problem;
   std::vector<double> by_contacts(step_.velocity.size());
   inelastic::GapOperator gap_operator;
   gap_operator.prepare(problem);
   gap_operator.velocity(problem, problem.contacts.impulse.data(), by_contacts.data(), ranks_);
   bodies_->note_stop(problem, by_contacts, step_.velocity);
-  bodies_->turn(problem, step_.velocity, step_.motion_of_bodies);
-  return result.iterations;
+  turn_bodies();
 }

@@ -7,6 +7,7 @@
 #include "solver.h"
 #include "step.h"
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -21,12 +22,16 @@ class HoldStill {
   HoldStill(Step &step, GhostExchange &ranks, RigidMotion *bodies);
 
   // Changes velocities and impulses of the step, which is solved. The marks are one per particle, those of ghosts
-  // are not read; of a body any marked member will do. Returns the number of iterations that it took. Where what
-  // moves finds no room nothing is changed. Collective.
-  long run(const std::vector<char> &stopped);
+  // are not read; of a body any marked member will do. `add_violated` adds constraints that the step's velocities
+  // violate, and returns how many all ranks added. Returns the number of iterations that it took. Where what moves
+  // finds no room nothing is changed. Collective.
+  long run(const std::vector<char> &stopped, const std::function<long()> &add_violated);
 
  private:
   std::vector<char> with_ghosts(const std::vector<char> &stopped) const;
+  inelastic::SolverResult project(const std::vector<char> &still);
+  void turn_bodies();
+  void note_stop();
 
   Step &step_;
   GhostExchange &ranks_;

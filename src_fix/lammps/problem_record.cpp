@@ -1,6 +1,5 @@
 #include "problem_record.h"
 
-#include "contact_memory.h"
 #include "ghost_exchange.h"
 #include "npz.h"
 #include "step.h"
@@ -18,9 +17,8 @@
 
 using namespace LAMMPS_NS;
 
-ProblemRecord::ProblemRecord(LAMMPS *lmp, const Step &step, GhostExchange &ranks,
-                             const ContactMemory &memory) :
-    Pointers(lmp), step_(step), ranks_(ranks), memory_(memory)
+ProblemRecord::ProblemRecord(LAMMPS *lmp, const Step &step, GhostExchange &ranks) :
+    Pointers(lmp), step_(step), ranks_(ranks)
 {
 }
 
@@ -132,8 +130,8 @@ ProblemRecord::Table ProblemRecord::contacts() const
          *out = set.impulse[c];
        }},
       {"impulse_guess", 1, Column::REAL,
-       [this, &set, partner](int c, double *out) {
-         *out = step_.impulse_per_force * memory_.find(set.first[c], partner(c));
+       [this, &sides](int c, double *out) {
+         *out = step_.impulse_per_force * sides[c].force;
        }},
   };
 }

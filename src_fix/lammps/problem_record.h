@@ -18,14 +18,12 @@ class NpzWriter;
 
 namespace LAMMPS_NS {
 
-class ContactMemory;
 class GhostExchange;
 struct Step;
 
 class ProblemRecord : protected Pointers {
  public:
-  ProblemRecord(class LAMMPS *lmp, const Step &step, GhostExchange &ranks,
-                const ContactMemory &memory);
+  ProblemRecord(class LAMMPS *lmp, const Step &step, GhostExchange &ranks);
 
   // Collective. Errors: the file cannot be written.
   void write(const inelastic::ProjectionResult &result) const;
@@ -53,7 +51,6 @@ class ProblemRecord : protected Pointers {
 
   const Step &step_;
   GhostExchange &ranks_;
-  const ContactMemory &memory_;
 };
 
 }    // namespace LAMMPS_NS

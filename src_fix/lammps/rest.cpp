@@ -66,6 +66,21 @@ Rest::Rest(LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state) :
 {
 }
 
+void Rest::compare_loads()
+{
+  step_.load_change.clear();
+  if (!any_stopped_) return;
+  const inelastic::ContactProblem &problem = step_.problem;
+  step_.load_change.assign(3 * static_cast<std::size_t>(problem.particles), 0.0);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const double before = step_.impulse_per_force * state_.load_at_rest(i);
+    if (before == 0.0) continue;
+    const std::size_t first = 3 * static_cast<std::size_t>(i);
+    step_.load_change[first] = norm(&problem.predicted_velocity[first]) / before;
+  }
+  ranks_.share_with_ghosts(step_.load_change.data());
+}
+
 bool Rest::look(const inelastic::ProjectionResult &result)
 {
   // What a shortened step, or one that pushes spheres apart, ends with is no rest. Uzawa starts every step from no
@@ -309,11 +324,12 @@ bool Rest::moves(const ClusterMotion &cluster) const
 
 bool Rest::decide(std::vector<char> &stopped)
 {
-  step_.at_rest = false;
+  step_.at_rest = any_stopped_ = false;
   if (!looks_) return false;
   stopped.assign(step_.problem.particles, 0);
   double maxima[2] = {0.0, 0.0};    // whether any is stopped, and whether any moves
   for (int i = 0; i < atom->nlocal; ++i) {
+    state_.load_at_rest(i) = 0.0;
     if (!counts(i)) continue;
     const ClusterMotion &cluster = motions_[clusters_.of(i)];
     const double steps = cluster.quiet_steps;
@@ -326,6 +342,9 @@ bool Rest::decide(std::vector<char> &stopped)
         (at_rest || (in_trial && step_.kick == Kick::WHOLE)) && goes_on && is_held(i, motion);
     if (stops) stopped[i] = 1;
     if (stops) maxima[0] = 1.0;
+    const double *const predicted =
+        &step_.problem.predicted_velocity[3 * static_cast<std::size_t>(i)];
+    if (stops) state_.load_at_rest(i) = norm(predicted) / step_.impulse_per_force;
     if (in_trial || (!stops && motion.speed > limit() * cluster.without_contacts)) maxima[1] = 1.0;
     // No time passes in the half kick with which a run starts.
     if (step_.kick == Kick::HALF) continue;
@@ -336,6 +355,7 @@ bool Rest::decide(std::vector<char> &stopped)
     if (own == PATIENCE + TRIAL && moves(cluster)) own = -PAUSE;
   }
   ranks_.reduce(nullptr, 0, maxima, 2);
-  step_.at_rest = maxima[0] > 0.0 && maxima[1] == 0.0;
-  return maxima[0] > 0.0;
+  any_stopped_ = maxima[0] > 0.0;
+  step_.at_rest = any_stopped_ && maxima[1] == 0.0;
+  return any_stopped_;
 }

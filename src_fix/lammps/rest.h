@@ -15,7 +15,8 @@
 //
 // After some quiet steps, those of most of its particles, the held particles are stopped, and some steps are solved more accurately. If nothing held
 // then moves, the forces balance and the cluster is at rest; if not it goes on, and is looked at again later. A
-// cluster at rest in which something would move is solved more accurately, too, before it is let go.
+// cluster at rest in which something would move is solved more accurately, too, before it is let go. Where the loads
+// of a cluster at rest all change by one factor, its contact forces do.
 
 #ifndef INELASTIC_REST_H
 #define INELASTIC_REST_H
@@ -37,6 +38,9 @@ class GhostExchange;
 class Rest : protected Pointers {
  public:
   Rest(class LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state);
+
+  // Looks at a step that is predicted: finds by what factors the loads of particles at rest have changed. Collective.
+  void compare_loads();
 
   // Looks at a step that is solved. Returns whether it is to be solved once more, with refined contacts, which are
   // marked in the problem; it is then looked at again. Collective.
@@ -92,7 +96,8 @@ class Rest : protected Pointers {
   std::vector<double>
       resistance_;    // 3 per particle: the sum of lambda (n . v)^2, the number of gaps to close, and nothing
   std::vector<ClusterMotion> motions_;
-  bool looks_ = false;    // in this step
+  bool looks_ = false;          // in this step
+  bool any_stopped_ = false;    // in the last step, on any rank
 };
 
 }    // namespace LAMMPS_NS

@@ -38,11 +38,12 @@ constexpr double EXTREME = 1.0e300;
 
 // The row beside each constraint of the problem.
 struct Side {
-  int wall;                   // the wall's number; 0 = the second side is a particle
-  double gap_now;             // [length] at the present positions
-  double size;                // [length] the sum of the two radii; the radius at a wall
-  double wall_motion;         // [length] by how much the wall closes the gap during the step
-  double force = 0.0;         // [force] that the last step left
+  int wall;              // the wall's number; 0 = the second side is a particle
+  double gap_now;        // [length] at the present positions
+  double size;           // [length] the sum of the two radii; the radius at a wall
+  double wall_motion;    // [length] by how much the wall closes the gap during the step
+  double force = 0.0;    // [force] that the last step left
+  double closed_gap = ContactMemory::NOT_CLOSED;    // [length] see contact_memory.h
   double to_stop = 0.0;       // [length] what the contact has to stop (gap_rules.h)
   bool as_at_start = true;    // the constraint asks for what it asked for at the start of the step
   bool followed = false;      // the gap was set by where an earlier solution of the step ends
@@ -84,6 +85,10 @@ struct Step {
   std::vector<double> velocity;    // 3 per particle, the projection
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
+
+  // 3 per particle, of which the first is the factor by which the forces on one that is at rest have changed since
+  // the last step; 0 where this is not known. Empty if nothing is at rest.
+  std::vector<double> load_change;
 
   // This is known after constraints were collected.
   Phase phase = Phase::CONTACT;

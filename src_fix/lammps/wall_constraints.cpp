@@ -232,6 +232,7 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   side.followed = step_.is_member(i);
   if (known) side.gap_now = step_.sides[existing->second].gap_now;
   if (known) side.force = step_.sides[existing->second].force;
+  if (known) side.closed_gap = step_.sides[existing->second].closed_gap;
   if (known) side.to_stop = step_.sides[existing->second].to_stop;
   if (known) side.law_contact = step_.sides[existing->second].law_contact;
   rules_.overlaps().note(side.gap_now, i, -view.wall);

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tests.fix.bodies import Bodies, body_scene
+from tests.fix.bodies import Bodies, body_scene, dimer, random_bodies
 from tests.fix.lammps_run import Run, run_lmp
-from tests.fix.scenes import GRAVITY, FloatArray, mass, read_dump, scene
+from tests.fix.scenes import GRAVITY, FloatArray, mass, random_points, read_dump, scene
 
 RADIUS = 0.5
 MASS = float(mass(RADIUS))
@@ -218,3 +218,61 @@ def assert_nothing_leaps(
     # Of the velocity that the load would give in a step, a hundredth of the accuracy.
     assert speed[since:].max() <= max(0.1, 1e-5 * weights)
     assert speed[later].max() <= 0.1
+
+
+# Of beds: the tolerance, and the number of steps after which they rest.
+BED_TOLERANCE = 1e-3
+SETTLING = 6000
+FASTEST = """
+variable speed atom sqrt(vx^2+vy^2+vz^2)
+compute fastest all reduce max v_speed
+"""
+
+
+def bed_box(side: float = 7.0) -> tuple[tuple[float, float], ...]:
+    """Return the box of a bed, whose walls are its region `container`."""
+    return ((0.0, side), (0.0, 40.0), (0.0, side))
+
+
+def settling_bed(
+    kind: str,
+    folder: Path,
+    changes: str = "1",
+    *,
+    number: int = 500,
+    side: float = 7.0,
+    loaded_after: int = 0,
+    accuracy: float = 1e-3,
+) -> str:
+    """Return a deck in which a bed settles, up to the end of a run after which it rests.
+
+    `kind`: so many "spheres", or half as many "dimers" of aspect ratio 1.5. Gravity is multiplied
+    by `changes`, a formula of v_s, which counts steps from `loaded_after` steps later on.
+    """
+    box = bed_box(side)
+    bodies = None
+    if kind == "spheres":
+        inside = tuple((low + RADIUS, high - RADIUS) for low, high in box)
+        points = random_points(number, inside, 2 * RADIUS, seed=1)
+    else:
+        inside = tuple((low + 2 * RADIUS, high - 2 * RADIUS) for low, high in box)
+        placed = random_bodies([dimer(1.5)] * (number // 2), RADIUS, inside, seed=1)
+        points, bodies = placed.positions, placed.molecules
+    deck = spheres_of(
+        points,
+        folder,
+        bodies=bodies,
+        tolerance=BED_TOLERANCE,
+        timestep=0.02,
+        skin=0.5,
+        box=box,
+        setup="",
+        options=f"region container shorten yes accuracy {accuracy:g}",
+        gravity=False,
+        fixes=f"variable s equal step-{SETTLING + loaded_after}\n{FASTEST}"
+        f"variable load equal {changes}\nvariable g equal {GRAVITY}*v_load\n"
+        "fix gravity all gravity v_g vector 0 -1 0\n",
+        thermo="step f_contact[1] v_load c_fastest f_contact[13]",
+    )
+    drag = f"fix drag all viscous {MASS:.17g}\nfix contact all"
+    return deck.replace("fix contact all", drag) + f"thermo 1000\nrun {SETTLING}\n"

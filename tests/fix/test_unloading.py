@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.fix.exact_scenes import UNLOADING, Column, assert_nothing_leaps
+from tests.fix.exact_scenes import UNLOADING, Column, assert_nothing_leaps, settling_bed
+from tests.fix.lammps_run import run_lmp
 from tests.fix.scenes import GRAVITY
 
 
@@ -23,3 +24,21 @@ def test_a_column_that_was_pressed(
     thermo = column.run(tmp_path).thermo
     speed = thermo["c_fastest"] / (GRAVITY * column.timestep)
     assert_nothing_leaps(thermo["v_load"], speed, weights)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("kind", ["spheres", "dimers"])
+def test_a_bed_at_rest_rests_on(kind: str, ranks: int, tmp_path: Path) -> None:
+    """With steps in which gravity adds a hundredth of the tolerance, and 40 times the gravity.
+
+    It came to rest with steps of four tolerances. Nothing falls through a gap that a contact has
+    had all along, though it loses its force for a step; scaled forces balance in the same places.
+    """
+    step, rested = 0.001, 50
+    changes = f"1+39*(v_s>=0)*(v_s<{rested})"
+    deck = settling_bed(kind, tmp_path, changes, number=100, side=4.0, loaded_after=rested)
+    deck += f"unfix drag\ntimestep {step}\nthermo 1\nrun {3 * rested}\n"
+    thermo = run_lmp(tmp_path, deck, ranks).thermo
+    assert (thermo["f_contact[13]"] == 1.0)[-rested:].all()
+    # 0.1 g h is what a bed that gives way exceeds at once; 1e-5 of the load is a hundredth of A.
+    assert (thermo["c_fastest"] <= 0.1 * GRAVITY * step).all()
