@@ -14,18 +14,24 @@ namespace {
   // In a bed of many contacts residuals make velocities of some hundred times their size, in a chain of n up to n
   // times (which accelerated_gradient.h looks at).
   constexpr double IN_NETWORKS = 1.0 / 16.0;
+  // Bodies turn, too: the softest motions of their networks are softer.
+  constexpr double OF_BODIES = 1.0 / 32.0;
   // Of what a contact carries, where that changes no velocity.
   constexpr double PART_OF_LOAD = 2.0e-5;
   // Gaps are known to a few units of round-off of what they are added up from.
   constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();
 
+  bool is_member(const ContactProblem &problem, int i)
+  {
+    const RigidBodies &bodies = problem.bodies;
+    return !bodies.empty() && i != problem.particles && bodies.body[i] >= 0;
+  }
+
   // The particle that stands for all those that move together with this one.
   int mover(const ContactProblem &problem, int i)
   {
     const RigidBodies &bodies = problem.bodies;
-    return bodies.empty() || i == problem.particles || bodies.body[i] < 0
-        ? i
-        : bodies.member[bodies.start[bodies.body[i]]];
+    return is_member(problem, i) ? bodies.member[bodies.start[bodies.body[i]]] : i;
   }
 
 }    // namespace
@@ -69,7 +75,10 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
         problem.timestep * norm(v + 3 * static_cast<std::size_t>(i));
   };
   for (std::size_t c = 0; c < count; ++c) {
-    part_[c] = IN_NETWORKS * limits.accuracy * limits.coarseness * contacts.refinement[c];
+    const bool of_bodies = is_member(problem, contacts.first[c]) ||
+        is_member(problem, contacts.second[c]);
+    part_[c] = (of_bodies ? OF_BODIES : IN_NETWORKS) * limits.accuracy * limits.coarseness *
+        contacts.refinement[c];
     const double length = std::abs(gap_operator.free_gap()[c]) + length_of(contacts.first[c]) +
         length_of(contacts.second[c]);
     least_[c] = std::max({ROUND_OFF * length, limits.least_length,
