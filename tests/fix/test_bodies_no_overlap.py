@@ -163,10 +163,11 @@ def test_fall_impact_and_rest(
 def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
     """Steps that are too long, and may not be shortened.
 
-    (With a time step of 0.03 bodies spin by ten radians in a step, and in one scene of ten the gaps
-    at its end are not to be had together, which is an error.)
+    Bodies may spin by ten radians in a step, and the gaps at its end are then not always to be had
+    together, which is an error that says so.
     """
     largest = 0.0
+    unsolved = 0
     for seed, mixture in itertools.product((11, 12), ("dimers-1.5", "dimers-2", "rods", "mixture")):
         folder = tmp_path / f"{mixture}-{seed}"
         deck = pour(
@@ -177,9 +178,14 @@ def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
             folder,
             fixes="fix drag all viscous 0.004",
             skin=8,
-            timestep=0.028,
+            timestep=0.04,
         )
-        result = lmp(deck + DUMP_BODY_SPHERES + "run 40\n", into=folder.name)
+        run = deck + DUMP_BODY_SPHERES + "run 40\n"
+        result = lmp(run, into=folder.name, must_pass=False)
+        if result.errors:
+            assert "Bodies spin by up to" in result.errors[0]
+            unsolved += 1
+            continue
         overlap = np.maximum(*overlaps(folder, "block"))
         assert result.thermo["f_contact[4]"] == pytest.approx(overlap, abs=1e-6 * EPS)
         regular = overlap[:-1] <= 2 * EPS * SLACK
@@ -198,6 +204,7 @@ def test_what_is_left_is_said(tmp_path: Path, lmp: Runner) -> None:
         deeper = overlap[1:] - np.maximum(overlap[:-1], 2 * EPS * SLACK)
         assert mixture == "rods" or deeper[~regular].max(initial=0) <= 0, mixture
     assert largest > EPS
+    assert unsolved <= 1
 
 
 @pytest.mark.parametrize("inertia", INERTIAS)

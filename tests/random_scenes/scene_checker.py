@@ -668,6 +668,10 @@ class _Part:
             wanted = np.where(held[:, None], 0.0, listed["total"])
             # Of what is at rest the velocity is taken away, which no contact force does.
             alike = np.linalg.norm(after, axis=1) > 10 * ROUND_OFF * sizes
+            if new.bodies is not None:
+                resting = self.resting(new)
+                for row, mine, _ in self.members(new):
+                    alike[mine] &= not resting[row]
             if self.has_pushed and new.bodies is not None:
                 # What a push has left in bodies in a line is still being taken away.
                 for _, mine, arm in self.members(new):
@@ -810,6 +814,9 @@ class _Part:
             kept_v[row] += kick * acting[mine].sum(axis=0) / new.bodies["mass"][row]
             kept_l[row] += kick * np.cross(arm, acting[mine]).sum(axis=0)
             lengths[row] = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
+        # Of what is at rest the momentum is taken away.
+        resting = self.resting(new)
+        kept_v[resting], kept_l[resting] = new.body_v[resting], new.body_l[resting]
         was_pushed = last is not None and not last.settled
         # The last step of a run takes the push out of the whole-step velocity, not out of this one.
         if settled and self.push_unknown:
@@ -856,6 +863,19 @@ class _Part:
             kept_v = new.body_v
             kept_l = np.where(in_line[:, None], kept_l, new.body_l)
         new.kept_v, new.kept_l, new.settled = kept_v, kept_l, settled
+
+    def resting(self, frame: _Frame) -> Array:
+        """(bodies,) Whether a body has no velocity in the step, beside the forces on all."""
+        assert frame.bodies is not None
+        half = 0.5 * frame.h * self.to_v
+        mass, v = frame.bodies["mass"], frame.bodies["vx vy vz"]
+        size = np.linalg.norm(v, axis=1) + half * self.to_strength(frame, frame.force) / mass
+        after = v.copy()
+        for row, mine, _ in self.members(frame):
+            after[row] += half * frame.force[mine].sum(axis=0) / mass[row]
+        # Sums of the forces on some spheres, and velocities that came from those of others.
+        slack = 10 * ROUND_OFF * (10 * size + self.fastest) + 0.01 * ROUND_OFF * size.max(initial=0)
+        return np.asarray(np.linalg.norm(after, axis=1) <= slack)
 
     def is_in_line(self, arm: Array) -> bool:
         """Whether a body's spheres lie on a line, about which no force on them turns it."""
