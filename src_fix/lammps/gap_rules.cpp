@@ -59,7 +59,9 @@ double GapRules::closed_gap(const Side &side, double last) const
   const double gap = std::max(0.0, side.gap_now);
   if (side.force > 0.0 && gap <= tolerance)
     return gap - std::clamp(gap - CLOSED * tolerance, 0.0, CLOSING * side.to_stop);
-  const bool parted = last == ContactMemory::NOT_CLOSED || gap > last + tolerance;
+  // The tolerance may have been lowered.
+  const bool parted = last == ContactMemory::NOT_CLOSED || last > tolerance ||
+      gap > last + tolerance;
   return parted ? ContactMemory::NOT_CLOSED : std::min(gap, last);
 }
 
