@@ -15,7 +15,7 @@ from .coordination import contact_counts
 from .errors import InputError
 from .geometry import FloatArray, IntArray, as_box, as_floats, as_integers, particles_inside
 from .packing import packing_fraction
-from .particles import ParticleFrame
+from .particles import ParticleFrame, check_not_periodic
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,7 +101,8 @@ def measure_evolution(
     packing : measures the packing fraction; None: `monte_carlo()`
     up : axis against gravity, 0 to 2 for x to z
 
-    Raises InputError without any frame, for another axis, and for a box of another shape.
+    Raises InputError without any frame, for one whose box is periodic, for another axis, and for a
+    box of another shape.
     """
     bounds = as_box(box)
     if up not in (0, 1, 2):
@@ -112,6 +113,7 @@ def measure_evolution(
     known = iter(contacts)
     current = next(known, None)
     for frame in frames:
+        check_not_periodic(frame)
         current = _not_before(frame.step, current, known)
         mass = frame.radii**3
         mass /= mass.sum()

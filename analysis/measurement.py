@@ -13,7 +13,7 @@ from .geometry import BoolArray, FloatArray, as_box, particles_inside
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import MeasuredPackingFraction, measure_packing_fraction
-from .particles import ParticleFrame
+from .particles import ParticleFrame, check_not_periodic
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +64,10 @@ def measure_packing(
     seed : seed of these points, not negative
     walls : (3, 2), box whose faces are walls, length; None where the walls are not known
 
-    Nothing is periodic. Raises InputError for boxes or counts of other shapes, and for points or a
-    seed that are no whole numbers or too small.
+    Raises InputError for a frame whose box is periodic, for boxes or counts of other shapes, and
+    for points or a seed that are no whole numbers or too small.
     """
+    check_not_periodic(frame)
     bounds, particles = as_box(box), frame.particles
     in_box = particles_inside(particles.centres(frame.positions), bounds)
     spheres = frame.positions, frame.radii

@@ -260,22 +260,28 @@ def read_particle_frame(
 
 def check_not_periodic(
     frame: ParticleFrame,
-    path: str | PathLike[str],
-    lacking: str = "overlaps across its faces are not looked for yet",
+    path: str | PathLike[str] | None = None,
+    lacking: str = "contacts and overlaps across its faces are not looked for yet",
 ) -> None:
     """See that the box of a frame has no periodic face: nothing here looks across one.
 
     Parameters
     ----------
     frame : frame of a particle dump
-    path : of the dump, for the error
+    path : of the dump, for the error; None where it is not known
     lacking : what would be wrong, for the error
 
-    Raises DumpError for a box that is periodic along any axis.
+    Raises DumpError for a box that is periodic along any axis, InputError without a path.
     """
-    if any("p" in flags for flags in frame.boundaries):
-        said = f"the box is periodic ({' '.join(frame.boundaries)}), and {lacking}"
-        raise DumpError(path, said)
+    if not any("p" in flags for flags in frame.boundaries):
+        return
+    said = (
+        f"the box is periodic ({' '.join(frame.boundaries)}), and {lacking}: "
+        "all boundaries must be f, s or m"
+    )
+    if path is None:
+        raise InputError(f"frame of step {frame.step}: {said}")
+    raise DumpError(path, said)
 
 
 def _side_by_side(data: dict[str, FloatArray], names: Sequence[str]) -> FloatArray:

@@ -46,6 +46,9 @@ IMAGES = ("tiff", "raw")
 VOXELS_PER_RADIUS = 10
 SUBDIVISIONS = 2
 
+# Why surfaces and images are not made of a periodic box; points know their box, or need none.
+NOT_ACROSS = "spheres that reach through its faces are not drawn on the other side yet"
+
 # So many steps are named where one is not found.
 STEPS_SHOWN = 6
 # A line is printed after each of so many equal parts where there is no terminal.
@@ -132,6 +135,7 @@ def write_spheres(
     positions, radii = frame.positions[chosen], frame.radii[chosen]
     rows = [("spheres", f"{len(radii)} of {len(chosen)}, step {frame.step}")]
     if form == "stl":
+        check_not_periodic(frame, path, NOT_ACROSS)
         divided = SUBDIVISIONS if subdivisions is None else subdivisions
         faces = write_stl(out, positions, radii, subdivisions=divided)
         return [*rows, ("faces", f"{faces}"), _as_file("file", out)]
@@ -225,8 +229,7 @@ def write_image(
     box : (3, 2), box of the image, length; None for the dump's
     voxel : edge of a voxel, length; None for a tenth of the smallest radius
     """
-    lacking = "spheres that reach through its faces are not drawn on the other side yet"
-    check_not_periodic(frame, path, lacking)
+    check_not_periodic(frame, path, NOT_ACROSS)
     bounds = frame.box if box is None else box
     if not spheres_reaching(frame.positions, frame.radii, bounds).any():
         raise AnalysisError(f"{path}: no sphere reaches into the box at step {frame.step}")

@@ -230,11 +230,16 @@ def test_what_is_no_file(run: Path, name: str, capsys: pytest.CaptureFixture[str
     assert said in failure_of([str(run), "--format", "xyz"], capsys)
 
 
-def test_image_of_a_periodic_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("form", ["raw", "tiff", "stl"])
+def test_no_solid_of_a_periodic_box(
+    form: str, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Images and surfaces would lack what reaches through its faces."""
     path = run / "particles.lammpsdump"
     path.write_text(path.read_text().replace("ff ff ff", "pp ff ff"))
-    message = failure_of([str(run), "--format", "raw"], capsys)
+    message = failure_of([str(run), "--format", form], capsys)
     assert "the box is periodic (pp ff ff)" in message
+    assert "f, s or m" in message
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,17 @@ FREE = analysis.group_spheres([0])
 TEN = np.full(10, 0.5)
 NOISE = analysis.RadialDistribution(np.array([0.0, 1.0]), np.array([1.0]), 1.0, 1)
 NAN = math.nan
+PERIODIC = analysis.ParticleFrame(
+    step=3,
+    ids=np.array([1]),
+    positions=np.array(ONE[0]),
+    velocities=None,
+    radii=np.array(ONE[1]),
+    bodies=None,
+    box=np.array(BOX, dtype=float),
+    boundaries=("ff", "pp", "ff"),
+)
+ACROSS = "frame of step 3: the box is periodic (ff pp ff), and contacts and overlaps across"
 
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
@@ -54,6 +65,8 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: analysis.wall_profile(*ONE, wall="xlo", thickness=1e-300),
         "slabs of 1e-300 are more than 1000000 in the box",
     ),
+    "a packing in a periodic box": (lambda: analysis.measure_packing(PERIODIC, (), BOX), ACROSS),
+    "frames of a periodic box": (lambda: analysis.measure_evolution([PERIODIC], BOX), ACROSS),
     "words": (lambda: analysis.packing_fraction([["a", "b", "c"]], [1], BOX), "positions must be"),
     "rows": (lambda: analysis.packing_fraction([[1, 2, 3], [4]], [1], BOX), "an array of numbers"),
     "parts of a contact": (
