@@ -1,5 +1,6 @@
 """From a run's dumps to numbers: arrays in, arrays or small frozen dataclasses out."""
 
+from .bed import BoxInBed, box_in_bed
 from .bodies import Particles, group_spheres
 from .contacts import ContactFrame, iterate_contact_frames
 from .coordination import (
@@ -79,6 +80,7 @@ __all__ = [
     "AnalysisError",
     "Backbone",
     "BondOrder",
+    "BoxInBed",
     "ContactCounts",
     "ContactFrame",
     "CoordinationNumber",
@@ -116,6 +118,7 @@ __all__ = [
     "best_packing_fraction",
     "binned_exponent",
     "bond_order",
+    "box_in_bed",
     "check_contacts",
     "check_not_periodic",
     "contact_counts",

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+from .bed import BoxInBed, box_in_bed
 from .bodies import Particles
 from .coordination import ContactCounts, CoordinationNumber, coordination_number
 from .geometry import BoolArray, FloatArray, as_box, particles_inside
@@ -23,6 +25,8 @@ class PackingMeasurement:
     Attributes
     ----------
     in_box : (p,) of bool, whether a particle's centre lies in the box
+    bed : how much of the box lies inside the bed; where not all of it does, every number of the box
+        is partly one of empty space
     packing_fraction : packing fraction in the box
     coordination : contacts with other particles of the particles in the box, over all contact
         frames; None where there is no such particle or no contact frame
@@ -35,6 +39,7 @@ class PackingMeasurement:
     """
 
     in_box: BoolArray
+    bed: BoxInBed
     packing_fraction: MeasuredPackingFraction
     coordination: CoordinationNumber | None
     neighbours: CoordinationNumber | None
@@ -78,6 +83,7 @@ def measure_packing(
 
     return PackingMeasurement(
         in_box=in_box,
+        bed=box_in_bed(*spheres, bounds, _faces(frame) if walls is None else walls),
         packing_fraction=measure_packing_fraction(
             *spheres, bounds, particles, points=points, seed=seed
         ),
@@ -88,6 +94,12 @@ def measure_packing(
         pair_overlap=largest_pair_overlap(*spheres, frame.bodies),
         wall_overlap=None if walls is None else largest_wall_overlap(*spheres, walls),
     )
+
+
+def _faces(frame: ParticleFrame) -> FloatArray:
+    """Return the faces of a frame's box that are fixed, (3, 2), length; infinite for the others."""
+    fixed = np.array([[flag == "f" for flag in flags] for flags in frame.boundaries])
+    return np.where(fixed, frame.box, [-np.inf, np.inf])
 
 
 def _orientation(

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from lammps_inelastic.analysis import CoordinationNumber, Orientation, ParticleFrame
+from lammps_inelastic.analysis import BoxInBed, CoordinationNumber, Orientation, ParticleFrame
 
 from .look import Look, as_ranges
 
@@ -42,19 +42,33 @@ def as_text(found: Look) -> str:
             *lines,
             "",
             f"{'box':<{left}}  {as_ranges(found.box)}",
+            f"{'  ends of the bed':<{left}}  {as_ranges(found.packing.bed.bed)}",
+            f"{'  in the bed':<{left}}  {_part_in_bed(found.packing.bed)}",
             f"{'r':<{left}}  {found.smallest_radius:.6g}, the smallest radius",
             *(f"{name:<{left}}  {path}" for name, path in files),
         ]
     )
 
 
+def _part_in_bed(bed: BoxInBed) -> str:
+    """Say how much of the box lies in the bed, and with which --box all of it would."""
+    if bed.is_inside:
+        return "all of the box"
+    if bed.inside is None:
+        return "no part of the box"
+    inside = " ".join(f"{bound:g}" for bound in bed.inside.ravel())
+    return f"{bed.share:.0%} of the box, --box {inside}"
+
+
 def _packing_row(found: Look) -> Row:
     measured = found.packing.packing_fraction
     by_points = f"{measured.drawn.value:.4f} ± {measured.drawn.uncertainty:.4f}"
     points = f"{measured.drawn.points:,} random points, seed {found.seed}"
+    bed = found.packing.bed
+    note = "" if bed.is_inside else f"PARTLY OF EMPTY SPACE: the bed ends at {bed.ends}; "
     if measured.exact is None:
-        return ("packing fraction", by_points, points)
-    return ("packing fraction", f"{measured.value:.4f}", f"exact; {by_points} by {points}")
+        return ("packing fraction", by_points, note + points)
+    return ("packing fraction", f"{measured.value:.4f}", f"{note}exact; {by_points} by {points}")
 
 
 def _coordination_rows(found: Look) -> list[Row]:
@@ -138,6 +152,7 @@ def as_json(found: Look) -> str:
         "particles": len(found.frame.particles),
         "smallest_radius": found.smallest_radius,
         "box": found.box.tolist(),
+        "bed": _bed_report(found.packing.bed),
         "packing_fraction": _packing_report(found),
         "coordination_number": _coordination_report(found),
         **_overlaps_report(found),
@@ -150,6 +165,14 @@ def as_json(found: Look) -> str:
     if found.frame.particles.composite:
         report |= _bodies_report(found)
     return json.dumps(report, indent=2, allow_nan=False)
+
+
+def _bed_report(bed: BoxInBed) -> dict[str, Any]:
+    return {
+        "ends": bed.bed.tolist(),
+        "share_of_box": bed.share,
+        "box_inside": None if bed.inside is None else bed.inside.tolist(),
+    }
 
 
 def _packing_report(found: Look) -> dict[str, Any]:

@@ -111,6 +111,26 @@ def test_text_and_picture(run: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert (run / "packing.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_box_that_reaches_out_of_the_bed_is_said(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The crystal's outermost centres are at y = 0.9: above, the box measures empty space."""
+    box = ["--box", "0.2", "0.8", "0.2", "1.2", "0.2", "0.8"]
+    assert main(["look", str(run), *box, "--no-picture"]) == 0
+    output = capsys.readouterr().out
+    assert "PARTLY OF EMPTY SPACE: the bed ends at y = 0.9; exact" in output
+    assert "  ends of the bed    x 0 to 1, y 0 to 0.9, z 0 to 1\n" in output
+    assert "  in the bed         70% of the box, --box 0.2 0.8 0.2 0.9 0.2 0.8\n" in output
+    assert main(["look", str(run), *box, "--no-picture", "--json"]) == 0
+    bed = json.loads(capsys.readouterr().out)["bed"]
+    # Differences of coordinates near 1, in float64.
+    assert bed["share_of_box"] == pytest.approx(0.7, abs=1e-12)
+    assert main(["look", str(run), *BOX, "--no-picture"]) == 0
+    output = capsys.readouterr().out
+    assert "  in the bed         all of the box\n" in output
+    assert "EMPTY" not in output
+
+
 def test_packing_fraction_is_the_one_of_studies(
     dimers: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
