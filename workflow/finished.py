@@ -34,6 +34,9 @@ LOG = "log.lammps"
 MEASURED_BY = "measured by"
 # So begins a line of the measuring process about a number that a result lacks.
 NOT_MEASURED = "not measured: "
+# And so one about a box that reaches out of the bed.
+OUT_OF_BED = "out of the bed: "
+REMARKS = (NOT_MEASURED, OUT_OF_BED)
 # These files of a finished run are read.
 FILES = (LOG, PARTICLES, CONTACTS)
 # A JSON file holds the texts of the decks, and is not larger than this [bytes].

@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any
 
 from .errors import StudyError, WorkflowError
-from .finished import NOT_MEASURED
+from .finished import REMARKS
 from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record
@@ -182,7 +182,7 @@ class _Job:
         if self._measuring:
             lines = last_lines(self._folder.case(self._case) / MEASURED)
             if code == 0 and self._folder.is_measured(self._study, self._case):
-                show_lacking(name, lines, display)
+                show_remarks(name, lines, display)
                 if self._study.outputs.keep == "results":
                     self._folder.drop_dumps(self._case)
                 outcome.measured.append(name)
@@ -303,13 +303,13 @@ def measured_too_long(limit: float) -> str:
 
 def failure_in(lines: Sequence[str]) -> str:
     """Return the line in which the measuring process says what went wrong; empty if none does."""
-    return next((line for line in reversed(lines) if not line.startswith(NOT_MEASURED)), "")
+    return next((line for line in reversed(lines) if not line.startswith(REMARKS)), "")
 
 
-def show_lacking(case: str, lines: Iterable[str], display: Display) -> None:
-    """Show those lines of the measuring process in which it says what a result lacks."""
+def show_remarks(case: str, lines: Iterable[str], display: Display) -> None:
+    """Show those lines of the measuring process in which it says what to know of a result."""
     for line in lines:
-        if line.startswith(NOT_MEASURED):
+        if line.startswith(REMARKS):
             display.say(f"{line}: {case}")
 
 
@@ -333,7 +333,7 @@ def measure_finished(
     )
     lines = done.stderr.splitlines()
     if done.returncode == 0 and folder.is_measured(study, case):
-        show_lacking(case.name, lines, display)
+        show_remarks(case.name, lines, display)
         if study.outputs.keep == "results":
             folder.drop_dumps(case)
         return None

@@ -3,8 +3,8 @@
     python -m lammps_inelastic.workflow.measure FOLDER TARGET OUTPUTS
 
 writes TARGET, an HDF5 file; OUTPUTS is JSON. It prints a line for each number that the packing does
-not have, and nothing else. It is a process of its own, so that it can be killed, and leaves no
-memory in use.
+not have and for a box that reaches out of it, and nothing else. It is a process of its own, so that
+it can be killed, and leaves no memory in use.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import (
     AnalysisError,
+    BoxInBed,
     ContactCounts,
     ContactFrame,
     Orientation,
@@ -61,6 +62,7 @@ from .finished import (
     LOG,
     MEASURED_BY,
     NOT_MEASURED,
+    OUT_OF_BED,
     PARTICLES,
     check_stage,
 )
@@ -94,9 +96,10 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
     result: Result | None = None
     for stage in record["stages"]:
         files, log = _open(folder, record, stage)
-        values = _measure(files, log, stage, outputs)
+        is_last = stage is record["stages"][-1]
+        values = _measure(files, log, stage, outputs, is_last=is_last)
         pictures: dict[str, bytes] = {}
-        if stage is record["stages"][-1]:
+        if is_last:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
             pictures = pictures_of(files.particles, _last_contacts(files, stage, outputs), outputs)
         result = Result(values, pictures, measured, outputs.measured, before=result)
@@ -117,7 +120,9 @@ def _open(
     return files, log
 
 
-def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Outputs) -> Values:
+def _measure(
+    files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Outputs, *, is_last: bool
+) -> Values:
     """Measure what a study asks for of a stage; return arrays by the names in the schema."""
     dump = files.particles
     frame = dump[-1]
@@ -132,6 +137,7 @@ def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Ou
         "particles": len(particles),
         "spheres": len(frame.ids),
         "particles_in_box": int(in_box.sum()),
+        "box_in_bed": packing.bed.share,
         **_packing_fractions(packing, frame, box, outputs.points),
         **_effort(log, smallest),
     }
@@ -143,7 +149,12 @@ def _measure(files: RunFiles, log: RunLog, stage: Mapping[str, Any], outputs: Ou
     resolution = _resolution(stage, float(frame.radii.max()))
     if resolution is not None:
         numbers["resolution"] = resolution
-    values: Values = {}
+    values: Values = {"bed/ends": packing.bed.bed}
+    if packing.bed.inside is not None:
+        values["bed/box"] = packing.bed.inside
+    # A deck before the last one may leave a cloud, which has no ends.
+    if is_last and not packing.bed.is_inside:
+        _say_out_of_bed(packing.bed)
     if in_box.any():
         numbers |= _contact_numbers(packing, contacts, values)
         numbers |= _orientation(packing.orientation)
@@ -342,6 +353,17 @@ def _structure(
         "q6": float(order.q6.mean()),
         "crystalline": order.crystalline_share,
     }
+
+
+def _say_out_of_bed(bed: BoxInBed) -> None:
+    """Say where the bed ends and which box lies inside, as `_say_not_measured` does."""
+    if bed.inside is None:
+        inside = "no part of it is inside"
+    else:
+        bounds = ", ".join(f"{bound:g}" for bound in bed.inside.ravel())
+        inside = f"[{bounds}] is inside"
+    said = f"the bed ends at {bed.ends}, the numbers of the box are partly of empty space; {inside}"
+    print(f"{OUT_OF_BED}{said}", file=sys.stderr)
 
 
 def _say_not_measured(what: str, why: str) -> None:

@@ -36,6 +36,9 @@ SCHEMA: Mapping[str, Entry] = {
     "numbers/particles": _number("1", "bodies and free spheres"),
     "numbers/spheres": _number("1", "spheres, those of bodies included"),
     "numbers/particles_in_box": _number("1", "particles whose centre lies in the measuring box"),
+    "numbers/box_in_bed": _number(
+        "1", "share of the measuring box inside the bed; below 1 its numbers are of empty space too"
+    ),
     "numbers/packing_fraction": _number(
         "1", "in the measuring box: exact for spheres and dimers, else by Monte Carlo"
     ),
@@ -124,6 +127,8 @@ SCHEMA: Mapping[str, Entry] = {
     "numbers/drift": _number(
         "diameters/time", "settling: speed of the centre of mass over the last 0.25 time units"
     ),
+    "bed/ends": Entry("(3, 2)", "length", "where the bed ends around the measuring box, per axis"),
+    "bed/box": Entry("(3, 2)", "length", "part of the measuring box that lies inside the bed"),
     "distribution/contacts": Entry("(k,)", "1", "share of the particles with 0, 1, ... contacts"),
     "distribution/neighbours": Entry("(k,)", "1", "share with 0, 1, ... neighbours"),
     "network/ids": Entry(

@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from lammps_inelastic.workflow.study import read_study
 from tests.workflow.few_spheres import TINY
 
 BIN = Path(sys.executable).parent
@@ -46,6 +47,13 @@ def inelastic(
         check=False,
         preexec_fn=preparation,
     )
+
+
+def warning(study: Path) -> str:
+    """Return what is said of a study of few spheres, whose box is higher than their bed."""
+    (line,) = read_study(study).warnings
+    assert "numbers of the box would be partly of empty space" in line
+    return f"warning: {line}\n"
 
 
 def run_few(folder: Path, seeds: str) -> Path:

@@ -15,7 +15,7 @@ from lammps_inelastic.workflow.folder import FAILED, Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.study import read_study
 from tests.workflow.few_spheres import TINY
-from tests.workflow.study_run import inelastic, numbers_of, run_few, same
+from tests.workflow.study_run import inelastic, numbers_of, run_few, same, warning
 
 
 @pytest.fixture(scope="module")
@@ -245,7 +245,8 @@ def test_what_stands_in_the_way(
         assert status == 1
         return
     assert status == 2
-    (line,) = captured.err.splitlines()
+    assert captured.err.startswith(warning(path))
+    (line,) = captured.err.removeprefix(warning(path)).splitlines()
     assert line.startswith(f"inelastic: {odd}: ")
     assert line.endswith("; move it away")
     assert captured.out == ""
@@ -262,7 +263,8 @@ def test_a_folder_in_the_place_of_the_results(
     file.unlink()
     file.mkdir()
     assert main(["run", str(study / "few.toml"), "--out", str(study / "out")]) == 2
-    assert capsys.readouterr().err == f"inelastic: {file}: a folder is in the way; move it away\n"
+    said = capsys.readouterr().err.removeprefix(warning(study / "few.toml"))
+    assert said == f"inelastic: {file}: a folder is in the way; move it away\n"
 
 
 def test_a_run_that_was_moved_and_linked(study: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -36,6 +36,8 @@ from lammps_inelastic.workflow.report.data import Data, paper_numbers, profile, 
 from lammps_inelastic.workflow.report.figures import Figure, Panel, curve
 from lammps_inelastic.workflow.report.markdown import render_markdown
 from lammps_inelastic.workflow.report.page import render, summarise
+from lammps_inelastic.workflow.report.sections.any_study import study_section
+from lammps_inelastic.workflow.report.sections.checks import checks
 from lammps_inelastic.workflow.report.sections.dimer_orientation import ratio_apart
 from lammps_inelastic.workflow.report.statistics import (
     Stated,
@@ -1200,3 +1202,54 @@ def test_page_and_tables_need_a_file_each(
     assert main(["report", str(file), "--out", target, "--markdown", target]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"inelastic: {target}: page and tables need a file each")
+
+
+def test_a_box_that_reaches_out_of_the_bed_is_marked_and_not_drawn() -> None:
+    """A packing fraction of empty space stands in the table, marked, and in no plot."""
+    box = [[0.25, 0.75], [0.25, 0.75], [0.25, 0.75]]
+    low = [[0.25, 0.75], [0.25, 0.5], [0.25, 0.75]]
+    given: dict[int, dict[str, Any]] = {
+        500: {"numbers__box_in_bed": 0.5, "bed__box": low},
+        1000: {"numbers__box_in_bed": 1.0, "bed__box": box},
+        2000: {"numbers__box_in_bed": 1.0, "bed__box": box},
+    }
+    results = [
+        measured(phi=0.4 if n == 500 else 0.63, particles=n, seed=seed, **more)
+        for n, more in given.items()
+        for seed in (1, 2)
+    ]
+    # A case of before this was measured does not tell, and is drawn.
+    results.append(measured(particles=3000))
+    section = study_section(StoredStudy("own", "Own", "", results))
+    first = next(block for block in section.blocks if isinstance(block, Table))
+    assert [row[0].marked for row in first.rows] == [True, False, False, False]
+    assert any("are partly of empty space" in note for note in first.notes)
+    assert any("No box is known to lie inside in all runs" in note for note in first.notes)
+    figures = [block for block in section.blocks if isinstance(block, Figure)]
+    assert figures
+    for figure in figures:
+        for panel in figure.panels:
+            for drawn in panel.curves:
+                assert "500" not in drawn.label
+                if panel.x == "particles":
+                    assert list(drawn.x) == [1000, 2000, 3000]
+    whole = study_section(StoredStudy("own", "Own", "", results[:-1]))
+    (said,) = (n for b in whole.blocks if isinstance(b, Table) for n in b.notes if "Marked" in n)
+    assert "box = [0.25, 0.75, 0.25, 0.5, 0.25, 0.75]" in said
+
+
+def test_checks_show_how_much_of_the_box_is_in_the_bed() -> None:
+    """Results of before this was measured leave the table as it was."""
+    for shares, head in (([math.nan], False), ([1.0, 0.48], True)):
+        results = [
+            measured(particles=1000 + n, **({} if math.isnan(s) else {"numbers__box_in_bed": s}))
+            for n, s in enumerate(shares)
+        ]
+        content = checks(Data({"own": StoredStudy("own", "Own", "", results)}, paper_numbers()))
+        (shown,) = (block for block in content.blocks if isinstance(block, Table))
+        assert ("box in the bed [%]" in shown.head) == head
+        if head:
+            assert [(row[-1].text, row[-1].marked) for row in shown.rows] == [
+                ("100", False),
+                ("48", True),
+            ]

@@ -550,3 +550,30 @@ def test_stages_hand_on_their_packing(write_study: Callable[..., Path]) -> None:
     assert first[-3:] == ["-var", "out", "spheres"]
     assert second[-3:] == ["-var", "packing", "spheres/packing.restart"]
     assert second[second.index("angle") + 1] == "-5"
+
+
+def test_a_box_above_the_bed_is_warned_of(
+    write_study: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A bed of 500 spheres of 0.11 ends below 0.58, where all of it at 0.6 would; of 1,000 not."""
+    text = "title = 't'\ndeck = '{}'\n[parameters]\nparticles = {}\nseed = [1, 2]\n[outputs]\n{}"
+    for deck, particles, outputs, said in (
+        ("spheres", 500, "", "500 spheres of diameter 0.11 make a bed that ends at about 0.5:"),
+        ("dimers", 200, "", "200 dimers of diameter 0.11 make a bed that ends at about 0.31:"),
+        (
+            "clusters",
+            100,
+            "",
+            "100 clusters of diameter 0.11 make a bed that ends at about 0.3:",
+        ),
+        ("spheres", 500, "box = [0.2, 0.8, 0.1, 0.4, 0.2, 0.8]", None),
+        ("spheres", 1000, "", None),
+    ):
+        path = write_study(text.format(deck, particles, outputs))
+        out = ["--out", str(path.parent / "out")]
+        for command in (["validate"], ["run", "--dry-run", *out], ["slurm", *out]):
+            assert main([*command, str(path)]) == 0
+            lines = capsys.readouterr().err.splitlines()
+            assert len(lines) == (0 if said is None else 1)
+            assert all(line.startswith(f"warning: {path}: outputs.box: ") for line in lines)
+            assert said is None or said in lines[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any, Literal
@@ -43,7 +44,7 @@ from lammps_inelastic.workflow.tradeoff.states import (
     read_states,
     write_states,
 )
-from lammps_inelastic.workflow.tradeoff.table import as_csv
+from lammps_inelastic.workflow.tradeoff.table import as_csv, out_of_bed
 from tests.core.contact_problems import Problem, no_bodies
 from tests.core.reference_solver import reference
 from tests.workflow.few_spheres import write_data
@@ -235,6 +236,17 @@ def test_rows_errors_and_ratios() -> None:
     assert sorted(loose.slower) == pytest.approx([2, 3, 6])
     assert comparison.scatter("packing_fraction") == pytest.approx(0.01)
     assert len(tight.slower) == 0
+
+
+def test_a_box_that_reaches_out_of_the_bed_is_said() -> None:
+    """What is compared there is partly empty space."""
+    study = made_up_study()
+    assert out_of_bed(compare(study)) == []
+    values = {**study[0][1].values, "numbers/box_in_bed": np.array(0.4)}
+    study[0] = study[0][0], replace(study[0][1], values=values)
+    (line,) = out_of_bed(compare(study))
+    assert line.startswith("out of the bed: after 1 of 9 runs the measuring box, [0.25, 0.75]^3,")
+    assert "40% of it in the worst" in line
 
 
 def test_recommendations() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import os
+import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..errors import StudyError, WorkflowError
@@ -87,6 +89,13 @@ def read_studies(paths: Sequence[Path]) -> list[Study]:
     if len({study.name for study in studies}) < len(studies):
         raise WorkflowError("two studies have the same file name; it is the name of their results")
     return studies
+
+
+def warn(studies: Iterable[Study]) -> None:
+    """Print on stderr what is expected to go wrong in studies, once in an MPI job."""
+    if os.environ.get("PMI_RANK", "0") == "0":
+        for warning in (line for study in studies for line in study.warnings):
+            print(f"warning: {warning}", file=sys.stderr)
 
 
 def study_path(path: Path) -> Path:

@@ -11,7 +11,7 @@ from ..errors import WorkflowError
 from ..folder import Folder
 from ..run_and_gather import run_and_gather
 from ..study import Case, Study
-from .arguments import add_out, add_running, add_studies, read_studies, running_options
+from .arguments import add_out, add_running, add_studies, read_studies, running_options, warn
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -45,6 +45,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the cases, or print how they would be; 1 if any has failed, else 0."""
     studies = read_studies(options.studies)
+    warn(studies)
     folder = Folder(options.out)
     choices = [(study, _chosen(study, options.case)) for study in studies]
     if options.dry_run:

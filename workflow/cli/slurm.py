@@ -9,7 +9,7 @@ from ..errors import WorkflowError
 from ..files import writing
 from ..folder import Folder
 from ..slurm import job_script
-from .arguments import add_out, add_studies, read_studies, study_path, whole_number
+from .arguments import add_out, add_studies, read_studies, study_path, warn, whole_number
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -31,6 +31,7 @@ def run(options: argparse.Namespace) -> int:
     if len(options.studies) > 1:
         raise WorkflowError("slurm: one study at a time")
     (study,) = read_studies(options.studies)
+    warn([study])
     folder = Folder(options.out)
     path = study_path(options.studies[0])
     script = job_script(study, path, folder, options.ranks, options.time)

@@ -36,6 +36,7 @@ from ..tradeoff.table import (
     as_csv,
     as_markdown,
     never_at_rest,
+    out_of_bed,
     print_comparison,
     print_states,
     states_as_csv,
@@ -120,7 +121,8 @@ def run(options: argparse.Namespace) -> int:
     plan = read_plan(options)
     results, left_out, failed = _run_all(plan, options.out, options.timeout)
     comparison = compare(results)
-    lines = [*left_out, *never_at_rest(comparison), *recommendations(comparison)]
+    lines = [*left_out, *never_at_rest(comparison), *out_of_bed(comparison)]
+    lines += recommendations(comparison)
     print_comparison(comparison, lines)
     states: list[Solved] = []
     lost: list[str] = []

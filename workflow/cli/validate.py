@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from .arguments import add_studies, as_cases, read_studies
+from .arguments import add_studies, as_cases, read_studies, warn
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -20,8 +20,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Say that the studies are fine; 0, or a StudyError with their mistakes."""
+    """Say that the studies are fine, with warnings; 0, or a StudyError with their mistakes."""
     studies = read_studies(options.studies)
+    warn(studies)
     for study, path in zip(studies, options.studies, strict=True):
         print(f"{path}: fine, {as_cases(study.cases)}")
     return 0

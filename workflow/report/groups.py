@@ -77,6 +77,14 @@ def _equal(value: object, wanted: float | str) -> bool:
     return value == wanted
 
 
+def box_is_in_bed(results: Iterable[Result]) -> bool:
+    """Say whether no run's measuring box is known to reach out of the bed.
+
+    Results of before this was measured do not tell.
+    """
+    return not any(result.number("box_in_bed") < 1 for result in results)
+
+
 def is_agitated(result: Result) -> bool:
     """Say whether a random force acted in a run."""
     return result.setting("random_force") > 0

@@ -179,6 +179,7 @@ class Study:
     text : text of the whole file
     cases : cases, no two of them the same
     outputs : measurements that are made of each case
+    warnings : what is expected to go wrong, one line each
     """
 
     name: str
@@ -186,6 +187,7 @@ class Study:
     text: str
     cases: tuple[Case, ...]
     outputs: Outputs
+    warnings: tuple[str, ...] = ()
 
 
 def stage_of(deck: Deck, values: Mapping[str, Value]) -> Stage:

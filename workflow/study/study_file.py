@@ -33,7 +33,7 @@ from ..files import read_regular
 from .case import Study
 from .cases import cases_of
 from .file_format import StudyFile
-from .measurable import unmeasurable_outputs
+from .measurable import doubtful_outputs, unmeasurable_outputs
 from .mistakes import mistakes_of, placed, shown
 
 # A study's name names a file and a folder, with some letters more while they are written [bytes].
@@ -81,7 +81,8 @@ def read_study(path: Path) -> Study:
         mistakes += dict.fromkeys(unmeasurable_outputs(file.outputs, cases))
     if mistakes:
         raise StudyError(placed(mistakes, path, text))
-    return Study(path.stem, file.title, text, cases, file.outputs)
+    warnings = placed([*doubtful_outputs(file.outputs, cases)], path, text)
+    return Study(path.stem, file.title, text, cases, file.outputs, tuple(warnings))
 
 
 def _of_name(name: str) -> str | None:

@@ -36,6 +36,7 @@ MEASURED = (
     "drift",
     "packing_fraction",
     "coordination_number",
+    "box_in_bed",
 )
 # These are computed from them and the reference's.
 COMPARED = ("packing_fraction_error", "coordination_number_error", "network_error", "shared")

@@ -98,6 +98,20 @@ def never_at_rest(comparison: Comparison) -> list[str]:
     return lines
 
 
+def out_of_bed(comparison: Comparison) -> list[str]:
+    """Return a line if the measuring box reaches out of the bed after some run."""
+    runs = [one for row in comparison.rows for one in row.runs]
+    out = [one for one in runs if one.at_rest and one.numbers["box_in_bed"] < 1]
+    if not out:
+        return []
+    least = min(one.numbers["box_in_bed"] for one in out)
+    return [
+        f"out of the bed: after {len(out)} of {len(runs)} runs the measuring box, [0.25, 0.75]^3, "
+        f"is not all in the bed, {least:.0%} of it in the worst: phi and z are partly of empty "
+        "space; take more particles (--particles)"
+    ]
+
+
 def print_comparison(comparison: Comparison, lines: Sequence[str]) -> None:
     """Print the table, what its columns mean, and more lines."""
     console = Console(highlight=False)

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...store import Result, StoredStudy
-from ..blocks import Block, Section, Table, missing
+from ..blocks import Block, Cell, Section, Table, missing
 from ..columns import RUNS, Column, LabelledRuns, table
 from ..curves import mean_curve, mean_distribution
 from ..data import arrays_of, profiles, series
 from ..figures import Curve, Figure, Panel, curve, points
-from ..groups import by_value, by_variables, grouped, labelled, varying
+from ..groups import box_is_in_bed, by_value, by_variables, grouped, labelled, varying
 from ..quantities import OF_ANY_STUDY
 from ..statistics import numbers
 from ..text import as_value
@@ -37,10 +37,14 @@ def study_section(study: StoredStudy) -> Section:
     blocks: list[Block] = []
     if groups:
         blocks.append(_table(groups))
-        blocks += _against(study, varying(study.results), anchor)
-        blocks += _evolution(groups, anchor)
-        blocks += _distributions(groups, anchor)
-        blocks += _profiles(groups, anchor)
+        # A number of empty space is no number of the packing: it is in the table, and not drawn.
+        drawn = [(label, group) for label, group in groups if box_is_in_bed(group)]
+        kept = {result.case for _, group in drawn for result in group}
+        results = [result for result in study.results if result.case in kept]
+        blocks += _against(results, varying(study.results), anchor)
+        blocks += _evolution(drawn, anchor)
+        blocks += _distributions(drawn, anchor)
+        blocks += _profiles(drawn, anchor)
         for number, (label, group) in enumerate(groups, 1):
             blocks += step_pictures(group, f"{anchor}-pictures-{number}", label)
             caption = f"Network of contacts: {label}"
@@ -64,22 +68,43 @@ def _table(groups: Groups) -> Table:
     known = [
         quantity for quantity in OF_ANY_STUDY if any(quantity.over(group).n for _, group in groups)
     ]
-    columns: list[Column[LabelledRuns]] = [Column("case", lambda case: case.label), RUNS]
+    columns: list[Column[LabelledRuns]] = [
+        Column("case", lambda case: Cell(case.label, marked=not box_is_in_bed(case.group))),
+        RUNS,
+    ]
     columns += [quantity.column() for quantity in known]
+    notes = ["Mean ± standard deviation (standard error); what all cases have alike is not named."]
+    if not all(box_is_in_bed(group) for _, group in groups):
+        notes.append(_out_of_bed([result for _, group in groups for result in group]))
     return table(
         "All cases, means over seeds",
         columns,
         [LabelledRuns(label, group) for label, group in groups],
-        ("Mean ± standard deviation (standard error); what all cases have alike is not named.",),
+        notes,
     )
 
 
-def _against(study: StoredStudy, names: Sequence[str], anchor: str) -> list[Block]:
+def _out_of_bed(results: Sequence[Result]) -> str:
+    """Say what is wrong with marked cases, and which box lies inside the bed in all runs."""
+    said = (
+        "Marked: in a run of the case the measuring box reaches out of the bed. Its numbers are "
+        "partly of empty space, and the plots leave the case out."
+    )
+    boxes = [result.values.get("bed/box") for result in results]
+    known = np.array([box for box in boxes if box is not None])
+    inside = np.column_stack([known[..., 0].max(axis=0), known[..., 1].min(axis=0)])
+    if len(known) < len(boxes) or not (inside[:, 0] < inside[:, 1]).all():
+        return f"{said} No box is known to lie inside in all runs."
+    bounds = ", ".join(f"{bound:g}" for bound in inside.ravel())
+    return f"{said} Inside in all runs lies box = [{bounds}]."
+
+
+def _against(results: Sequence[Result], names: Sequence[str], anchor: str) -> list[Block]:
     """Return a figure for each parameter that varies as a number."""
     figures: list[Block] = []
     for name in names:
         others = [other for other in names if other != name]
-        drawn = _curves_against(study.results, name, others)
+        drawn = _curves_against(results, name, others)
         panels = [
             Panel(name, text, drawn[number][:MOST_CURVES])
             for number, text in PLOTTED.items()

@@ -52,6 +52,12 @@ class _Row:
         return ALLOWED_OF_SPHERES if flat and not bodies else ALLOWED_OF_BODIES
 
     @property
+    def in_bed(self) -> float:
+        """The smallest share of a run's measuring box inside the bed; NaN where it is not known."""
+        shares = [one.number("box_in_bed") for one in self.group]
+        return min((share for share in shares if not math.isnan(share)), default=math.nan)
+
+    @property
     def resolution(self) -> float:
         """The mean resolution of the runs."""
         return RESOLUTION.over(self.group).mean
@@ -81,6 +87,17 @@ COLUMNS: Sequence[Column[_Row]] = (
         lambda row: Cell(as_short(row.resolution), marked=row.resolution > WORST_RESOLUTION),
     ),
 )
+NOTE = (
+    "ε: the loosest of a run. Marked: an overlap of more than ε (2 ε where there are bodies, which "
+    "turn, or a deck of your own, whose walls may be curved), or a count whose ε / (g h²) is above "
+    "0.01."
+)
+# Results of before this was measured have no such column.
+IN_BED: Column[_Row] = Column(
+    "box in the bed",
+    lambda row: Cell(as_text(100 * row.in_bed, 0), marked=row.in_bed < 1),
+    "%",
+)
 
 
 def checks(data: Data) -> Content:
@@ -92,17 +109,12 @@ def checks(data: Data) -> Content:
     ]
     if not rows:
         return Content()
-    return Content(
-        [
-            table(
-                "Largest overlap at any step of any run, and how well contacts are resolved",
-                COLUMNS,
-                rows,
-                (
-                    "ε: the loosest of a run. Marked: an overlap of more than ε (2 ε where there "
-                    "are bodies, which turn, or a deck of your own, whose walls may be curved), or "
-                    "a count whose ε / (g h²) is above 0.01.",
-                ),
-            )
-        ]
-    )
+    columns, notes = list(COLUMNS), [NOTE]
+    if not all(math.isnan(row.in_bed) for row in rows):
+        columns.append(IN_BED)
+        notes.append(
+            "Box in the bed: the least share of a run's measuring box; below 100 % the numbers of "
+            "the box are partly of empty space."
+        )
+    caption = "Largest overlap at any step of any run, and how well contacts are resolved"
+    return Content([table(caption, columns, rows, notes)])
