@@ -39,8 +39,10 @@ void MotionCheck::check_other_fixes() const
 
 void MotionCheck::begin_run()
 {
-  scene_.warn_of_hidden_pairs(
-      {step_.settings.group_bit, step_.settings.frozen_bit, bodies_ != nullptr});
+  const SceneCheck::Group group = {step_.settings.group_bit, step_.settings.frozen_bit,
+                                   bodies_ != nullptr};
+  scene_.check_held(group);
+  scene_.warn_of_hidden_pairs(group);
   step_.continues = false;
 }
 
@@ -99,9 +101,11 @@ std::string MotionCheck::not_finite() const
 // taken out of the velocities, or what somebody has changed since. Empty if that is nothing.
 std::string MotionCheck::break_in_run()
 {
+  first_without_setup_ = false;
   if (!step_.continues) return "";
   const bool went_on = goes_on_;
   goes_on_ = true;
+  first_without_setup_ = !went_on;
   if (!went_on && ended_pushing_)
     return "run pre no cannot go on from a step that was pushing overlaps apart: leave out pre no";
   return scene_.change_of_box();
@@ -185,6 +189,16 @@ std::string MotionCheck::moved_otherwise(int i, double position_error, double ve
                              "with the keyword frozen",
                              atom->tag[i], fix->id);
   if (!unfrozen.empty()) return unfrozen;
+  if (!scene_.is_integrated(i))
+    return fmt::format("no fix moves atom {}: a sphere that is to stay where it is needs the "
+                       "keyword frozen, others "
+                       "fix nve or nve/sphere",
+                       atom->tag[i]);
+  if (first_without_setup_)
+    return fmt::format(
+        "the position or velocity of atom {} was changed before run pre no, which goes on from the "
+        "last step: leave out pre no",
+        atom->tag[i]);
   const std::string mover = !step_.is_member(i)
       ? "nve or nve/sphere"
       : fmt::format("{} (without its keywords gravity and langevin, forces not taken early)",
@@ -199,7 +213,7 @@ std::string MotionCheck::moved_otherwise(int i, double position_error, double ve
                      later.empty() ? "" : ". Fixes that may have:", later);
 }
 
-// The fixes that may have changed forces or velocities after this one.
+// The fixes that may have changed forces, velocities or positions after this one.
 std::string MotionCheck::other_fixes() const
 {
   std::string later;
@@ -209,7 +223,7 @@ std::string MotionCheck::other_fixes() const
     if (fixes[k] == fix_)
       passed = true;
     else if ((passed && (modify->fmask[k] & FixConst::POST_FORCE)) ||
-             (modify->fmask[k] & FixConst::END_OF_STEP))
+             (modify->fmask[k] & (FixConst::END_OF_STEP | FixConst::POST_INTEGRATE)))
       later += fmt::format(" {} ({})", fixes[k]->id, fixes[k]->style);
   }
   return later;

@@ -30,7 +30,7 @@ class RegionWalls : protected Pointers {
   RegionWalls(class LAMMPS *lmp, std::vector<std::string> region_ids);
 
   // Finds the regions and numbers their walls. Errors: a region that does not exist, or one whose walls
-  // LAMMPS does not show (an ellipsoid, a union with side out).
+  // LAMMPS does not show (an ellipsoid, a cylinder with an open side, a union with side out).
   void init();
 
   bool empty() const { return ids_.empty(); }
@@ -78,6 +78,7 @@ class RegionWalls : protected Pointers {
     bool cone;
   };
 
+  void refuse_wrong(const Region *region, const std::string &used) const;
   bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &) const;
   void correct_cap(const Obstacle &, const double *x, WallView &) const;
 

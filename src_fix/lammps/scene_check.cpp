@@ -10,6 +10,8 @@
 #include "modify.h"
 #include "neighbor.h"
 
+#include "fmt/format.h"
+
 using namespace LAMMPS_NS;
 
 // Along a direction that is not periodic the box is no part of any gap.
@@ -136,6 +138,43 @@ void SceneCheck::warn_of_hidden_pairs(const Group &group) const
   for (int k = 1; k <= 3 && bonds; ++k)
     if (force->special_lj[k] == 0.0 && force->special_coul[k] == 0.0)
       return warn_of_hidden("special_bonds with a factor of 0");
+}
+
+bool SceneCheck::sets_forces(const Fix *fix)
+{
+  // An accelerated style has the name of its package behind it.
+  const std::string style = fix->style;
+  const std::string name = style.substr(0, style.find('/'));
+  for (const char *one : {"freeze", "setforce", "lineforce", "planeforce", "aveforce"})
+    if (name == one) return true;
+  return false;
+}
+
+// These fixes replace the forces of spheres by others. They do it before the contacts are known, which then move the
+// spheres all the same; behind this fix they would take contact forces away.
+void SceneCheck::check_held(const Group &group) const
+{
+  for (const Fix *fix : modify->get_fix_list()) {
+    if (!sets_forces(fix)) continue;
+    bool free = false;
+    for (int i = 0; i < atom->nlocal && !free; ++i)
+      free = (atom->mask[i] & fix->groupbit) && (atom->mask[i] & group.bit) &&
+          !(atom->mask[i] & group.frozen_bit);
+    if (any(free))
+      error->all(FLERR,
+                 "Fix inelastic: fix {} ({}) sets forces on spheres of group {}, and contacts move "
+                 "them all the "
+                 "same: leave it out; spheres that are to be held, or moved, are named with the "
+                 "keyword frozen",
+                 fix->id, fix->style, this->group->names[fix->igroup]);
+  }
+}
+
+bool SceneCheck::is_integrated(int i) const
+{
+  for (const Fix *fix : modify->get_fix_list())
+    if (fix->time_integrate && (atom->mask[i] & fix->groupbit)) return true;
+  return false;
 }
 
 std::vector<double> SceneCheck::box() const

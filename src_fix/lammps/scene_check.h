@@ -1,5 +1,5 @@
 // This room refuses what other commands and fixes of a deck must not do, because fix inelastic would not
-// see it: hide spheres or pairs from it, or change the box or the radii while a run lasts.
+// see it: hide spheres or pairs from it, hold spheres, or change the box or the radii while a run lasts.
 
 #ifndef INELASTIC_SCENE_CHECK_H
 #define INELASTIC_SCENE_CHECK_H
@@ -27,6 +27,10 @@ class SceneCheck : protected Pointers {
   // the box or radii, or do not bear that the time step is shortened.
   void check(bool shorten) const;
 
+  // At the start of a run. Errors: fixes that are to hold or guide spheres of the group that are not frozen.
+  // Collective.
+  void check_held(const Group &group) const;
+
   // At the start of a run. Warnings: settings that keep pairs apart. Collective.
   void warn_of_hidden_pairs(const Group &group) const;
 
@@ -36,6 +40,9 @@ class SceneCheck : protected Pointers {
   // Says what has changed about the box since then; empty if nothing has.
   std::string change_of_box() const;
 
+  // Tells whether a fix moves a sphere, as an integrator does.
+  bool is_integrated(int i) const;
+
   // Names the fixes that may have changed the radius of a sphere; empty if there are none.
   std::string fixes_that_change_radii() const;
 
@@ -43,6 +50,7 @@ class SceneCheck : protected Pointers {
   // The periods of the directions that are periodic, and the three tilts.
   std::vector<double> box() const;
 
+  static bool sets_forces(const Fix *fix);
   bool changes_periods(const Fix *fix) const;
   template <typename One, typename Other>
   bool hides(const Group &group, One &&on_one_side, Other &&on_the_other) const;

@@ -118,12 +118,18 @@ void StepLength::check_reach() const
 {
   const double widest = 2.0 * step_.largest_radius + neighbor->skin;
   const double listed = one_cutoff_ ? neighbor->cutneighmin : neighbor->cutneighmax;
-  if (listed < widest * BELOW_ONE)
-    error->all(
-        FLERR,
-        "Fix inelastic: the neighbour list reaches {:.6g} between centres but needs {:.6g}: give "
-        "pair_style zero a cutoff of at least the largest diameter, {:.6g}",
-        listed, widest, 2.0 * step_.largest_radius);
+  if (listed >= widest * BELOW_ONE) return;
+  // As LAMMPS creates them.
+  constexpr double DEFAULT_DIAMETER = 1.0;
+  const bool as_created = 2.0 * step_.largest_radius == DEFAULT_DIAMETER;
+  error->all(
+      FLERR,
+      "Fix inelastic: the neighbour list reaches {:.6g} between centres but needs {:.6g}: give "
+      "pair_style zero a cutoff of at least the largest diameter, {:.6g}{}",
+      listed, widest, 2.0 * step_.largest_radius,
+      as_created
+          ? " (which LAMMPS gives to spheres that it creates: or was set diameter forgotten?)"
+          : "");
 }
 
 void StepLength::check_reach_of_types() const

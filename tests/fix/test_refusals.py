@@ -114,6 +114,14 @@ def test_the_scene_itself_runs(tmp_path: Path, lmp: Runner) -> None:
         ),
         ("fix contact all inelastic 1e-5 region container\npair_style none", ["pair_style zero"]),
         (
+            "fix contact all inelastic 1e-5 region container friction 0.5",
+            ["region friction does not exist", "IDs of regions", "next keyword"],
+        ),
+        (
+            "fix contact all inelastic 1e-5 region container\nset group all diameter 1",
+            ["pair_style zero", "was set diameter forgotten"],
+        ),
+        (
             "fix contact all inelastic 1e-5 region container\nset atom 3 x 0.7",
             ["centre", "atom 3", "region container"],
         ),
@@ -155,17 +163,16 @@ run 1
 
 
 CHANGES = {
-    "no integrator": ("fix motion all nve\n", "", [], "position"),
     "a later force": (
         "thermo 1\n",
         "fix wind all addforce 1e-6 0 0\nthermo 1\n",
         ["wind (addforce)", "before fix contact"],
         "",
     ),
-    "a later setforce": (
+    "reflected at the box": (
         "thermo 1\n",
-        "fix hold all setforce 0 NULL NULL\nthermo 1\n",
-        ["hold (setforce)"],
+        "fix mirror all wall/reflect ylo 0.3\nthermo 1\n",
+        ["mirror (wall/reflect)"],
         "",
     ),
     "gravity afterwards": (
@@ -200,7 +207,7 @@ CHANGES = {
 
 @pytest.mark.parametrize(
     ("name", "ranks"),
-    [(name, 1) for name in CHANGES] + [("no integrator", 2), ("a later setforce", 2)],
+    [(name, 1) for name in CHANGES] + [("a later force", 2), ("reflected at the box", 2)],
 )
 def test_something_else_moves_the_spheres(
     name: str, ranks: int, tmp_path: Path, refused: Refused
@@ -211,6 +218,47 @@ def test_something_else_moves_the_spheres(
     error = refused(text.replace(old, new, 1) + "run 50\n", ranks=ranks)
     for word in ("did not move as predicted", what, *words):
         assert word in error, error
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_spheres_that_nothing_moves_are_frozen_ones(
+    ranks: int, tmp_path: Path, refused: Refused
+) -> None:
+    """A rough base that no fix moves is not held: contacts would move it."""
+    text = deck(tmp_path).replace(
+        "fix motion all nve", "group base id 1:9\ngroup free subtract all base\nfix motion free nve"
+    )
+    error = refused(text + "run 50\n", ranks=ranks)
+    assert re.search(r"no fix moves atom [1-9]\b", error), error
+    assert "frozen" in error
+
+
+HOLDS = ["freeze", "setforce 0 0 0", "setforce NULL NULL 0", "lineforce 1 0 0", "planeforce 1 0 0"]
+
+
+@pytest.mark.parametrize("later", [False, True])
+@pytest.mark.parametrize("hold", [*HOLDS, "aveforce 0 0 0"])
+def test_held_grains_are_frozen_ones(
+    hold: str, later: bool, tmp_path: Path, refused: Refused
+) -> None:
+    """A fix that replaces forces holds nothing, before this fix or behind it."""
+    held = f"group base id 1:9\nfix hold base {hold}\n"
+    text = deck(tmp_path, fixes="" if later else held) + (held if later else "")
+    error = refused(text + "run 2\n")
+    for words in (f"fix hold ({hold.split()[0]})", "group base", "keyword frozen"):
+        assert words in error, error
+
+
+def test_frozen_grains_may_be_held_as_well(tmp_path: Path, lmp: Runner) -> None:
+    fixes = "group base id 1:9\ngroup free subtract all base\nfix hold base freeze\n"
+    options = "region container frozen base"
+    lmp(deck(tmp_path, fixes=fixes, options=options, motion="fix motion free nve") + "run 20\n")
+
+
+def test_velocities_changed_before_a_run_without_setup(tmp_path: Path, refused: Refused) -> None:
+    """The first step of `run pre no` goes on from the last one, which had other velocities."""
+    error = refused(deck(tmp_path) + "run 5\nvelocity all set 1 0 0\nrun 5 pre no\n")
+    assert "was changed before run pre no" in error
 
 
 def test_fixes_in_the_right_order_are_accepted(tmp_path: Path, lmp: Runner) -> None:
