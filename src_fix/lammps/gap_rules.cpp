@@ -12,6 +12,8 @@ namespace {
 constexpr double RELINEARISE_BEYOND = 1.1;
 // In tolerances: a contact is closed, whatever its exact gap, within this distance from touching.
 constexpr double CLOSED = 0.5;
+// Beyond that it closes in a step by at most this part of what the contact has to stop.
+constexpr double CLOSING = 0.01;
 
 }    // namespace
 
@@ -19,7 +21,12 @@ void GapRules::begin(Side &side, const ContactMemory::Entry &last, int i, int j,
                      const double *normal) const
 {
   constexpr double PART_OF_LOAD = 0.1;
-  side.force = last.force * load_change(i, j);
+  constexpr double SAME = 1.0e-9;    // round-off of forces
+  side.force = last.force;
+  const auto changes = load_changes(i, j);
+  // Loads of particles at rest that change by one factor change contact forces by it.
+  if (changes && std::abs((*changes)[1] - (*changes)[0]) <= SAME * (*changes)[0])
+    side.force *= (*changes)[0];
   const inelastic::ContactProblem &problem = step_.problem;
   const double *const v = problem.predicted_velocity.data();
   double opening = 0.0;
@@ -27,38 +34,34 @@ void GapRules::begin(Side &side, const ContactMemory::Entry &last, int i, int j,
   const double load = step_.impulse_per_force * side.force * problem.mobility_of_pair(i, j, normal);
   side.to_stop =
       std::max({PART_OF_LOAD * load, side.wall_motion - problem.timestep * opening, 0.0});
-  side.closed_gap = closed_gap(side, last.closed_gap);
+  // What is at rest is closed where it is: to close would be a motion that nothing makes.
+  side.closed_gap = closed_gap(side, last.closed_gap, changes ? 0.0 : CLOSING * side.to_stop);
 }
 
-// The factor by which the loads of both sides of a contact at rest have changed since the last step, walls and frozen
-// particles left out; 1 where they are not at rest, or have changed differently.
-double GapRules::load_change(int i, int j) const
+// The factors by which the loads of two particles have changed that were at rest in the last step, one of them twice
+// beside a wall or a frozen particle; nothing if one was not at rest.
+std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
 {
-  constexpr double SAME = 1.0e-9;    // round-off of forces
   const inelastic::ContactProblem &problem = step_.problem;
-  if (step_.load_change.empty()) return 1.0;
-  const auto of = [this](int k) {
-    return step_.load_change[3 * static_cast<std::size_t>(k)];
-  };
+  if (step_.load_change.empty()) return std::nullopt;
   if (problem.inverse_mass[i] == 0.0) std::swap(i, j);
-  const double change = of(i);
-  if (!(change > 0.0)) return 1.0;
-  if (j == problem.particles || problem.inverse_mass[j] == 0.0) return change;
-  return std::abs(of(j) - change) <= SAME * change ? change : 1.0;
+  if (j == problem.particles || problem.inverse_mass[j] == 0.0) j = i;
+  const double one = step_.load_change[3 * static_cast<std::size_t>(i)];
+  const double other = step_.load_change[3 * static_cast<std::size_t>(j)];
+  if (!(one > 0.0 && other > 0.0)) return std::nullopt;
+  return std::array<double, 2>{one, other};
 }
 
 // [length] A gap under a force is closed where it is, up to half a tolerance: positions are not known better, and
 // what they would give or take in a step would be velocities that nothing gives. Where that adds up along a chain,
-// or differs from step to step, a bed would never be quiet. Beyond it the gap closes, by no more than a small part of
-// what the contact has to stop: the force stays. When the force goes, the contact is still closed at that gap until
+// or differs from step to step, a bed would never be quiet. Beyond it the gap closes, so little that the force stays. When the force goes, the contact is still closed at that gap until
 // the two have parted: what lies on a contact that loses its force for a step does not fall.
-double GapRules::closed_gap(const Side &side, double last) const
+double GapRules::closed_gap(const Side &side, double last, double most_closing) const
 {
-  constexpr double CLOSING = 0.01;
   const double tolerance = step_.settings.tolerance;
   const double gap = std::max(0.0, side.gap_now);
   if (side.force > 0.0 && gap <= tolerance)
-    return gap - std::clamp(gap - CLOSED * tolerance, 0.0, CLOSING * side.to_stop);
+    return gap - std::clamp(gap - CLOSED * tolerance, 0.0, most_closing);
   // The tolerance may have been lowered.
   const bool parted = last == ContactMemory::NOT_CLOSED || last > tolerance ||
       gap > last + tolerance;

@@ -7,6 +7,8 @@
 #include "overlap_watch.h"
 #include "step.h"
 
+#include <array>
+#include <optional>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -65,8 +67,8 @@ class GapRules {
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
-  double load_change(int i, int j) const;
-  double closed_gap(const Side &side, double last) const;
+  std::optional<std::array<double, 2>> load_changes(int i, int j) const;
+  double closed_gap(const Side &side, double last, double most_closing) const;
   double contact_gap(const Side &side) const;
   double given_back(const Side &side) const;
   double gap_by_law(const Side &side, const LawContact &contact) const;
