@@ -147,8 +147,9 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
 {
   Region *region = obstacle.region;
   double x[3] = {where[0], where[1], where[2]};
-  // From a point exactly on its axis LAMMPS does not see the side of a cone or a cylinder.
-  if (!obstacle.exact)
+  // From a point exactly on its axis LAMMPS does not see the side of a cone or a cylinder, nor from
+  // outside anything of a cone (a division by zero).
+  if (!obstacle.exact || obstacle.cone)
     for (int d = 0; d < 3; ++d) x[d] += OFF_AXIS[d] * std::min(reach, 1.0);
   views.clear();
   const int count = region->surface(x[0], x[1], x[2], reach);

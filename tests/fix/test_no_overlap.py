@@ -415,6 +415,29 @@ def test_oscillating_floor(tmp_path: Path, lmp: Runner) -> None:
     assert np.abs(last.velocities).max() < 6
 
 
+@pytest.mark.parametrize("radii", ["0.3 0.2", "0.2 0.3"])
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_sphere_on_the_axis_of_a_cone_lies_on_its_cap(
+    axis: str, radii: str, tmp_path: Path, lmp: Runner
+) -> None:
+    """From outside LAMMPS divides by the distance from the axis."""
+    along = np.eye(3)["xyz".index(axis)]
+    deck = scene(
+        0.8 * along,
+        0.1,
+        tmp_path,
+        tolerance=EPS,
+        gravity=False,
+        box=((-1, 1),) * 3,
+        fixes="fix pull all gravity 9.81 vector {} {} {}".format(*-along),
+        setup=f"region post cone {axis} 0 0 {radii} -0.5 0.5 side out",
+        options="region post",
+    )
+    lmp(deck + DUMP_PARTICLES + "run 80\n")
+    end = read_dump(tmp_path / "particles.dump")[-1].positions[0]
+    assert end == pytest.approx(0.6 * along, abs=EPS * SLACK)
+
+
 @pytest.mark.parametrize("region", ["plane 0 0 0 0 1 0", "block 0 1 0 5 0 1"])
 @pytest.mark.parametrize("gravity", [True, False])
 def test_a_rising_floor_gives_the_spheres_its_velocity(
