@@ -21,6 +21,15 @@ namespace {
 constexpr double OFF_AXIS[3] = {1.0e-12, 0.7e-12, 0.4e-12};
 constexpr double EVERYTHING = 1.0e300;    // a reach that no wall exceeds
 
+// LAMMPS marks a union of parts that rotate as rotating itself, by an angle and about a point that it
+// never sets.
+void let_only_parts_move(Region *region)
+{
+  if (!region->reglist) return;
+  region->moveflag = region->rotateflag = 0;
+  for (int k = 0; k < region->nregion; ++k) let_only_parts_move(region->reglist[k]);
+}
+
 WallView make_view(const Region::Contact &contact, int first_wall)
 {
   WallView view{};
@@ -77,9 +86,11 @@ void RegionWalls::init()
           "Fix inelastic: region {} is a union with side out, of whose parts LAMMPS does not show "
           "the walls: list the parts instead, each with side out",
           id);
+    let_only_parts_move(region);
     // Cones can also be parts of joined regions.
     const bool cone = joined || strcmp(region->style, "cone") == 0;
-    obstacles_.push_back({region, number_of_walls_ + 1, moving, exact, convex_obstacle, cone});
+    obstacles_.push_back(
+        {region, number_of_walls_ + 1, moving, exact, convex_obstacle, joined, cone});
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
   }
@@ -273,8 +284,9 @@ void RegionWalls::view_moving(
     const double *x = entry.from->where;
     if (entry.passed_over) {
       // The wall will have swept over the centre. LAMMPS then sees no wall, but for one that only
-      // translates the distance it will have follows from the one it has now.
-      const bool seen_now = !region->rotateflag && !region->varshape &&
+      // translates the distance it will have follows from the one it has now. (Of the parts of a
+      // union or an intersection each may move in its own way.)
+      const bool seen_now = !region->rotateflag && !region->varshape && !obstacle.joined &&
           see(obstacle, x, entry.from->reach + shift_length, views);
       for (WallView &view : views) {
         if (!seen_now) break;

@@ -75,6 +75,7 @@ class RegionWalls : protected Pointers {
     bool moving;
     bool exact;
     bool convex;
+    bool joined;
     bool cone;
   };
 

@@ -438,6 +438,27 @@ def test_a_sphere_on_the_axis_of_a_cone_lies_on_its_cap(
     assert end == pytest.approx(0.6 * along, abs=EPS * SLACK)
 
 
+def test_a_union_of_parts_that_turn(tmp_path: Path, lmp: Runner) -> None:
+    """Only its parts turn; LAMMPS turns the union by an angle that nobody has set."""
+    deck = scene(
+        [0.2, -0.3, 0.1],
+        0.1,
+        tmp_path,
+        tolerance=EPS,
+        box=((-2, 2),) * 3,
+        setup="variable turn equal 2*time\n"
+        "region large sphere 0 0 0 1 rotate v_turn 0 0 0 0 1 0\n"
+        "region small sphere 0.1 0 0 0.5 rotate v_turn 0 0 0 0 1 0\n"
+        "region inner union 2 small large\nregion tub union 2 inner small",
+        options="region tub shorten yes",
+    )
+    # What is not set is then neither zero nor small.
+    lmp(deck + DUMP_PARTICLES + "run 150\n", environment={"MALLOC_PERTURB_": "165"})
+    away = [np.linalg.norm(f.positions[0]) for f in read_dump(tmp_path / "particles.dump")]
+    assert max(away) <= 0.9 + 2 * EPS * SLACK
+    assert max(away) >= 0.9 - EPS
+
+
 @pytest.mark.parametrize("region", ["plane 0 0 0 0 1 0", "block 0 1 0 5 0 1"])
 @pytest.mark.parametrize("gravity", [True, False])
 def test_a_rising_floor_gives_the_spheres_its_velocity(
