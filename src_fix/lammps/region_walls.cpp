@@ -74,11 +74,8 @@ void RegionWalls::init()
         !region->interior && !region->openflag && strcmp(region->style, "intersect") != 0;
     const bool exact = (flat && !region->openflag) || convex_obstacle;
     refuse_wrong(region, region->id);
-    // A region does not tell what it is joined of.
     const bool joined = strcmp(region->style, "union") == 0 ||
         strcmp(region->style, "intersect") == 0;
-    if (joined)
-      for (const Region *part : domain->get_region_list()) refuse_wrong(part, region->id);
     // LAMMPS keeps those surface points of a part that lie in the other parts, and drops all others.
     if (strcmp(region->style, "union") == 0 && !region->interior)
       error->all(
@@ -97,13 +94,14 @@ void RegionWalls::init()
 }
 
 // Refuses a region whose walls LAMMPS shows too late, or not at all where a sphere is (up to update 4 of 22 Jul 2025):
-// `used` itself, or one that may be a part of it.
+// `used` itself, or a part of it.
 void RegionWalls::refuse_wrong(const Region *region, const std::string &used) const
 {
+  for (int k = 0; region->reglist && k < region->nregion; ++k)
+    refuse_wrong(region->reglist[k], used);
   const std::string what = region->id == used
       ? fmt::format("region {} is", used)
-      : fmt::format("region {} is joined of others, of which region {} may be one,", used,
-                    region->id);
+      : fmt::format("region {}, a part of region {}, is", region->id, used);
   constexpr int SIDE = 2;
   if (strcmp(region->style, "ellipsoid") == 0)
     error->all(FLERR,
