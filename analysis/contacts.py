@@ -1,8 +1,8 @@
 """Contact frames: LAMMPS's local text dump of the fix's contacts.
 
-MDAnalysis does not read local dumps, so this module does. Every row is a contact that carries a
-force: a positive multiplier, no distance criterion. With the law gluey a row is a contact that
-carries a force, which may pull, or that has stored an impulse; the dump then has the column stored.
+Every row is a contact that carries a force: a positive multiplier, no distance criterion. With the
+law gluey a row is a contact that carries a force, which may pull, or that has stored an impulse;
+the dump then has the column stored.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ import numpy as np
 
 from .dump_text import (
     LARGEST_ID,
+    PARTICLES,
     FrameHeader,
-    malformed_row,
     open_dump,
+    parsed_rows,
     read_header,
     read_rows,
     require_columns,
@@ -66,6 +67,13 @@ def iterate_contact_frames(path: str | PathLike[str]) -> Iterator[ContactFrame]:
     line = 1
     with open_dump(file) as dump:
         while header := read_header(dump, file, line):
+            if header.label == PARTICLES:
+                raise DumpError(
+                    file,
+                    f"its rows are {PARTICLES}, of a dump of particles: a dump local of contacts "
+                    "is needed",
+                    header.first_row_line - 1,
+                )
             require_columns(header, COLUMNS, file)
             yield _parsed_frame(read_rows(dump, file, header), header, file)
             line = header.next_line
@@ -76,17 +84,7 @@ def iterate_contact_frames(path: str | PathLike[str]) -> Iterator[ContactFrame]:
 def _parsed_frame(rows: list[bytes], header: FrameHeader, path: Path) -> ContactFrame:
     stores = STORED in header.columns
     names = (*COLUMNS, STORED) if stores else COLUMNS
-    data = np.empty((0, len(names)))
-    if rows:
-        try:
-            table = np.loadtxt(rows, comments=None, ndmin=2)
-        except ValueError:
-            table = np.empty((0, 0))
-        if table.shape != (len(rows), len(header.columns)):
-            raise malformed_row(rows, header, COLUMNS, path) or DumpError(
-                path, "every column must hold numbers", header.first_row_line
-            )
-        data = table[:, [header.columns.index(name) for name in names]]
+    data = parsed_rows(rows, header, names, path)
     _check(data, names, header, path)
     return ContactFrame(
         step=header.step,

@@ -26,6 +26,10 @@ class DumpError(FileError):
     """A dump file is missing, incomplete or malformed."""
 
 
+class CutOffError(DumpError):
+    """A dump ends inside a frame; the frames before it are whole."""
+
+
 class LogError(FileError):
     """A log is missing, cannot be read, or lacks a part."""
 

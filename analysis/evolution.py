@@ -20,8 +20,8 @@ from .particles import ParticleFrame, check_not_periodic
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Such a function measures a packing fraction of positions (n, 3) and radii (n,) in a box (3, 2).
-PackingFractionOf = Callable[[ArrayLike, ArrayLike, ArrayLike], float]
+# Such a function measures the packing fraction of a frame in a box (3, 2).
+PackingFractionOf = Callable[[ParticleFrame, FloatArray], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +69,13 @@ def monte_carlo(points: int = 100_000, seed: int = 0) -> PackingFractionOf:
     points : number of random points, at least 1
     seed : of numpy's default generator, not negative; every call draws the same points
 
-    The function takes positions (n, 3), radii (n,) and a box (3, 2), length, and raises InputError
-    as `packing_fraction` does.
+    The function takes a frame and a box (3, 2), length, and raises InputError as
+    `packing_fraction` does.
     """
 
-    def measure(positions: ArrayLike, radii: ArrayLike, box: ArrayLike) -> float:
-        return packing_fraction(positions, radii, box, points=points, seed=seed).value
+    def measure(frame: ParticleFrame, box: FloatArray) -> float:
+        found = packing_fraction(frame.positions, frame.radii, box, points=points, seed=seed)
+        return found.value
 
     return measure
 
@@ -123,7 +124,7 @@ def measure_evolution(
         steps.append(frame.step)
         rows.append(
             (
-                measure(frame.positions, frame.radii, bounds),
+                measure(frame, bounds),
                 _coordination(frame, current, bounds),
                 float(mass @ frame.positions[:, up]),
                 energy,

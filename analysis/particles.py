@@ -1,4 +1,4 @@
-"""Particle frames: LAMMPS's custom text dump of spheres, read through MDAnalysis.
+"""Particle frames: LAMMPS's custom text dump of spheres, ours or of others.
 
 A dump must have the columns `id`, positions and, unless the reader gives a radius, `radius` or
 `diameter`. Positions may be as they are (x, xu) or in shares of the box (xs, xsu).
@@ -10,25 +10,24 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from MDAnalysis.coordinates.LAMMPS import DumpReader
 
 from .bodies import Particles, group_spheres
 from .dump_text import (
     LARGEST_ID,
+    PARTICLES,
     FrameHeader,
-    malformed_row,
     missing_columns,
     open_dump,
+    parsed_rows,
     read_header,
     read_rows,
     require_columns,
 )
-from .errors import DumpError, InputError
+from .errors import CutOffError, DumpError, InputError, shortened
 from .geometry import FloatArray, IntArray
 
 # The first three of these columns that a dump has are read: positions in the box come before those
@@ -53,7 +52,8 @@ class ParticleFrame:
     radii : (n,), positive, length
     bodies : (n,), the dump's `mol`, 0 for a free sphere; None where the dump has no `mol`
     box : (3, 2), lower and upper bound per axis, length
-    boundaries : two letters per axis (f fixed, p periodic, s or m shrink-wrapped), lower then upper
+    boundaries : two letters per axis (f fixed, p periodic, s or m shrink-wrapped), lower then
+        upper; None where the dump does not say
     contacts : (n,), each sphere's contacts with spheres of other particles; None where the dump has
         no `contacts`
     """
@@ -65,7 +65,7 @@ class ParticleFrame:
     radii: FloatArray
     bodies: IntArray | None
     box: FloatArray
-    boundaries: tuple[str, str, str]
+    boundaries: tuple[str, str, str] | None
     contacts: IntArray | None = None
 
     @cached_property
@@ -101,52 +101,107 @@ class ParticleDump:
     """The frames of a particle dump: a sequence that reads a frame when it is asked for.
 
     The headers are read at once, so that an incomplete file is known before any frame is used.
-    `dump[i]`, `len(dump)` and `for frame in dump` work as for a list; `steps` are the time steps.
+    `dump[i]`, `len(dump)` and `for frame in dump` work as for a list; `steps` are the time steps,
+    and `spheres` the numbers of spheres, of the frames. `cut_off` says why the frames are not all.
     """
 
-    def __init__(self, path: str | PathLike[str], *, radius: float | None = None) -> None:
+    def __init__(
+        self, path: str | PathLike[str], *, radius: float | None = None, whole: bool = True
+    ) -> None:
         """Read the headers of all frames of the file.
 
         Parameters
         ----------
         path : of the dump, plain text or compressed by gzip
         radius : of all spheres, length, where the dump has neither `radius` nor `diameter`
+        whole : whether the file must be whole; if not, the frames before its end are read where
+            that is missing, and `cut_off` says in one line that it is
 
-        Raises InputError for a radius that is not positive, and DumpError for a file that is not
-        whole or lacks a column.
+        Raises InputError for a radius that is not positive, DumpError for a file without a frame or
+        a column that is needed, and CutOffError for one that is not whole.
         """
         if radius is not None and not (radius > 0 and math.isfinite(radius)):
             raise InputError(f"a radius must be positive and finite, not {radius:g}")
         self.path = Path(path)
-        self._headers = _scanned_headers(self.path)
+        self.cut_off: str | None = None
+        self._headers: list[FrameHeader] = []
+        # Of the first row of each frame.
+        self._offsets: list[int] = []
+        try:
+            self._scan()
+        except CutOffError as error:
+            if whole or not self._headers:
+                raise
+            self.cut_off = str(error)
         self._radius = radius
         self._layout = _layout(self._headers[0], self.path, radius)
         self.steps: tuple[int, ...] = tuple(header.step for header in self._headers)
-        self._reader: DumpReader | None = None
+        self.spheres: tuple[int, ...] = tuple(header.rows for header in self._headers)
 
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self._headers)
 
-    @property
-    def spheres(self) -> int:
-        """Number of spheres, the same in all frames."""
-        return self._headers[0].rows
-
     def __iter__(self) -> Iterator[ParticleFrame]:
         """Read the frames one by one, never two at a time."""
-        return (self[index] for index in range(len(self)))
+        # A compressed file is unpacked once.
+        with open_dump(self.path) as dump:
+            for header, offset in zip(self._headers, self._offsets, strict=True):
+                dump.seek(offset)
+                yield self._frame(header, read_rows(dump, self.path, header))
 
     def __getitem__(self, index: int) -> ParticleFrame:
         """Read one frame; negative indices count from the end.
 
-        Raises IndexError for a frame that is not there, and DumpError for a row that is wrong.
+        Raises IndexError for a frame that is not there, and DumpError for one without spheres or
+        with a row that is wrong.
         """
         if not -len(self) <= index < len(self):
             raise IndexError(f"{self.path}: no frame {index}, there are {len(self)}")
-        header, layout = self._headers[index], self._layout
-        data = self._read(index % len(self))
-        self._check(header, data)
+        with open_dump(self.path) as dump:
+            dump.seek(self._offsets[index])
+            rows = read_rows(dump, self.path, self._headers[index])
+        return self._frame(self._headers[index], rows)
+
+    def _scan(self) -> None:
+        """Read all headers; see that every frame is whole and has the same columns."""
+        line = 1
+        with open_dump(self.path) as dump:
+            while header := read_header(dump, self.path, line):
+                if header.label != PARTICLES:
+                    raise DumpError(
+                        self.path,
+                        f"its rows are {shortened(header.label)}, as in a dump local, such as one "
+                        f"of contacts: a dump custom of particles, of {PARTICLES}, is needed",
+                        header.first_row_line - 1,
+                    )
+                if self._headers and header.columns != self._headers[0].columns:
+                    raise DumpError(
+                        self.path,
+                        "the columns are not those of the first frame",
+                        header.first_row_line - 1,
+                    )
+                offset = dump.tell()
+                read_rows(dump, self.path, header)
+                self._headers.append(header)
+                self._offsets.append(offset)
+                line = header.next_line
+        if not self._headers:
+            raise DumpError(self.path, "the file is empty")
+
+    def _frame(self, header: FrameHeader, rows: list[bytes]) -> ParticleFrame:
+        """Make a frame of its rows, which may be in any order."""
+        layout = self._layout
+        if header.rows == 0:
+            raise DumpError(
+                self.path,
+                f"the frame of step {header.step} has no spheres",
+                header.first_row_line - 1,
+            )
+        table = parsed_rows(rows, header, layout.columns, self.path, whole=("id",))
+        self._check(header, table)
+        table = table[np.argsort(table[:, 0])]
+        data = dict(zip(layout.columns, table.T, strict=True))
         positions = _side_by_side(data, layout.positions)
         if layout.positions in SCALED:
             lower, upper = header.box.T
@@ -167,79 +222,43 @@ class ParticleDump:
             contacts=data["contacts"].astype(np.int64) if "contacts" in data else None,
         )
 
-    def _read(self, index: int) -> dict[str, FloatArray]:
-        """Read one frame's columns, each (n,) and ordered by id."""
-        columns = self._layout.columns
-        try:
-            if self._reader is None:
-                # Additional columns are the only exact ones: MDAnalysis keeps positions as
-                # float32 and shifts them to the box's origin. dt only silences its warning.
-                self._reader = DumpReader(str(self.path), additional_columns=[*columns], dt=1.0)
-            values = self._reader[index].data
-        # An id of twenty digits makes an OverflowError.
-        except (ValueError, IndexError, OverflowError) as error:
-            self._reader = None
-            mistake = self._malformed() or self._mistake(self._headers[index])
-            raise mistake or DumpError(self.path, f"cannot be read: {error}") from None
-        # These are copies, since MDAnalysis reads the next frame into the same arrays.
-        return {name: np.array(values[name], dtype=np.float64) for name in columns}
-
-    def _malformed(self) -> DumpError | None:
-        """Find the first row that MDAnalysis cannot read; it does not tell which one it was."""
-        line = 1
-        with open_dump(self.path) as dump:
-            while header := read_header(dump, self.path, line):
-                rows = read_rows(dump, self.path, header)
-                columns = self._layout.columns
-                if error := malformed_row(rows, header, columns, self.path, whole=("id",)):
-                    return error
-                line = header.next_line
-        return None
-
-    def _check(self, header: FrameHeader, data: dict[str, FloatArray]) -> None:
-        ids, size, whole = data["id"], self._layout.size, self._layout.whole
-        fine = np.isfinite(np.column_stack(list(data.values()))).all(axis=1)
-        fine &= (ids >= 1) & (ids < LARGEST_ID)
+    def _check(self, header: FrameHeader, table: FloatArray) -> None:
+        """See that the rows of a frame, in the order of the file, can be spheres."""
+        columns, size, whole = self._layout.columns, self._layout.size, self._layout.whole
+        ids = table[:, 0]
+        named = (ids >= 1) & (ids < LARGEST_ID)
+        again = np.ones(len(ids), dtype=np.bool_)
+        again[np.unique(ids, return_index=True)[1]] = False
+        fine = np.isfinite(table).all(axis=1) & named & ~again
         if size is not None:
-            fine &= data[size] > 0
+            fine &= table[:, columns.index(size)] > 0
         for name in whole:
-            fine &= (data[name] >= 0) & (data[name] == np.rint(data[name]))
-        if not fine.all() or (np.diff(ids) == 0).any():
-            raise self._mistake(header) or DumpError(self.path, "changed while it was read")
-
-    def _mistake(self, header: FrameHeader) -> DumpError | None:
-        """Find the first row that is wrong, in the order of the file, which tells its line."""
-        with open_dump(self.path) as dump:
-            rows = list(islice(dump, header.first_row_line - 1, header.next_line - 1))
-        columns = self._layout.columns
-        place = [header.columns.index(name) for name in columns]
-        before: set[int] = set()
-        for line, row in enumerate(rows, start=header.first_row_line):
-            fields = row.split()
-            number = int(fields[place[0]])
-            values = {
-                name: float(fields[k]) for name, k in zip(columns[1:], place[1:], strict=True)
-            }
-            if not 1 <= number < LARGEST_ID or number in before:
-                said = f"step {header.step}: ids must be positive and each there once"
-                return DumpError(self.path, said, line)
-            before.add(number)
-            if said := self._said_of(values):
-                return DumpError(self.path, f"step {header.step}, sphere {number}: {said}", line)
-        return None
+            values = table[:, columns.index(name)]
+            fine &= (values >= 0) & (values < LARGEST_ID) & (values == np.rint(values))
+        if fine.all():
+            return
+        row = int(np.argmin(fine))
+        line = header.first_row_line + row
+        if not named[row] or again[row]:
+            said = f"step {header.step}: ids must be positive and each there once"
+            raise DumpError(self.path, said, line)
+        said = self._said_of(dict(zip(columns[1:], table[row, 1:].tolist(), strict=True)))
+        raise DumpError(self.path, f"step {header.step}, sphere {int(ids[row])}: {said}", line)
 
     def _said_of(self, values: dict[str, float]) -> str:
-        """Say what is wrong with the values of a sphere; nothing if they are right."""
+        """Say what is wrong with the values of a sphere."""
         for name, value in values.items():
             if not math.isfinite(value):
                 return f"{name} is {value}"
         size = self._layout.size
         if size is not None and not values[size] > 0:
             return f"{size} is not positive"
-        for name in self._layout.whole:
-            if values[name] < 0 or values[name] != round(values[name]):
-                return f"{name} must be {WHOLE_NUMBERS[name]}, not {values[name]:g}"
-        return ""
+        name = next(
+            name
+            for name in self._layout.whole
+            if not 0 <= values[name] < LARGEST_ID or values[name] != round(values[name])
+        )
+        return f"{name} must be {WHOLE_NUMBERS[name]}, not {values[name]:g}"
 
 
 def read_particle_frame(
@@ -265,6 +284,8 @@ def check_not_periodic(
 ) -> None:
     """See that the box of a frame has no periodic face: nothing here looks across one.
 
+    A dump that does not say which faces are periodic is taken for one without.
+
     Parameters
     ----------
     frame : frame of a particle dump
@@ -273,7 +294,7 @@ def check_not_periodic(
 
     Raises DumpError for a box that is periodic along any axis, InputError without a path.
     """
-    if not any("p" in flags for flags in frame.boundaries):
+    if not frame.boundaries or not any("p" in flags for flags in frame.boundaries):
         return
     said = (
         f"the box is periodic ({' '.join(frame.boundaries)}), and {lacking}: "
@@ -308,29 +329,3 @@ def _layout(header: FrameHeader, path: Path, radius: float | None) -> _Layout:
     )
     require_columns(header, layout.columns, path)
     return layout
-
-
-def _scanned_headers(path: Path) -> list[FrameHeader]:
-    """Read all headers; see that every frame is whole and has the same spheres and columns."""
-    headers: list[FrameHeader] = []
-    line = 1
-    with open_dump(path) as dump:
-        while header := read_header(dump, path, line):
-            if header.rows == 0:
-                raise DumpError(path, f"the frame of step {header.step} has no spheres", line + 3)
-            first = headers[0] if headers else header
-            if header.rows != first.rows:
-                raise DumpError(
-                    path,
-                    f"{header.rows} spheres at step {header.step}, "
-                    f"but {first.rows} at step {first.step}",
-                    line + 3,
-                )
-            if header.columns != first.columns:
-                raise DumpError(path, "the columns are not those of the first frame", line + 8)
-            read_rows(dump, path, header)
-            headers.append(header)
-            line = header.next_line
-    if not headers:
-        raise DumpError(path, "the file is empty")
-    return headers

@@ -41,12 +41,15 @@ class RunFiles:
     contacts: Path | None
     log: RunLog | None
 
-    def contact_frames(self, frame: ParticleFrame) -> Iterator[ContactFrame]:
+    def contact_frames(
+        self, frame: ParticleFrame, step: int | None = None
+    ) -> Iterator[ContactFrame]:
         """Read the contact frames, and see that each belongs to a particle frame.
 
         Parameters
         ----------
-        frame : the last one of the particle dump
+        frame : the last one of the particle dump, or that of `step`
+        step : time step of the one contact frame that is read, if it is there; None for all
 
         Raises RunFilesError where the contacts are not those of these particles.
         """
@@ -54,31 +57,33 @@ class RunFiles:
             raise RunFilesError(f"{self.particles.path}: no contact dump belongs to it")
         written = None if self.log is None else self.log.written(self.contacts)
         for number, contacts in enumerate(iterate_contact_frames(self.contacts)):
+            if step is not None and contacts.step != step:
+                continue
             known = written is not None and number < len(written.runs)
             run = int(written.runs[number]) if written is not None and known else None
             self._check(self.contacts, contacts, frame, run)
             yield contacts
+            if step is not None:
+                return
 
     def _check(
         self, path: Path, contacts: ContactFrame, frame: ParticleFrame, run: int | None
     ) -> None:
-        check_contacts(contacts, frame, path, self._same_moment(run))
+        last = frame.step == self.particles.steps[-1]
+        check_contacts(contacts, frame, path, last and self._same_moment(run))
         if run is not None:
             between = int((contacts.ids[:, 1] > 0).sum())
             counted = {5: between, 6: len(contacts.ids) - between}
             self._compare(path, contacts.step, run, counted)
 
-    def check_last(self, frame: ParticleFrame) -> None:
-        """See that the last particle frame has the contacts of which the log tells.
-
-        Parameters
-        ----------
-        frame : the last one of the particle dump
-        """
+    def check_last(self) -> None:
+        """See that the last particle frame has the contacts of which the log tells."""
         written = self._written(self.particles.path)
-        if written is None or frame.contacts is None or frame.step != written.steps[-1]:
+        # A frame of another run need not be read.
+        if written is None or self.particles.steps[-1] != written.steps[-1]:
             return
-        if written.fix is not None and written.group == "all":
+        frame = self.particles[-1]
+        if frame.contacts is not None and written.fix is not None and written.group == "all":
             counted = {5: int(frame.contacts.sum()) / 2}
             self._compare(self.particles.path, frame.step, int(written.runs[-1]), counted)
 
@@ -267,10 +272,21 @@ def _differences(written: Written, steps: Sequence[int]) -> tuple[list[int], lis
 
 def _check_number(particles: ParticleDump, written: Written, log: RunLog) -> None:
     """Compare the number of spheres with those of the runs that wrote the dump."""
-    numbers = {log.runs[run].atoms for run in set(written.runs.tolist())} - {None}
-    if numbers and particles.spheres not in numbers:
+    writers = [log.runs[run] for run in written.runs.tolist()]
+    numbers = {run.atoms for run in writers} - {None}
+    there = set(particles.spheres)
+    wrong = next(iter(there)) if len(there) == 1 and not there & numbers else None
+    if len(there) > 1 and particles.steps == tuple(written.steps.tolist()):
+        # A log tells the number of atoms at the end of each run only.
+        ends = zip(particles.spheres, particles.steps, writers, strict=True)
+        known = ((count, run.atoms) for count, step, run in ends if step == run.known)
+        wrong, numbers = next(
+            ((count, {atoms}) for count, atoms in known if atoms not in (None, count)),
+            (None, numbers),
+        )
+    if numbers and wrong is not None:
         raise RunFilesError(
-            f"{particles.path}: {particles.spheres} spheres, but {max(numbers)} atoms in "
+            f"{particles.path}: {wrong} spheres, but {max(numbers)} atoms in "
             f"{log.path.name}: they are of different runs; {AGAIN}"
         )
 

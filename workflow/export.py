@@ -36,6 +36,7 @@ from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray, 
 
 from .finished import CONTACTS as CONTACT_DUMP
 from .finished import open_in_folder
+from .frames import choose_index
 
 # The file has this name if no other is given, and its format's ending.
 NAME = "packing"
@@ -49,8 +50,6 @@ SUBDIVISIONS = 2
 # Why surfaces and images are not made of a periodic box; points know their box, or need none.
 NOT_ACROSS = "spheres that reach through its faces are not drawn on the other side yet"
 
-# So many steps are named where one is not found.
-STEPS_SHOWN = 6
 # A line is printed after each of so many equal parts where there is no terminal.
 PARTS = 10
 
@@ -58,7 +57,7 @@ PARTS = 10
 def choose_frame(
     dump: ParticleDump, source: Path, *, number: int | None, step: int | None
 ) -> ParticleFrame:
-    """Return a frame of a dump, the last one if none is chosen.
+    """Return a frame of a dump as `choose_index` does; by its number only where none is missing.
 
     Parameters
     ----------
@@ -67,22 +66,10 @@ def choose_frame(
     number : number of the frame from 0, or from the end: -1 is the last
     step : time step of the frame, which comes before its number
     """
-    if step is not None:
-        # A frame that is named by its step is the right one, whatever became of the others.
-        if step not in dump.steps:
-            raise AnalysisError(f"{dump.path}: no step {step}; {_as_steps(dump.steps)}")
-        if dump.steps.count(step) > 1:
-            raise AnalysisError(
-                f"{dump.path}: more than one frame of step {step}; --frame N chooses one"
-            )
-        return dump[dump.steps.index(step)]
-    _check_frames(dump, source)
-    index = -1 if number is None else number
-    if not -len(dump) <= index < len(dump):
-        raise AnalysisError(
-            f"{dump.path}: no frame {index}; there are {len(dump)}, from 0 to {len(dump) - 1}"
-        )
-    return dump[index]
+    # A frame that is named by its step is the right one, whatever became of the others.
+    if step is None:
+        _check_frames(dump, source)
+    return dump[choose_index(dump, number=number, step=step)]
 
 
 def _check_frames(dump: ParticleDump, source: Path) -> None:
@@ -97,13 +84,6 @@ def _check_frames(dump: ParticleDump, source: Path) -> None:
         raise AnalysisError(f"{error}; --step N writes a frame that is there") from None
     except RunFilesError as error:
         raise AnalysisError(f"{error}, or write a frame that is there with --step N") from None
-
-
-def _as_steps(steps: tuple[int, ...]) -> str:
-    if len(steps) <= STEPS_SHOWN:
-        return f"the steps are {', '.join(map(str, steps))}"
-    first = ", ".join(map(str, steps[: STEPS_SHOWN - 1]))
-    return f"the {len(steps)} steps are {first}, ..., {steps[-1]}"
 
 
 def write_spheres(
@@ -148,7 +128,8 @@ def write_spheres(
             radii,
             **columns.arrays,
             box=frame.box,
-            periodic=["p" in flags for flags in frame.boundaries],
+            # A reader takes a box of which nothing is said for a periodic one.
+            periodic=["p" in flags for flags in frame.boundaries or ("", "", "")],
             step=frame.step,
         )
     else:

@@ -101,7 +101,7 @@ def open_in_folder(
     folder = dump.path.parent
     log = read_run_log(folder / LOG) if (folder / LOG).exists() else None
     files = open_run(dump, contacts, log, over=over)
-    files.check_last(dump[-1])
+    files.check_last()
     if not alone:
         _check_recorded(folder)
     return files
@@ -128,8 +128,7 @@ def check_stage(
     if stage["deck"] in DECKS:
         _check_log(files, log)
         _check_variables(stage, files, log)
-    frame = files.particles[-1]
-    files.check_last(frame)
+    files.check_last()
     check_unchanged(folder, record, stage)
 
 

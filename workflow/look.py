@@ -26,6 +26,7 @@ from lammps_inelastic.analysis import (
 )
 
 from .finished import open_in_folder
+from .frames import choose_index, notes_of
 from .pictures import draw_frame
 
 PICTURE = "packing.png"
@@ -43,7 +44,7 @@ class Look:
     contact_dump : path of the contact dump; None where contacts are counted by distance
     contact_gap : gap below which two spheres are in contact, length; None where contacts are those
         of the contact dump, which carry a force
-    frame : last particle frame, on which everything but the contacts is measured
+    frame : particle frame on which everything but the contacts is measured
     box : (3, 2), where the packing fraction and the coordination number are measured, length
     seed : seed of the random points
     packing : numbers of the packing, as studies measure them
@@ -53,6 +54,7 @@ class Look:
     wall_contacts_in_all : contacts of all particles with walls, mean over the contact frames
     picture : path of the picture; None if there is none
     failure : reason why there is no picture; None if there is one, or none was asked for
+    notes : one line for each thing that the dump lacks
     """
 
     dump: Path
@@ -68,6 +70,7 @@ class Look:
     wall_contacts_in_all: float
     picture: Path | None
     failure: PictureError | None
+    notes: tuple[str, ...]
 
     @property
     def smallest_radius(self) -> float:
@@ -82,13 +85,17 @@ def look_at(
     *,
     contact_gap: float | None,
     radius: float | None,
+    number: int | None,
+    step: int | None,
     points: int,
     seed: int,
     container: FloatArray | None,
     box_is_container: bool,
     picture: Path | None,
 ) -> Look:
-    """Measure the last frame of a run and its contacts, and draw it.
+    """Measure a frame of a run and its contacts, and draw it.
+
+    Contacts are those of all contact frames; where a frame is chosen, of its step alone.
 
     Parameters
     ----------
@@ -98,6 +105,8 @@ def look_at(
     contact_gap : gap below which two spheres are in contact, smallest radii; None to read the
         contact dump
     radius : radius of all spheres, for a dump without radii, length
+    number : number of the frame from 0, or from the end; None for the last one
+    step : time step of the frame, which comes before its number
     points : number of random points for the packing fraction
     seed : seed of these points
     container : (3, 2), box whose faces are the walls, length; None for the dump's, if its faces are
@@ -108,15 +117,16 @@ def look_at(
     Raises AnalysisError with one line. A picture that cannot be drawn is told by `Look.failure`:
     the numbers do not need it.
     """
-    particle_dump = ParticleDump(dump, radius=radius)
-    files = _files(particle_dump, contact_dump if contact_gap is None else None)
-    frame = particle_dump[-1]
+    particle_dump = ParticleDump(dump, radius=radius, whole=False)
+    chosen = number is not None or step is not None
+    files = _files(particle_dump, contact_dump if contact_gap is None else None, chosen, step)
+    frame = particle_dump[choose_index(particle_dump, number=number, step=step)]
     _check_frame(dump, frame, box)
     walls = container
-    if walls is None and (box_is_container or all(flags == "ff" for flags in frame.boundaries)):
+    if walls is None and (box_is_container or frame.boundaries == ("ff", "ff", "ff")):
         walls = frame.box
     gap = None if contact_gap is None else contact_gap * float(frame.radii.min())
-    steps, counts = _count_contacts(files, frame, gap, walls)
+    steps, counts = _count_contacts(files, frame, gap, walls, frame.step if chosen else None)
     failure = None if picture is None else _draw(picture, frame, walls, counts[-1])
     packing = measure_packing(frame, counts, box, points=points, seed=seed, walls=walls)
     # There is a frame of contacts, and a particle in the box.
@@ -135,6 +145,7 @@ def look_at(
         wall_contacts_in_all=float(np.mean([count.walls.sum() for count in counts])),
         picture=picture if failure is None else None,
         failure=failure,
+        notes=tuple(notes_of(particle_dump, frame)),
     )
 
 
@@ -150,11 +161,28 @@ def _draw(
     return None
 
 
-def _files(particles: ParticleDump, contacts: Path | None) -> RunFiles:
-    """Open the files of a run, which must belong together, as far as there is a log to tell."""
+def _files(
+    particles: ParticleDump, contacts: Path | None, chosen: bool, step: int | None
+) -> RunFiles:
+    """Open the files of a run, which must belong together, as far as there is a log to tell.
+
+    Parameters
+    ----------
+    particles : particle dump
+    contacts : path of the contact dump; None where contacts are counted by distance
+    chosen : whether the user has chosen a frame
+    step : time step of that frame; None where it is named by its number
+    """
     if contacts is not None and not contacts.exists():
         raise AnalysisError(
             f"{contacts}: no such file; --contact-gap GAP counts contacts by distance"
+        )
+    if step is not None:
+        # A frame that is named by its step is the right one, whatever became of the others.
+        return RunFiles(particles, contacts, None)
+    if contacts is not None and particles.cut_off is not None and not chosen:
+        raise AnalysisError(
+            f"{particles.cut_off}; --contact-gap GAP counts contacts in the last whole frame"
         )
     try:
         # By distance, contacts are those of one frame, whatever comes after it.
@@ -176,17 +204,29 @@ def _check_frame(dump: Path, frame: ParticleFrame, box: FloatArray) -> None:
 
 
 def _count_contacts(
-    files: RunFiles, frame: ParticleFrame, gap: float | None, walls: FloatArray | None
+    files: RunFiles,
+    frame: ParticleFrame,
+    gap: float | None,
+    walls: FloatArray | None,
+    step: int | None,
 ) -> tuple[list[int], list[ContactCounts]]:
-    """Count contacts by distance or in every contact frame; return the frames' steps, too."""
+    """Count contacts by distance or in contact frames, all of them or those of one step.
+
+    The frames' steps are returned, too.
+    """
     particles = frame.particles
     if gap is not None:
         near = contacts_by_distance(frame.positions, frame.radii, gap, particles, walls)
         return [frame.step], [contact_counts(near.ids(frame.ids), frame.ids, particles)]
     steps, counts = [], []
-    for contacts in files.contact_frames(frame):
+    for contacts in files.contact_frames(frame, step):
         steps.append(contacts.step)
         counts.append(contact_counts(contacts.ids, frame.ids, particles))
+    if not steps:
+        raise AnalysisError(
+            f"{files.contacts}: no contacts of step {frame.step}; --contact-gap GAP counts them "
+            "by distance"
+        )
     return steps, counts
 
 

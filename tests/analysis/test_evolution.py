@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import (
     InputError,
     ParticleDump,
+    ParticleFrame,
     iterate_contact_frames,
     measure_evolution,
     monte_carlo,
@@ -34,11 +35,10 @@ def rows_at(height: float, speed: float, contacts: int) -> Rows:
 COLUMNS = "id x y z vx vy vz radius contacts"
 
 
-def seen(positions: ArrayLike, radii: ArrayLike, box: ArrayLike) -> float:
+def seen(frame: ParticleFrame, box: NDArray[np.float64]) -> float:
     """Return a packing fraction that says what it was given."""
-    assert np.shape(positions) == (2, 3)
-    assert np.shape(radii) == (2,)
-    return float(np.asarray(box)[0, 1])
+    assert frame.positions.shape == (2, 3)
+    return float(box[0, 1])
 
 
 def test_each_frame(write_particles: Writer) -> None:

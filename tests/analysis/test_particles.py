@@ -257,14 +257,30 @@ def test_wrong_number_of_rows(write_particles: Writer, announced: int) -> None:
 
 
 def test_frame_without_particles(write_particles: Writer) -> None:
-    with pytest.raises(DumpError, match="line 4: the frame of step 5 has no spheres"):
-        read_particle_frame(write_particles({5: []}))
+    """A container that is still empty: the frames after it are read."""
+    path = write_particles({5: [], 6: [FIRST]})
+    assert read_particle_frame(path).ids.tolist() == [1]
+    with pytest.raises(DumpError, match="line 9: the frame of step 5 has no spheres"):
+        read_particle_frame(path, 0)
 
 
 def test_number_of_particles_changes(write_particles: Writer) -> None:
-    path = write_particles({0: [FIRST, SECOND], 1: [FIRST]})
-    with pytest.raises(DumpError, match="line 15: 1 spheres at step 1, but 2 at step 0"):
-        read_particle_frame(path)
+    dump = ParticleDump(write_particles({0: [FIRST], 1: [SECOND, FIRST], 2: [SECOND]}))
+    assert dump.spheres == (1, 2, 1)
+    assert [frame.ids.tolist() for frame in dump] == [[1], [1, 2], [2]]
+
+
+def test_whole_frames_of_a_file_that_is_cut_off(write_particles: Writer) -> None:
+    path = write_particles({0: [FIRST], 1: [SECOND]})
+    path.write_bytes(path.read_bytes()[:-1])
+    dump = ParticleDump(path, whole=False)
+    assert [frame.ids.tolist() for frame in dump] == [[1]]
+    assert dump.cut_off is not None
+    assert "the file ends inside the frame of step 1: 0 of 1 rows" in dump.cut_off
+    # No frame of this one is whole.
+    path.write_text(path.read_text().partition("ITEM: TIMESTEP\n1")[0][:-1])
+    with pytest.raises(DumpError, match="line 10: the file ends inside the frame of step 0"):
+        ParticleDump(path, whole=False)
 
 
 def test_columns_change(write_particles: Writer) -> None:
@@ -286,12 +302,14 @@ def test_columns_change(write_particles: Writer) -> None:
         ("\n2 1", "\n2.5 1", r"line 11: id = '2\.5' is no whole number"),
         ("\n2 1", "\n2e0 1", "line 11: id = '2e0' is no whole number"),
         ("\n2 1", "\n1 1", "step 0: ids must be positive and each there once"),
-        ("ff ff ff", "xy xz yz ff ff ff", "line 5: expected an orthogonal box"),
+        ("ff ff ff", "xy xz yz ff ff ff", "line 6: expected two bounds and a tilt, found"),
+        ("ff ff ff", "ff ff", "line 5: expected two letters for each axis of the box, or none"),
         ("e+00 5.0", "e+00 -5.0", "line 7: box bounds 0 -5 are not in order"),
         ("e+00 5.0", "e+00 5.0 5.0", "line 7: expected two bounds"),
         ("ATOMS\n2", "ATOMS\ntwo", "line 4: expected an integer, found 'two'"),
         ("ITEM: ATOMS", "ITEM: ENTRIES", "line 9: expected 'ITEM: ATOMS'"),
-        ("ITEM: TIMESTEP", "ITEM: UNITS\nlj\nITEM: TIMESTEP", "line 1: .* 'units yes'"),
+        ("ITEM: TIMESTEP", "ITEM: UNITS\nITEM: TIMESTEP", "line 2: expected a value"),
+        ("ITEM: TIMESTEP", "ITEM: GRID", r"line 1: .*\(it is no text dump custom or local"),
     ],
 )
 def test_malformed(write_particles: Writer, old: str, new: str, message: str) -> None:

@@ -16,6 +16,9 @@ from lammps_inelastic.analysis import InputError
 
 BOX = [[0, 1]] * 3
 ONE = ([[0.5, 0.5, 0.5]], [0.3], BOX)
+FRAME = analysis.ParticleFrame(
+    0, np.array([1]), np.array(ONE[0]), None, np.array(ONE[1]), None, np.array(BOX, float), None
+)
 FREE = analysis.group_spheres([0])
 TEN = np.full(10, 0.5)
 NOISE = analysis.RadialDistribution(np.array([0.0, 1.0]), np.array([1.0]), 1.0, 1)
@@ -50,7 +53,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         "the seed must be at least 0, not -1",
     ),
     "seed of a function": (
-        lambda: analysis.monte_carlo(seed=-1)(*ONE),
+        lambda: analysis.measure_evolution([FRAME], BOX, packing=analysis.monte_carlo(seed=-1)),
         "the seed must be at least 0",
     ),
     "seed of necks": (

@@ -530,7 +530,7 @@ def test_whole_runs_are_whole(start: Path, deck: str, variables: dict[str, objec
         contacts = run / CONTACTS if (run / CONTACTS).exists() else None
         assert (contacts is None) == (variables.get("contacts") == "soft")
         opened = open_run(dump, contacts, read_run_log(run / LOG))
-        opened.check_last(dump[-1])
+        opened.check_last()
         if contacts is not None:
             *_, last = opened.contact_frames(dump[-1])
             assert last.step == dump[-1].step

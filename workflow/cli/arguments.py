@@ -39,6 +39,18 @@ def add_out(parser: argparse.ArgumentParser, default: str = "studies", what: str
     )
 
 
+def add_frame(parser: argparse.ArgumentParser) -> None:
+    """Add which frame of a dump is taken."""
+    frames = parser.add_mutually_exclusive_group()
+    frames.add_argument(
+        "--frame",
+        type=int,
+        metavar="N",
+        help="frame, counted from 0, or from the end: -1 is the last (default: the last)",
+    )
+    frames.add_argument("--step", type=int, metavar="N", help="frame of this time step")
+
+
 def add_running(parser: argparse.ArgumentParser) -> None:
     """Add how cases are run."""
     parser.add_argument(

@@ -13,6 +13,8 @@ from lammps_inelastic.analysis.geometry import as_box
 
 from ..export import ENDINGS, IMAGES, NAME, SUBDIVISIONS, choose_frame, write_image, write_spheres
 from ..finished import PARTICLES as PARTICLE_DUMP
+from ..frames import notes_of
+from .arguments import add_frame
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -37,14 +39,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="FILE",
         help=f"file to write (default: {NAME} and the format's ending, in the run's folder)",
     )
-    frames = export.add_mutually_exclusive_group()
-    frames.add_argument(
-        "--frame",
-        type=int,
-        metavar="N",
-        help="frame, counted from 0, or from the end: -1 is the last (default: the last)",
-    )
-    frames.add_argument("--step", type=int, metavar="N", help="frame of this time step")
+    add_frame(export)
     export.add_argument(
         "--box",
         type=float,
@@ -76,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     if options.subdivisions is not None and options.format != "stl":
         raise AnalysisError(f"--subdivisions is for stl, not for {options.format}")
     source: Path = options.source
-    dump = ParticleDump(source / PARTICLE_DUMP if source.is_dir() else source)
+    dump = ParticleDump(source / PARTICLE_DUMP if source.is_dir() else source, whole=False)
     frame = choose_frame(dump, source, number=options.frame, step=options.step)
     box = None if options.box is None else as_box(np.reshape(options.box, (3, 2)))
     out: Path = options.out or dump.path.with_name(NAME + ENDINGS[options.format])
@@ -86,6 +81,7 @@ def run(options: argparse.Namespace) -> int:
         rows = write_spheres(
             options.format, out, dump.path, frame, box, source, options.subdivisions
         )
+    rows += [("note", note) for note in notes_of(dump, frame)]
     left = max(len(name) for name, _ in rows)
     print("\n".join(f"{name:<{left}}  {value}" for name, value in rows))
     return 0

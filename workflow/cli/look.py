@@ -15,6 +15,7 @@ from ..finished import PARTICLES as PARTICLE_DUMP
 from ..look import PICTURE, look_at
 from ..look_output import as_json, as_text
 from ..study import PAPER_BOX
+from .arguments import add_frame
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -50,6 +51,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="R",
         help="radius of all spheres, for a dump without radius and diameter",
     )
+    add_frame(look)
     bounds = ("XLO", "XHI", "YLO", "YHI", "ZLO", "ZHI")
     look.add_argument(
         "--box",
@@ -101,6 +103,8 @@ def run(options: argparse.Namespace) -> int:
         np.reshape(np.asarray(options.box, dtype=np.float64), (3, 2)),
         contact_gap=options.contact_gap,
         radius=options.radius,
+        number=options.frame,
+        step=options.step,
         points=options.points,
         seed=options.seed,
         container=None
