@@ -12,6 +12,10 @@ class WorkflowError(ValueError):
     """The base of every error that the workflow raises on purpose."""
 
 
+class WriteError(WorkflowError):
+    """A file could not be written: the disk is full, or may not be written to."""
+
+
 class StudyError(WorkflowError):
     """The mistakes of a study file; `mistakes` has one line for each."""
 

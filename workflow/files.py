@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import WorkflowError
+from .errors import WorkflowError, WriteError
 
 # Every HDF5 file begins with these bytes.
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -22,7 +22,7 @@ LONGEST_HOST = 20
 def whole(path: Path) -> Iterator[Path]:
     """Give a temporary name to write to; what was written gets the file's own name in the end.
 
-    Raises WorkflowError, with the name of the file, where the disk is full or may not be written.
+    Raises WriteError, with the name of the file, where the disk is full or may not be written.
     """
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -41,14 +41,14 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file that is either whole or not there; raise WorkflowError as `whole` does."""
+    """Write a text file that is either whole or not there; raise WriteError as `whole` does."""
     with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Raise WorkflowError with the file or folder that could not be written.
+    """Raise WriteError with the file or folder that could not be written.
 
     The system's own error often does not name it.
     """
@@ -58,9 +58,9 @@ def writing(path: Path) -> Iterator[None]:
     except FileExistsError as error:
         if Path(error.filename).is_dir():
             raise
-        raise WorkflowError(f"{path}: cannot be written: {error.filename} is no folder") from None
+        raise WriteError(f"{path}: cannot be written: {error.filename} is no folder") from None
     except OSError as error:
-        raise WorkflowError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise WriteError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def read_regular(path: Path, most: int) -> bytes:

@@ -32,6 +32,8 @@ PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
 LOG = "log.lammps"
 # A result's record is that of its run, and says under this key which version has measured it.
 MEASURED_BY = "measured by"
+# The exit status of the measuring process if a run's files are not whole, or not of that run.
+NOT_WHOLE = 2
 # So begins a line of the measuring process about a number that a result lacks.
 NOT_MEASURED = "not measured: "
 # And so one about a box that reaches out of the bed.

@@ -11,6 +11,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -20,7 +21,7 @@ from types import FrameType
 from typing import Any
 
 from .errors import StudyError, WorkflowError
-from .finished import REMARKS
+from .finished import NOT_MEASURED, NOT_WHOLE, REMARKS
 from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record
@@ -189,8 +190,7 @@ class _Job:
                 display.ended(name, f"done in {self._seconds:.0f} s: {name}")
                 self._held.close()
                 return False
-            reason = failure_in(lines) or exit_reason(code)
-            reason = unmeasurable(reason, self._folder.case(self._case))
+            reason = unmeasurable(code, lines, self._folder.case(self._case))
             return self._leave(reason, lines, outcome, display)
         if code != 0:
             return self._fail(exit_reason(code), outcome, display)
@@ -282,9 +282,34 @@ def measuring(study: Study, case: Case, folder: Folder) -> list[str]:
     return [sys.executable, "-m", module, ".", str(target), study.outputs.model_dump_json()]
 
 
-def unmeasurable(reason: str, folder: Path) -> str:
-    """Say why a finished run gives no result, and what to do about it."""
-    return f"cannot be measured: {reason}; delete {folder} to run it again"
+def unmeasurable(code: int, lines: Sequence[str], folder: Path) -> str:
+    """Say why a finished run gives no result, and what to do about it.
+
+    Parameters
+    ----------
+    code : exit status of the measuring process
+    lines : what it has printed
+    folder : folder of the run
+    """
+    reason = failure_in(lines)
+    if code == NOT_WHOLE:
+        return f"cannot be measured: {reason}; delete {folder} to run it again"
+    if not reason:
+        # Without room the process could not even say so.
+        full = f"{folder}: nothing can be written there: the disk is full, or read-only"
+        reason = exit_reason(code) if _is_room_in(folder) else full
+    return f"cannot be measured: {reason}; the run is kept, and is measured the next time"
+
+
+def _is_room_in(folder: Path) -> bool:
+    """Say whether a file can be written in a folder."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"0")
+            file.flush()
+    except OSError:
+        return False
+    return True
 
 
 def note_timeout(case: Path, limit: float) -> None:
@@ -316,7 +341,7 @@ def show_remarks(case: str, lines: Iterable[str], display: Display) -> None:
 def measure_finished(
     study: Study, case: Case, folder: Folder, display: Display, limit: float | None = None
 ) -> str | None:
-    """Measure a finished run, and wait for it; return what went wrong, None if nothing did.
+    """Measure a finished run, and wait for it; return why there is no result, None if there is.
 
     Raises TimeoutExpired of subprocess if it takes longer than the limit [seconds].
     """
@@ -337,7 +362,7 @@ def measure_finished(
         if study.outputs.keep == "results":
             folder.drop_dumps(case)
         return None
-    return failure_in(lines) or exit_reason(done.returncode)
+    return unmeasurable(done.returncode, lines, where)
 
 
 def prepare_stage(case: Case, stage: int, part: Path) -> None:

@@ -14,6 +14,7 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from lammps_inelastic.analysis import (
     ParticleDump,
     ParticleFrame,
     Particles,
+    PictureError,
     RunFiles,
     RunLog,
     at_steps,
@@ -55,13 +57,14 @@ from lammps_inelastic.analysis import (
 from lammps_inelastic.analysis.run_files import AGAIN
 
 from .decks import gravity_of
-from .errors import WorkflowError
+from .errors import WorkflowError, WriteError
 from .finished import (
     CONTACTS,
     FINISHED,
     LOG,
     MEASURED_BY,
     NOT_MEASURED,
+    NOT_WHOLE,
     OUT_OF_BED,
     PARTICLES,
     check_stage,
@@ -478,15 +481,20 @@ def _profile(
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Measure; 0 if all went well, 2 after one line on stderr about what did not."""
+    """Measure; 0 if all went well, else after one line on stderr about what did not.
+
+    NOT_WHOLE if it is the run, and 1 if it is the result, which could not be drawn or written.
+    """
     folder, target, outputs = arguments
     try:
         write_result(Path(target), measure_case(Path(folder), Outputs.model_validate_json(outputs)))
     except (AnalysisError, WorkflowError, OSError) as error:
         # The caller says what to do, and names the folder that must go.
         said = str(error).removesuffix(f"; {AGAIN}")
-        print(" ".join(said.split()), file=sys.stderr)
-        return 2
+        with suppress(OSError):
+            # A disk that is full has no room for the reason, either.
+            print(" ".join(said.split()), file=sys.stderr)
+        return 1 if isinstance(error, WriteError | PictureError | OSError) else NOT_WHOLE
     return 0
 
 

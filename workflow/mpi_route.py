@@ -33,7 +33,6 @@ from .launch import (
     missing_file,
     note_timeout,
     prepare_stage,
-    unmeasurable,
 )
 from .progress import Display
 from .provenance import run_record
@@ -153,8 +152,8 @@ def _lead(
         outcome.measured.append(case.name)
         display.ended(case.name, f"done in {time.time() - began:.0f} s: {case.name}")
     else:
-        outcome.failed[case.name] = unmeasurable(reason, folder.case(case))
-        display.ended(case.name, f"CANNOT BE MEASURED ({reason}): {case.name}")
+        outcome.failed[case.name] = reason
+        display.ended(case.name, f"CANNOT BE MEASURED: {case.name}", [reason])
 
 
 def _make(

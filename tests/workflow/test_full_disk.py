@@ -7,11 +7,13 @@ a file: to a superuser no other folder is closed.
 
 from __future__ import annotations
 
+import os
 import re
 import resource
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -176,6 +178,27 @@ def test_a_disk_that_fills_up(done: Path, small_disk: Path) -> None:
     for path in small_disk.rglob("*.h5"):
         # What has got its name is whole.
         read_studies(path)
+
+
+@pytest.mark.parametrize("left", [0, 8192], ids=["no room for a word", "room for the reason"])
+def test_a_disk_that_is_full_when_a_run_is_measured(left: int, study: Path, tmp_path: Path) -> None:
+    """The message names the disk; the finished run is kept, and nobody is told to delete it."""
+    with mounted(tmp_path / "disk", "2M") as disk:
+        shutil.copytree(study / "out" / "cases", disk / "cases")
+        arguments = ["run", study / "few.toml", "--out", disk]
+        fill = disk / "fill"
+        with suppress(OSError), fill.open("wb", buffering=0) as file:
+            while True:
+                file.write(bytes(4096))
+        os.truncate(fill, fill.stat().st_size - left)
+        said = inelastic(*arguments)
+        (reason,) = (line for line in said.stdout.splitlines() if "  failed: " in line)
+        full = "No space left on device" if left else "nothing can be written there: the disk is"
+        assert re.search(rf"cannot be measured: {disk}/\S+: .*{full}", reason)
+        assert reason.endswith("; the run is kept, and is measured the next time")
+        assert "delete" not in said.stdout + said.stderr
+        fill.unlink()
+        assert "few: 1 done" in inelastic(*arguments).stdout
 
 
 def test_out_that_is_no_folder(study: Path, refused: Callable[..., str]) -> None:
