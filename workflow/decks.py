@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from .errors import WorkflowError
+from .errors import WorkflowError, meant
 from .files import is_file
 from .shipped import DECKS, deck_text
 
@@ -260,7 +260,8 @@ def find_deck(name: str, folder: Path) -> Deck:
     path = folder / name
     if not is_file(path):
         raise WorkflowError(
-            f"no deck {name!r}: it must be {', '.join(DECKS)} or a file as seen from {folder}"
+            f"no deck {name!r}{meant(name, DECKS)}: it must be {', '.join(DECKS)} or a file as "
+            f"seen from {folder}"
         )
     try:
         deck = Deck(path.stem, path.read_text(encoding="utf-8"), shipped=False)

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 
 # This is the exit status of a command that the user has interrupted.
 INTERRUPTED = 130
+
+
+def meant(name: str, names: Iterable[str]) -> str:
+    """Return the question whether the nearest of some names was meant; nothing if none is near."""
+    nearest = difflib.get_close_matches(name, [*names], n=1)
+    return f" (did you mean {nearest[0]}?)" if nearest else ""
 
 
 class WorkflowError(ValueError):

@@ -185,10 +185,7 @@ class Folder:
         Who gathers and writes inside of it never replaces newer results by older ones. Where the
         file system has no locks, or nothing may be written or has been run, it does not wait.
         """
-        with ExitStack() as held:
-            with suppress(OSError):
-                handle = os.open(self._gathers, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666)
-                fcntl.flock(held.enter_context(os.fdopen(handle, "w")), fcntl.LOCK_EX)
+        with held(self._gathers):
             yield
 
     @property
@@ -274,6 +271,27 @@ class Folder:
     def _of_failure(self, case: Case, what: str) -> str:
         said = (json_of(self.failure(case) / FAILED) or {}).get(what, UNKNOWN)
         return " ".join(str(said).split()) or UNKNOWN
+
+
+@contextmanager
+def held(path: Path, line: str = "") -> Iterator[None]:
+    """Wait until nobody else holds a lock, and hold it.
+
+    Where the file system has no locks, or the lock's file cannot be made, it does not wait.
+
+    Parameters
+    ----------
+    path : of the lock's file, whose folder must be there
+    line : is printed before a wait; nothing is if it is empty
+    """
+    with ExitStack() as stack:
+        with suppress(OSError):
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666)
+            file = stack.enter_context(os.fdopen(handle, "w"))
+            if line and not _locked(file):
+                print(line, flush=True)
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def _locked(file: IO[str]) -> bool:

@@ -140,3 +140,13 @@ def test_comments_in_a_table_do_not_change_a_deck() -> None:
 )
 def test_gravity_is_a_number_or_not_known(text: str, expected: float | None) -> None:
     assert gravity_of(text) == expected
+
+
+@pytest.mark.parametrize("time", ["1e-15", "9e-7"])
+def test_frames_closer_than_any_time_step_are_refused(time: str, tmp_path: Path) -> None:
+    """LAMMPS loses frames, and lines of the log, where they are as close as round-off."""
+    study = tmp_path / "study.toml"
+    head = 'title = "t"\ndeck = ["spheres", "settling"]\n'
+    study.write_text(f"{head}[parameters]\ntime_between = [1e-6, {time}]\n")
+    with pytest.raises(StudyError, match=r"time_between: .* is not allowed: .* at least 1e-6"):
+        read_study(study)

@@ -36,8 +36,18 @@ def mistakes_of(path: Path) -> list[str]:
         ('title = "t"\ndeck = []', "deck: a deck is a name, or a list of names, not []"),
         (
             'title = "t"\ndeck = "sphere"\n[parameters]\nseed = 1\ndrag = 1',
-            "deck: no deck 'sphere': it must be spheres, dimers, clusters, response, gluey, "
-            "settling or",
+            "deck: no deck 'sphere' (did you mean spheres?): it must be spheres, dimers, clusters, "
+            "response, gluey, settling or",
+        ),
+        ('title = "t"\ndeck = "grains"', "deck: no deck 'grains': it must be spheres, dimers, "),
+        (HEAD + "[parameter]\nseed = 1", "parameter: no such key (did you mean parameters?); all"),
+        (
+            HEAD + "[parameters]\npartcles = 1",
+            "parameters.partcles: no variable of that name (did you mean particles?); allowed are",
+        ),
+        (
+            HEAD + "[outputs.profile]\naxes = 'x'",
+            "outputs.profile.axes: no such key (did you mean axis?); allowed are axis, ",
         ),
         (HEAD + "foo = 1", "foo: no such key; allowed are title, deck, parameters, rows, outputs"),
         (
@@ -71,7 +81,10 @@ def mistakes_of(path: Path) -> list[str]:
             HEAD + "[parameters]\nseed = { from = 1, to = 9000 }\ndrag = [1, 2]",
             "more than 10000 cases",
         ),
-        (HEAD + "[outputs]\nboxx = 1", "outputs.boxx: no such key; allowed are box, points, evol"),
+        (
+            HEAD + "[outputs]\nboxx = 1",
+            "outputs.boxx: no such key (did you mean box?); allowed are box, points",
+        ),
         (HEAD + "[outputs]\nbox = 'big'", "outputs.box: it must be six numbers"),
         (HEAD + "[outputs]\nbox = [0, 1, 0, 1]", "outputs.box: it must be six numbers"),
         (HEAD + "[outputs]\nbox = [0, 1, 0, 1, 0, 1, 2]", "outputs.box: it must be six numbers"),
@@ -422,7 +435,9 @@ def test_mistakes_in_outputs_do_not_hide_others(write_study: Callable[..., Path]
 def test_study_that_is_neither_a_file_nor_shipped(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "table_1"]) == 2
     error = capsys.readouterr().err
-    assert error.startswith("inelastic: no study table_1: it must be a TOML file or ")
+    assert error.startswith(
+        "inelastic: no study table_1 (did you mean table-1?): it must be a TOML file or "
+    )
     assert "table-1, table-2" in error
 
 

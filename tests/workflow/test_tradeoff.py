@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
+import subprocess
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
@@ -24,6 +26,7 @@ from lammps_inelastic.analysis import (
 )
 from lammps_inelastic.analysis.geometry import FloatArray
 from lammps_inelastic.workflow.cli import tradeoff as tradeoff_command
+from lammps_inelastic.workflow.folder import held
 from lammps_inelastic.workflow.launch import cores
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.settling import first_at_rest, overlaps_as_contacts
@@ -48,7 +51,14 @@ from lammps_inelastic.workflow.tradeoff.table import as_csv, out_of_bed
 from tests.core.contact_problems import Problem, no_bodies
 from tests.core.reference_solver import reference
 from tests.workflow.few_spheres import write_data
-from tests.workflow.study_run import killed_when, numbers_of, same
+from tests.workflow.study_run import (
+    ENVIRONMENT,
+    PATIENCE,
+    command,
+    killed_when,
+    numbers_of,
+    same,
+)
 
 # Deep enough to fill the measuring box, few enough for a second a run.
 FEW = ["--particles", "60", "--diameter", "0.3"]
@@ -614,6 +624,28 @@ def test_nothing_is_left_to_do(
     assert "solves" not in output
     assert same(before[0], numbers_of(out / "tradeoff.h5"))
     assert before[1] == (out / "tradeoff.csv").read_text()
+
+
+def test_two_comparisons_in_a_folder_follow_one_another(
+    finished: tuple[list[str], Path],
+) -> None:
+    """The second waits, and says so: it does not write over the tables of the first."""
+    arguments, out = finished
+    table = out / "tradeoff.csv"
+    with held(out / tradeoff_command.LOCK):
+        second = subprocess.Popen(
+            command(*arguments), env=ENVIRONMENT, stdout=subprocess.PIPE, text=True
+        )
+        assert second.stdout is not None
+        assert second.stdout.readline() == f"{out}: somebody else compares there; this one waits\n"
+        # The first is to write it yet: what stands there is not of the second.
+        table.unlink()
+        time.sleep(1)
+        assert second.poll() is None
+        assert not table.exists()
+    assert "ranks-1: 6 there before" in second.communicate(timeout=PATIENCE)[0]
+    assert second.returncode == 0
+    assert table.exists()
 
 
 @pytest.mark.slow

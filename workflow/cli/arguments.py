@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ..errors import StudyError, WorkflowError
+from ..errors import StudyError, WorkflowError, meant
 from ..launch import Options, cores
 from ..shipped import shipped_studies
 from ..study import Case, Study, read_study
@@ -116,7 +116,10 @@ def study_path(path: Path) -> Path:
         return path
     shipped = shipped_studies()
     if str(path) not in shipped:
-        raise WorkflowError(f"no study {path}: it must be a TOML file or {', '.join(shipped)}")
+        near = meant(str(path), shipped)
+        raise WorkflowError(
+            f"no study {path}{near}: it must be a TOML file or {', '.join(shipped)}"
+        )
     return shipped[str(path)]
 
 

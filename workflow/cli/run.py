@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..errors import WorkflowError
+from ..errors import WorkflowError, meant
 from ..folder import Folder
 from ..run_and_gather import run_and_gather
 from ..study import Case, Study
@@ -78,8 +78,8 @@ def _chosen(study: Study, wanted: Iterable[str] | None) -> list[Case]:
     for name in wanted:
         if name not in cases:
             raise WorkflowError(
-                f"--case {name}: {study.name} has no such case; it must be a name that "
-                f"`inelastic status` shows, or a number from 1 to {len(study.cases)}"
+                f"--case {name}: {study.name} has no such case{meant(name, cases)}; it must be a "
+                f"name that `inelastic status` shows, or a number from 1 to {len(study.cases)}"
             )
         # A case may be asked for by its name and by its number.
         if cases[name] not in chosen:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..decks import find_deck
-from ..files import write_text
-from ..folder import Folder
+from ..files import write_text, writing
+from ..folder import Folder, held
 from ..gather import gather_results
 from ..launch import Options, run_study
 from ..progress import Display
@@ -46,6 +46,7 @@ from .arguments import add_out, seconds
 
 STORE, ROWS, PAGE, FIGURE = "tradeoff.h5", "tradeoff.csv", "tradeoff.md", "tradeoff"
 STATES = "states"
+LOCK = Path(".locks", "results")
 # Only the result of a run is kept: the dumps of many would fill a disk. Random points are not
 # needed where the exact packing fraction is known.
 OUTPUTS = Outputs(points=10_000, structure=False, keep="results")
@@ -117,8 +118,20 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run what is missing, print, write, draw; 1 if any run has failed, else 0."""
+    """Run what is missing, print, write, draw; 1 if any run has failed, else 0.
+
+    Two comparisons in one folder follow one another: beside each other they would take each
+    other's time, and the last to write would replace whole tables by its own with gaps.
+    """
     plan = read_plan(options)
+    lock = options.out / LOCK
+    with writing(lock):
+        lock.parent.mkdir(parents=True, exist_ok=True)
+    with held(lock, f"{options.out}: somebody else compares there; this one waits"):
+        return _compare(plan, options)
+
+
+def _compare(plan: Plan, options: argparse.Namespace) -> int:
     results, left_out, failed = _run_all(plan, options.out, options.timeout)
     comparison = compare(results)
     lines = [*left_out, *never_at_rest(comparison), *out_of_bed(comparison)]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..decks import Deck, Value, file_of, find_deck
-from ..errors import WorkflowError
+from ..errors import WorkflowError, meant
 from ..files import is_file, read_regular
 from ..shipped import DECKS
 from .case import INPUTS, Case, Input, is_word, stage_of
@@ -147,7 +147,9 @@ def _unknown(key: str, decks: Sequence[Deck]) -> str:
     if not decks:
         return f"{key}: no deck knows it"
     allowed = "; ".join(f"{deck.name}: {', '.join(deck.parameters) or 'none'}" for deck in decks)
-    return f"{key}: no variable of that name; allowed are {allowed}"
+    names = [name for deck in decks for name in deck.parameters]
+    near = meant(key.rpartition(".")[2], names)
+    return f"{key}: no variable of that name{near}; allowed are {allowed}"
 
 
 def _case(

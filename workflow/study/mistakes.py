@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
+from ..errors import meant
 from .file_format import Outputs, ProfileOutput, StudyFile
 from .toml_lines import lines_of_keys
 
@@ -67,7 +68,8 @@ def mistakes_of(error: ValidationError) -> Iterator[str]:
             model: type[BaseModel] = Outputs if place.startswith("outputs") else StudyFile
             if place.startswith("outputs.profile"):
                 model = ProfileOutput
-            message = f"no such key; allowed are {', '.join(model.model_fields)}"
+            near = meant(str(mistake["loc"][-1]), model.model_fields)
+            message = f"no such key{near}; allowed are {', '.join(model.model_fields)}"
         elif mistake["type"] == "missing":
             message = "this key is missing"
         elif mistake["type"] in KINDS:
