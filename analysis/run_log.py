@@ -31,8 +31,8 @@ _ANEW = ("LAMMPS", "units", "atom_style", "read_restart", "read_data", "clear")
 _SAME_TIME = 1e-6
 # Thermo output has eight digits: this is its relative rounding.
 _DIGITS = 1e-8
-# Frames are not predicted where a run has more of them, or more steps between which to look for
-# those that are written at times: a step count that is damaged shall not exhaust the memory.
+# Frames are not predicted where a run has more of them: a step count that is damaged shall not
+# exhaust the memory.
 _MOST = 10_000_000
 # Steps are read as float64, which holds every whole number below this one.
 _LARGEST_STEP = 2**53
@@ -109,6 +109,7 @@ class RunLog:
         tell all about that
     ended : whether it was closed as LAMMPS or the deck does it: not the case while LAMMPS works,
         and where the log was cut off
+    too_many : those of the files, by their paths, that must hold more frames than are compared
     """
 
     path: Path
@@ -116,6 +117,7 @@ class RunLog:
     runs: Sequence[Run]
     dumps: Mapping[str, Written | None]
     ended: bool
+    too_many: frozenset[str] = frozenset()
 
     @property
     def complete(self) -> bool:
@@ -129,10 +131,17 @@ class RunLog:
     def written(self, path: Path) -> Written | None:
         """Return what a dump must hold; None where the log does not tell.
 
-        A folder may have been moved: the file's name decides, which must be there once.
+        A folder may have been moved: the file's name decides, which must be there once. Raises
+        LogError where the dump must hold more frames than are compared.
         """
-        found = [dump for name, dump in self.dumps.items() if PurePosixPath(name).name == path.name]
-        return found[0] if len(found) == 1 else None
+        found = [name for name in self.dumps if PurePosixPath(name).name == path.name]
+        if len(found) != 1:
+            return None
+        if found[0] in self.too_many:
+            raise LogError(
+                self.path, f"tells of more than {_MOST} frames in {path.name}: too many to compare"
+            )
+        return self.dumps[found[0]]
 
 
 def read_run_log(path: str | PathLike[str]) -> RunLog:
@@ -154,7 +163,8 @@ def read_run_log(path: str | PathLike[str]) -> RunLog:
         reader.read(line, number)
     reader.close_run(None)
     dumps = {name: reader.written(name) for name in reader.files}
-    return RunLog(file, text, reader.runs, dumps, reader.ended)
+    too_many = frozenset(name for name, one in reader.files.items() if one.too_many)
+    return RunLog(file, text, reader.runs, dumps, reader.ended, too_many)
 
 
 @dataclass
@@ -174,6 +184,7 @@ class _File:
     """The frames of a dump file; nothing is known of a file that had something in it before."""
 
     known: bool = True
+    too_many: bool = False
     steps: list[int] = field(default_factory=list)
     runs: list[int] = field(default_factory=list)
     slack: int = 0
@@ -376,16 +387,17 @@ class _Reader:
     def _write(self, dump: _Dump, run: Run) -> None:
         """Add the frames that a dump has written in a run."""
         file, last = self.files[dump.path], run.known
+        found: Sequence[int] | None = None
         if dump.every:
-            expected = _multiples(dump.every, run.first, last + 1)
-            found = list(expected) if len(expected) <= _MOST else None
+            found = _multiples(dump.every, run.first, last + 1)
         else:
             found = _steps_at_times(run, dump.time) if dump.time and not self._cut else None
             file.slack = 1
-        if found is None:
+        file.too_many |= found is not None and len(found) > _MOST
+        if found is None or file.too_many:
             file.known = False
             return
-        steps = found
+        steps = [*found]
         if dump.first and dump.last is None and steps[:1] != [run.first]:
             steps.insert(0, run.first)
         steps = [step for step in steps if step != dump.last]
@@ -413,25 +425,41 @@ def _multiples(every: int, first: int, end: int) -> range:
     return range(-(-first // every) * every, end, every)
 
 
-def _steps_at_times(run: Run, interval: float) -> list[int] | None:
-    """Return the steps at which a multiple of a time interval is reached; None if unknown."""
-    if "Time" not in run.thermo or run.known - run.first > _MOST:
+def _steps_at_times(run: Run, interval: float) -> Sequence[int] | None:
+    """Return the steps at which a multiple of a time interval is reached; None if unknown.
+
+    Where there are more than _MOST of them, they are only counted: what is returned has their
+    number, and is no list of steps.
+    """
+    if "Time" not in run.thermo:
         return None
-    steps = np.arange(run.first, run.known + 1)
-    times = at_steps(steps, run.thermo["Step"], run.thermo["Time"])
-    if not np.isfinite(times).all():
+    steps, times = run.thermo["Step"], run.thermo["Time"]
+    if run.known > steps[-1]:
+        end = at_steps([run.known], steps, times)
+        steps, times = np.append(steps, run.known), np.append(times, end)
+    # Of a step between two lines.
+    length = np.diff(times) / np.diff(steps) if len(steps) > 1 else np.zeros(1)
+    if not np.isfinite(times).all() or length.min() < 0:
         return None
-    length = np.diff(times, prepend=times[0])
     # A dump whose interval is about that of the steps now and then leaves one out.
     if 2 * length.max() > interval:
         return None
-    length[0] = length[1] if len(length) > 1 else 0.0
-    near = (_SAME_TIME * length + _DIGITS * np.abs(times)) / interval
-    passed = np.floor(times / interval + near)
-    written = np.diff(passed, prepend=passed[0]) > 0
+    before = np.concatenate([length[:1], length[: len(steps) - 1]])
+    near = _SAME_TIME * before + _DIGITS * np.abs(times)
+    passed = np.floor((times + near) / interval)
+    if passed[-1] - passed[0] > _MOST:
+        return range(int(passed[-1] - passed[0]))
+    multiples = np.arange(passed[0] + 1, passed[-1] + 1)
+    # The line at which a multiple has been passed, and the step since the line before.
+    line = np.searchsorted(passed, multiples)
+    slope = length[line - 1]
+    due = (multiples * interval - _SAME_TIME * slope) / (1 + _DIGITS) - times[line - 1]
+    since = np.ceil(np.divide(due, slope, out=np.zeros_like(due), where=slope > 0))
+    written = steps[line - 1] + np.clip(since, 1, steps[line] - steps[line - 1])
     # The first time is a multiple of the interval, or lies beyond one already.
-    written[0] = abs(times[0] / interval - passed[0]) <= near[0]
-    return [int(step) for step in steps[written]]
+    if abs(times[0] - passed[0] * interval) <= near[0]:
+        written = np.append(steps[0], written)
+    return [int(step) for step in written]
 
 
 def at_steps(wanted: ArrayLike, steps: FloatArray, values: FloatArray) -> FloatArray:

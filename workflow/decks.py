@@ -234,12 +234,19 @@ def gravity_of(text: str) -> float | None:
 
 
 def as_value(text: str) -> Value:
-    """Return the number that a deck's word stands for, or the word."""
+    """Return the number that a deck's word stands for, or the word.
+
+    One that no computer number holds, such as a whole number of 22 digits, stays a word: LAMMPS
+    gets it as it is written, and no file keeps another one in its place.
+    """
     for kind in (int, float):
         try:
-            return kind(text)
+            value = kind(text)
         except ValueError:
             continue
+        if abs(value) < (2**63 if kind is int else math.inf):
+            return value
+        return text
     return text
 
 

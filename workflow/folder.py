@@ -71,6 +71,11 @@ class Folder:
         """Return where the last failed run is."""
         return self.case(case).with_name(f"{case.name}.failed")
 
+    def check_there(self) -> None:
+        """See that the folder is there; raise WorkflowError with one line if it is not."""
+        if not self.root.is_dir():
+            raise WorkflowError(f"{self.root}: no such folder; --out names that of the runs")
+
     def result(self, study: Study, case: Case) -> Path:
         """Return where the measurements of a case are."""
         return self.result_folder(study) / f"{case.name}.h5"

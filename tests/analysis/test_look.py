@@ -311,6 +311,7 @@ def test_colours_are_the_contacts_of_bodies(dimers: Path, monkeypatch: pytest.Mo
         contacts: Any,
         *,
         contacts_per_colour: Any,
+        longest: Any,
     ) -> None:
         drawn["contacts"], drawn["contacts_per_colour"] = contacts.tolist(), contacts_per_colour
 
@@ -559,7 +560,8 @@ def test_periodic_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     [
         (["--box", "1", "0", "0", "1", "0", "1"], "xlo = 1 must be less than xhi = 0"),
         (["--box", "2", "3", "2", "3", "2", "3"], "no particle's centre lies in the box x 2 to 3"),
-        (["--points", "0"], "--points must be at least 1, not 0"),
+        (["--points", "0"], "--points must be from 1 to 100000000, not 0"),
+        (["--points", "1" + "0" * 22], "--points must be from 1 to 100000000, not 1000"),
         (["--contact-gap", "-0.1"], "--contact-gap must be 0 or more, not -0.1"),
         (["--contact-gap", "nan"], "--contact-gap must be 0 or more, not nan"),
         (["--radius", "0"], "a radius must be positive and finite, not 0"),

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from lammps_inelastic.analysis import LogError, ParticleDump, UnfinishedRunError, open_run
 from lammps_inelastic.analysis.run_log import read_run_log
@@ -65,8 +69,12 @@ def written(path: Path, text: str) -> list[int] | None:
         (DUMP.format(3) + "dump_modify all delay 5\n" + run(0, 7), None),
         (DUMP.format(3) + "dump_modify all skip v_dull\n" + run(0, 7), None),
         (DUMP.format(1) + "dump_modify all every/time 0.15\n" + run(0, 7), None),
-        # More frames than there is memory for.
-        (DUMP.format(1) + run(0, 7).replace("for 7", "for 40000000000"), None),
+        # Runs of more than ten million steps.
+        (
+            DUMP.format(1) + "dump_modify all every/time 1e6\n" + run(0, 30_000_000),
+            [0, 10_000_000, 20_000_000, 30_000_000],
+        ),
+        (DUMP.format(20_000_000) + run(5, 40_000_000), [20_000_000, 40_000_000]),
         (
             DUMP.format(1)
             + "dump_modify all every/time 0.3\nthermo_modify format float %.2g\n"
@@ -116,6 +124,42 @@ def test_frames_of_which_a_log_tells(tmp_path: Path, text: str, steps: list[int]
 def test_a_log_that_contradicts_itself(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(LogError, match=f"log.lammps, .*{said}"):
         written(tmp_path, text)
+
+
+@pytest.mark.parametrize("when", ["every 1", "every/time 0.2"])
+def test_more_frames_than_are_compared_are_said(tmp_path: Path, when: str) -> None:
+    """It is said of the dump that is asked for, and of no other in the same log."""
+    text = DUMP.format(1) + f"dump_modify all {when}\n" + run(0, 40_000_000)
+    with pytest.raises(LogError, match=r"tells of more than 10000000 frames in a\.dump: too many"):
+        written(tmp_path, text)
+    assert read_run_log(tmp_path / "log.lammps").written(tmp_path / "other.dump") is None
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(
+    start=st.floats(0, 10),
+    lengths=st.lists(st.floats(0.01, 0.1), min_size=1, max_size=10),
+    apart=st.integers(1, 20),
+    interval=st.floats(0.21, 3),
+)
+def test_frames_at_times_are_those_of_each_step(
+    start: float, lengths: list[float], apart: int, interval: float, tmp_path_factory: Any
+) -> None:
+    """Looked for between the lines, they are where the time of a step passes a multiple."""
+    ends = start + np.concatenate([[0], np.cumsum(apart * np.array(lengths))])
+    rows = [f"{n * apart} {end!r}" for n, end in enumerate(ends.tolist())]
+    steps = apart * len(lengths)
+    text = "\n".join(
+        ["Step Time", *rows, f"Loop time of 1 on 1 procs for {steps} steps with 3 atoms"]
+    )
+    folder = tmp_path_factory.mktemp("log")
+    found = written(folder, DUMP.format(1) + f"dump_modify all every/time {interval!r}\n{text}\n")
+    times = np.interp(np.arange(steps + 1), np.arange(len(ends)) * apart, ends)
+    shares = times / interval
+    # Where a time is a multiple but for round-off, either side is right.
+    assume(np.abs(shares - np.rint(shares)).min() > 1e-5)
+    expected = 1 + np.flatnonzero(np.diff(np.floor(shares)))
+    assert (found or []) == expected.tolist()
 
 
 def test_what_is_no_log(tmp_path: Path) -> None:
@@ -181,12 +225,12 @@ def test_a_dump_of_which_no_log_tells(tmp_path: Path, steps: list[int], said: st
     dump = ParticleDump(tmp_path / "own.dump")
     (tmp_path / "log.lammps").write_text(DUMP.format(5) + run(0, 20) + "quit\n")
     log = read_run_log(tmp_path / "log.lammps")
-    for given in (None, log):
+    for known in (None, log):
         if said:
             with pytest.raises(ValueError, match=said):
-                open_run(dump, None, given)
+                open_run(dump, None, known)
         else:
-            assert open_run(dump, None, given).log is None
+            assert open_run(dump, None, known).log is None
     # The log of a run that was cut off before it told of the dump.
     if not said:
         (tmp_path / "log.lammps").write_text(run(0, 20))

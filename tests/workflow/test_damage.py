@@ -253,7 +253,24 @@ def test_what_stands_in_the_way(
     assert sorted(tmp_path.rglob("*")) == before
     assert mine.read_text() == "mine"
     # Neither a look nor a script opens what is there.
-    assert main(["status", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert main(["status", str(path), "--out", str(tmp_path / "out")]) == (0 if place else 2)
+
+
+@pytest.mark.parametrize("command", ["status", "collect"])
+def test_a_folder_that_is_not_there(
+    command: str,
+    write_study: Callable[..., Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A slip in --out is no study of which nothing has been run."""
+    out = tmp_path / "nowhere"
+    study = write_study(TINY.replace("{seeds}", "1"))
+    assert main([command, str(study), "--out", str(out)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == f"inelastic: {out}: no such folder; --out names that of the runs\n"
+    assert not out.exists()
 
 
 def test_a_folder_in_the_place_of_the_results(

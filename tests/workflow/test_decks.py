@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.decks import Deck, find_deck, gravity_of, read_rule
+from lammps_inelastic.workflow.decks import Deck, as_value, find_deck, gravity_of, read_rule
 from lammps_inelastic.workflow.errors import StudyError
 from lammps_inelastic.workflow.shipped import DECKS
 from lammps_inelastic.workflow.study import read_study
@@ -140,6 +140,14 @@ def test_comments_in_a_table_do_not_change_a_deck() -> None:
 )
 def test_gravity_is_a_number_or_not_known(text: str, expected: float | None) -> None:
     assert gravity_of(text) == expected
+
+
+@pytest.mark.parametrize("text", ["1" + "0" * 22, "-" + "9" * 400, str(2**63), "1e999", "nan"])
+def test_numbers_that_no_computer_number_holds_stay_words(text: str) -> None:
+    """A deck's default of 22 digits is kept as it is written, and a larger one ends nothing."""
+    assert as_value(text) == text
+    assert as_value(str(2**63 - 1)) == 2**63 - 1
+    assert as_value("1e22") == 1e22
 
 
 @pytest.mark.parametrize("time", ["1e-15", "9e-7"])

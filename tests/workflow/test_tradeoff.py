@@ -407,6 +407,7 @@ def rows_of(out: Path) -> list[dict[str, str]]:
 def test_what_a_comparison_writes(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     assert {path.name for path in out.iterdir()} == {
+        ".locks",
         "ranks-1",
         "states",
         "states.csv",

@@ -129,10 +129,10 @@ def as_cases(cases: Sequence[Case]) -> str:
 
 
 def whole_number(text: str) -> int:
-    """Return the whole number of at least 1 that an argument is."""
+    """Return the whole number from 1 to 999999999 that an argument is."""
     # Digits of other scripts are digits too, and superscripts: but no numbers.
     if not (text.isascii() and text.isdigit() and len(text) < 10) or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number of at least 1")
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 to 999999999")
     return int(text)
 
 

@@ -29,9 +29,13 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the file, and print how many results are in it; return 0."""
+    """Write the file, and print how many results are in it; return 0.
+
+    Raises WorkflowError without the folder.
+    """
     studies = read_studies(options.studies)
     folder = Folder(options.out)
+    folder.check_there()
     file = options.file or folder.root / f"{'+'.join(study.name for study in studies)}.h5"
     check_target(file, hdf5=True)
     with folder.gathering():

@@ -14,7 +14,7 @@ from ..finished import CONTACTS as CONTACT_DUMP
 from ..finished import PARTICLES as PARTICLE_DUMP
 from ..look import PICTURE, look_at
 from ..look_output import as_json, as_text
-from ..study import PAPER_BOX
+from ..study import MOST_POINTS, PAPER_BOX
 from .arguments import add_frame
 
 
@@ -85,8 +85,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, draw, print; 0, or an AnalysisError."""
-    if options.points < 1:
-        raise AnalysisError(f"--points must be at least 1, not {options.points}")
+    if not 1 <= options.points <= MOST_POINTS:
+        raise AnalysisError(f"--points must be from 1 to {MOST_POINTS}, not {options.points}")
     if options.seed < 0:
         raise AnalysisError(f"--seed must not be negative, not {options.seed}")
     if options.contact_gap is not None and not 0 <= options.contact_gap < np.inf:

@@ -30,9 +30,10 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the state of every case; return 0."""
+    """Print the state of every case; return 0. Raises WorkflowError without the folder."""
     studies = read_studies(options.studies)
     folder = Folder(options.out)
+    folder.check_there()
     for study in studies:
         _print_status(study, folder)
     return 0

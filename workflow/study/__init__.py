@@ -1,7 +1,7 @@
 """Studies: from a TOML file to its cases, all of it checked before anything runs."""
 
 from .case import INPUTS, Case, Input, Stage, Study, is_word, stage_of
-from .file_format import PAPER_BOX, Outputs, ProfileOutput
+from .file_format import MOST_POINTS, PAPER_BOX, Outputs, ProfileOutput
 from .stages import steps_of
 from .study_file import read_study
 from .values import MOST_CASES
@@ -9,6 +9,7 @@ from .values import MOST_CASES
 __all__ = [
     "INPUTS",
     "MOST_CASES",
+    "MOST_POINTS",
     "PAPER_BOX",
     "Case",
     "Input",
