@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,6 +29,9 @@ RADIUS_SHADES = 8
 PALETTE = "viridis"
 BACKGROUND = (255, 255, 255)
 EDGE_COLOUR = (0.45, 0.45, 0.48)
+# The legend's letters are so many times smaller than the picture: four pictures side by side on
+# 1,200 pixels can still be read.
+TEXT = 32
 
 Colour = tuple[float, float, float]
 
@@ -49,6 +53,14 @@ class _Shading:
     labels: Sequence[str]
     title: str
 
+    @property
+    def rgb(self) -> list[tuple[int, int, int]]:
+        """The colours as a picture has them, each part 0 to 255."""
+        return [
+            (round(255 * red), round(255 * green), round(255 * blue))
+            for red, green, blue in self.colours
+        ]
+
 
 def draw_packing(
     path: str | PathLike[str],
@@ -59,6 +71,7 @@ def draw_packing(
     *,
     contacts_per_colour: int = 1,
     pixels: int = 1200,
+    longest: int | None = None,
 ) -> None:
     """Write a PNG of a packing and the edges of its container; -y, where things fall, is down.
 
@@ -74,7 +87,8 @@ def draw_packing(
         radius if None
     contacts_per_colour : how many numbers of contacts share a colour: bodies have more contacts
         than there are colours to tell apart
-    pixels : the larger side of the picture, about
+    pixels : the larger side of the packing in the picture, about
+    longest : no side of the picture, with its legend, has more pixels; None for no bound
 
     Raises InputError for arrays of other shapes and for numbers that are not whole and positive,
     and PictureError where LAMMPS cannot draw or the file cannot be written.
@@ -82,6 +96,8 @@ def draw_packing(
     centres, radius = as_spheres(positions, radii)
     bounds = as_box(container)
     as_count(pixels, "the number of pixels")
+    if longest is not None:
+        as_count(longest, "the number of pixels of the longest side")
     if contacts is None:
         shading = _by_radius(radius)
     else:
@@ -91,12 +107,36 @@ def draw_packing(
         _render(raw, centres, radius, bounds, shading, pixels * OVERSAMPLING)
         with Image.open(raw) as image:
             picture = _framed(image.convert("RGB"), shading, pixels)
+    if longest is not None:
+        picture.thumbnail((longest, longest))
     target = Path(path)
     try:
         with unfinished(target) as file:
-            picture.save(file, format="PNG", optimize=True)
+            few_colours(picture, shading.rgb).save(file, format="PNG", optimize=True)
     except OSError as error:
         raise PictureError(f"{target}: cannot be written: {reason_of(error)}") from None
+
+
+def few_colours(picture: Image.Image, kept: Sequence[tuple[int, int, int]] = ()) -> Image.Image:
+    """Return an RGB picture with 256 colours, a tenth as large in a file.
+
+    Parameters
+    ----------
+    picture : the picture
+    kept : colours that stay as they are: those of a legend, which a choice among the shades of all
+        spheres would make one another's
+    """
+    # Colours far from all others count for this method, and not, as usually, large areas alone.
+    free = 256 - len(kept)
+    few = picture.quantize(free, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    pixels, index = np.asarray(picture), np.array(few)
+    for number, colour in enumerate(kept, free):
+        index[(pixels == colour).all(axis=2)] = number
+    palette = (few.getpalette() or [])[: 3 * free]
+    palette += [0] * (3 * free - len(palette)) + [part for colour in kept for part in colour]
+    reduced = Image.fromarray(index)
+    reduced.putpalette(palette)
+    return reduced
 
 
 def _by_contacts(contacts: ArrayLike, count: int, width: int) -> _Shading:
@@ -273,7 +313,7 @@ def _framed(image: Image.Image, shading: _Shading, pixels: int) -> Image.Image:
     packing = cut.resize(size, Image.Resampling.LANCZOS)
 
     margin = pixels // 25
-    legend = _legend(shading, pixels)
+    legend = _legend(shading, pixels, packing.width)
     width = max(packing.width, legend.width) + 2 * margin
     height = packing.height + legend.height + 2 * margin
     picture = Image.new("RGB", (width, height), BACKGROUND)
@@ -282,23 +322,27 @@ def _framed(image: Image.Image, shading: _Shading, pixels: int) -> Image.Image:
     return picture
 
 
-def _legend(shading: _Shading, pixels: int) -> Image.Image:
-    """Draw one disc for each colour, its label at its side, the title below."""
+def _legend(shading: _Shading, pixels: int, room: int) -> Image.Image:
+    """Draw one disc for each colour, its label at its side, the title below.
+
+    The discs stand in as many rows as the room needs, pixels.
+    """
     if not shading.title:
         return Image.new("RGB", (0, 0), BACKGROUND)
-    text = max(pixels // 45, 8)
+    text = max(pixels // TEXT, 8)
     font = ImageFont.load_default(size=text)
     ink = (60, 60, 66)
-    widths = [2.2 * text + font.getlength(label) for label in shading.labels]
-    legend = Image.new("RGB", (round(sum(widths)), 5 * text), BACKGROUND)
+    wide = 2.2 * text + max(font.getlength(label) for label in shading.labels)
+    rows = min(math.ceil(len(shading.labels) * wide / room), len(shading.labels))
+    columns = math.ceil(len(shading.labels) / rows)
+    size = (round(columns * wide), round((2.3 + 1.5 * rows) * text))
+    legend = Image.new("RGB", size, BACKGROUND)
     draw = ImageDraw.Draw(legend)
-    left, middle = 0.0, 2.2 * text
-    for width, label, colour in zip(widths, shading.labels, shading.colours, strict=True):
-        red, green, blue = (round(255 * part) for part in colour)
+    for number, (label, colour) in enumerate(zip(shading.labels, shading.rgb, strict=True)):
+        left, middle = number % columns * wide, (1.2 + 1.5 * (number // columns)) * text
         disc = (left, middle - text / 2, left + text, middle + text / 2)
-        draw.ellipse(disc, fill=(red, green, blue))
+        draw.ellipse(disc, fill=colour)
         draw.text((left + 1.35 * text, middle), label, fill=ink, font=font, anchor="lm")
-        left += width
-    centre = (legend.width / 2, middle + 1.8 * text)
+    centre = (legend.width / 2, (1.2 + 1.5 * rows) * text)
     draw.text(centre, shading.title, fill=ink, font=font, anchor="mm")
     return legend

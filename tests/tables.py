@@ -23,8 +23,10 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from PIL import Image
 
 from lammps_inelastic.analysis import ParticleDump, draw_packing, read_run_log
+from lammps_inelastic.analysis.pictures import few_colours
 from lammps_inelastic.analysis.run_log import Run as RunOfLog
 from tests.beds import BEDS, at_rest
 from tests.benchmark.scenes_without import TURNING, build
@@ -404,6 +406,8 @@ def draw_gluey(path: Path, folder: Path, pressed: RunOfLog, turned: RunOfLog) ->
     axes[4].legend()
     figure.savefig(path, dpi=100)
     pyplot.close(figure)
+    with Image.open(path) as picture:
+        few_colours(picture.convert("RGB")).save(path, optimize=True)
 
 
 TABLES = {

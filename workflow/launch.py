@@ -21,7 +21,7 @@ from types import FrameType
 from typing import Any
 
 from .errors import StudyError, WorkflowError
-from .finished import NOT_MEASURED, NOT_WHOLE, REMARKS
+from .finished import NOT_WHOLE, REMARKS
 from .folder import MARK, Folder, last_lines
 from .progress import Display
 from .provenance import run_record

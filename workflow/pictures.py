@@ -19,6 +19,7 @@ from lammps_inelastic.analysis import (
     draw_network,
     draw_packing,
 )
+from lammps_inelastic.analysis.pictures import few_colours
 
 from .study import Outputs
 
@@ -28,7 +29,11 @@ MOST_PIXELS = 900
 
 
 def draw_frame(
-    path: Path, frame: ParticleFrame, walls: ArrayLike, contacts: ArrayLike | None
+    path: Path,
+    frame: ParticleFrame,
+    walls: ArrayLike,
+    contacts: ArrayLike | None,
+    longest: int | None = None,
 ) -> None:
     """Draw a packing, coloured by contacts.
 
@@ -38,11 +43,18 @@ def draw_frame(
     frame : packing that is drawn
     walls : (3, 2), box that is drawn around it, length
     contacts : (n,), contacts of each sphere's particle; None where they are not known
+    longest : no side of the picture has more pixels; None for no bound
     """
     # A body has ten contacts and more, a sphere six.
     per_colour = 2 if frame.particles.composite else 1
     draw_packing(
-        path, frame.positions, frame.radii, walls, contacts, contacts_per_colour=per_colour
+        path,
+        frame.positions,
+        frame.radii,
+        walls,
+        contacts,
+        contacts_per_colour=per_colour,
+        longest=longest,
     )
 
 
@@ -63,8 +75,8 @@ def pictures_of(
         for wanted in outputs.pictures:
             # The nearest frame is drawn: a run may end at another step than was thought.
             frame = dump[int(np.argmin(np.abs(np.array(dump.steps) - wanted)))]
-            draw_frame(target, frame, frame.box, _contacts_of_particles(frame))
-            pictures[f"{frame.step:08d}"] = _small(target)
+            draw_frame(target, frame, frame.box, _contacts_of_particles(frame), MOST_PIXELS)
+            pictures[f"{frame.step:08d}"] = target.read_bytes()
         if contacts is not None:
             _draw_contact_network(target, dump[-1], contacts)
             pictures["network"] = _small(target)
@@ -81,13 +93,12 @@ def _contacts_of_particles(frame: ParticleFrame) -> NDArray[np.int64] | None:
 
 
 def _small(path: Path) -> bytes:
-    """Return a picture as results keep it: there are many, so its size and colours are limited."""
+    """Return a figure as results keep it: there are many, so its size and colours are limited."""
     with Image.open(path) as picture:
         small = picture.convert("RGB")
         small.thumbnail((MOST_PIXELS, MOST_PIXELS))
-        few = small.quantize(256, method=Image.Quantize.MEDIANCUT)
         buffer = io.BytesIO()
-        few.save(buffer, format="PNG", optimize=True)
+        few_colours(small).save(buffer, format="PNG", optimize=True)
     return buffer.getvalue()
 
 

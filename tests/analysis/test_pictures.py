@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
@@ -46,6 +47,64 @@ def test_colours_of_bodies(tmp_path: Path) -> None:
     # The sphere is about 60 pixels wide; the legend's three green discs have below 100 pixels each.
     assert green_pixels[0] < 300
     assert green_pixels[1] > 1000
+
+
+@pytest.fixture(scope="module")
+def bed() -> tuple[Any, Any, Any]:
+    """Return positions, radii and contacts of spheres in 1,000 shades, and more."""
+    random = np.random.default_rng(1)
+    return random.random((300, 3)) * 0.9 + 0.05, np.full(300, 0.05), random.integers(0, 12, 300)
+
+
+def colours_of_legend(path: Path) -> Any:
+    """Return the colours (k, 3) that are not grey, below the packing, in 20 pixels and more."""
+    seen = pixels_of(path)
+    blank = (seen > 250).all(axis=(1, 2))
+    starts = np.flatnonzero(blank[:-1] & ~blank[1:])
+    # The packing comes first, then rows of discs, then the title.
+    colours, count = np.unique(seen[starts[1] :].reshape(-1, 3), axis=0, return_counts=True)
+    return colours[(count >= 20) & (np.ptp(colours, axis=1) > 40)]
+
+
+def check_legend(path: Path) -> None:
+    """See that each colour of the legend is its own, and the one that is meant."""
+    meant = 255 * matplotlib.colormaps["viridis"](np.linspace(0, 1, 11))[:, :3]
+    written = colours_of_legend(path)
+    assert len(written) > 0
+    near = np.linalg.norm(meant[:, None] - written, axis=2)
+    nearest = written[near.argmin(axis=1)]
+    assert len(np.unique(nearest, axis=0)) == 11
+    # The colour nearest to each is meant for that one, and for no other.
+    assert np.linalg.norm(meant[:, None] - nearest, axis=2).argmin(axis=0).tolist() == [*range(11)]
+    apart = np.linalg.norm(nearest[:, None] - nearest, axis=2) + 1000 * np.eye(11)
+    # Two neighbours of the palette are 33 apart; 10 in one channel are seen beside each other.
+    assert apart.min() > 20
+
+
+@pytest.mark.parametrize("contacts", ["all", "few", "none", "many"])
+def test_each_colour_of_the_legend_can_be_told_from_the_others(
+    contacts: str, bed: tuple[Any, Any, Any], tmp_path: Path
+) -> None:
+    """In the file, which has 256 colours: most of them are shades of spheres."""
+    positions, radii, numbers = bed
+    shown = {"all": numbers, "few": numbers % 3, "none": 0 * numbers, "many": 0 * numbers + 6}
+    path = tmp_path / "packing.png"
+    draw_packing(path, positions, radii, [[0, 1]] * 3, shown[contacts])
+    check_legend(path)
+
+
+def test_a_legend_that_is_read_where_four_pictures_stand_side_by_side(
+    bed: tuple[Any, Any, Any], tmp_path: Path
+) -> None:
+    """Letters are as high as a disc: ten pixels of 1,200 that four pictures share."""
+    path = tmp_path / "packing.png"
+    draw_packing(path, bed[0], bed[1], [[0, 1]] * 3, bed[2])
+    seen = pixels_of(path)
+    blank = (seen > 250).all(axis=(1, 2))
+    starts = np.flatnonzero(blank[:-1] & ~blank[1:])
+    ends = np.flatnonzero(~blank[:-1] & blank[1:])
+    disc = ends[1] - starts[1]
+    assert disc * 1200 / (4 * seen.shape[1]) > 9
 
 
 def test_overlapping_spheres_meet_in_a_plane(tmp_path: Path) -> None:
