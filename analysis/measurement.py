@@ -97,7 +97,12 @@ def measure_packing(
 
 
 def _faces(frame: ParticleFrame) -> FloatArray:
-    """Return the faces of a frame's box that are fixed, (3, 2), length; infinite for the others."""
+    """Return the faces of a frame's box that are fixed, (3, 2), length; infinite for the others.
+
+    Where a dump does not tell its boundaries none is known to be a wall.
+    """
+    if frame.boundaries is None:
+        return np.array([[-np.inf, np.inf]] * 3)
     fixed = np.array([[flag == "f" for flag in flags] for flags in frame.boundaries])
     return np.where(fixed, frame.box, [-np.inf, np.inf])
 

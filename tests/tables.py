@@ -406,8 +406,8 @@ def draw_gluey(path: Path, folder: Path, pressed: RunOfLog, turned: RunOfLog) ->
     axes[4].legend()
     figure.savefig(path, dpi=100)
     pyplot.close(figure)
-    with Image.open(path) as picture:
-        few_colours(picture.convert("RGB")).save(path, optimize=True)
+    with Image.open(path) as drawn:
+        few_colours(drawn.convert("RGB")).save(path, optimize=True)
 
 
 TABLES = {
