@@ -383,6 +383,7 @@ inelastic::ProjectionResult FixInelastic::solve()
 {
   length_.begin_step();
   unsolved_.begin_step();
+  step_.keeps_overlaps = constraints_.overlaps().pushed_before();
   while (true) {
     unsolved_.begin_trial();
     length_.fit_to_list();
@@ -391,6 +392,10 @@ inelastic::ProjectionResult FixInelastic::solve()
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
     constraints_.overlaps().share();
+    if (result.status != inelastic::Status::CONVERGED && step_.bad_start && !step_.keeps_overlaps) {
+      step_.keeps_overlaps = true;
+      continue;
+    }
     if (settings_.record_every > 0 && step_.kick == Kick::WHOLE &&
         update->ntimestep % settings_.record_every == 0)
       record_.write(result);

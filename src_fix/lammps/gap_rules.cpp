@@ -85,7 +85,7 @@ double GapRules::given_back(const Side &side) const
   constexpr double FULL = 0.8;    // tolerances
   const double tolerance = step_.settings.tolerance;
   const double beyond = -side.gap_now - CLOSED * tolerance;
-  if (beyond <= 0.0) return 0.0;
+  if (beyond <= 0.0 || step_.keeps_overlaps) return 0.0;
   const double x = beyond / ((FULL - CLOSED) * tolerance);
   const double softly = step_.settings.accuracy * side.to_stop * x * std::max(1.0, x * x);
   return std::min(beyond, std::max(softly, -side.gap_now - tolerance));
@@ -147,6 +147,7 @@ bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
 
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
 {
+  if (step_.keeps_overlaps) return 0;
   inelastic::ContactSet &contacts = step_.problem.contacts;
   constexpr double LEFT = 0.75;    // tolerances
   const double tolerance = step_.settings.tolerance;

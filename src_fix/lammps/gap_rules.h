@@ -61,7 +61,8 @@ class GapRules {
 
   // Changes constraints of free spheres that these velocities leave beyond the tolerance, since gaps that count
   // as closed may be open or overlap: they ask for their present gap, in the case of an overlap first for as much
-  // as leaves most of the tolerance. Returns how many.
+  // as leaves most of the tolerance. Returns how many. None where overlaps are kept: in a dense start the spheres
+  // jam for a moment, and cannot all be opened at once.
   long keep_within_tolerance(const std::vector<double> &velocity);
 
   OverlapWatch &overlaps() { return overlaps_; }

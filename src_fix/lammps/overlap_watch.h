@@ -46,6 +46,8 @@ class OverlapWatch : protected Pointers {
   // Tells whether this step or the one before pushed spheres apart: a whole-step velocity holds half of each
   // push.
   bool pushes_in_velocity() const { return pushes_in_velocity_; }
+  // Tells whether the step before pushed spheres apart.
+  bool pushed_before() const { return pushed_before_; }
 
  private:
   Step &step_;

@@ -32,15 +32,30 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   step_.phase = Phase::PUSH;
   step_.relinearisations = 0;
   if (bodies_) constraints_.entangled().find();
-  for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
-    const Side &side = step_.sides[c];
-    // A gap that counts as closed is one here.
-    if (side.gap_now <= step_.settings.tolerance)
-      problem.contacts.gap[c] = constraints_.rules().asked_gap(side);
-    problem.contacts.impulse[c] = 0.0;
+  // All of them may not be had at once: spheres jam for a moment. Then less is.
+  constexpr double LESS = 0.25;
+  constexpr int TRIALS = 6;
+  double part = 1.0;
+  for (int trial = 0; trial < TRIALS; ++trial, part *= LESS) {
+    problem.contacts = contacts;
+    step_.sides.resize(contacts.size());
+    for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+      const Side &side = step_.sides[c];
+      // A gap that counts as closed is one here.
+      if (side.gap_now <= step_.settings.tolerance)
+        problem.contacts.gap[c] =
+            (side.gap_now < 0.0 ? part : 1.0) * constraints_.rules().effective_gap(side) -
+            side.wall_motion;
+      problem.contacts.impulse[c] = 0.0;
+    }
+    if (bodies_) constraints_.entangled().disentangle(atom, constraints_.overlaps());
+    const long left = std::max(0L, step_.settings.max_iterations - result.iterations);
+    const inelastic::ProjectionResult pushed = project(trial + 1 < TRIALS ? left / 4 : left);
+    const bool solved = pushed.status == inelastic::Status::CONVERGED;
+    if (solved || trial + 1 == TRIALS) add(result, pushed);
+    if (solved) break;
+    result.iterations += trial + 1 < TRIALS ? pushed.iterations : 0;
   }
-  if (bodies_) constraints_.entangled().disentangle(atom, constraints_.overlaps());
-  add(result, project(std::max(0L, step_.settings.max_iterations - result.iterations)));
 
   problem.contacts = contacts;
   step_.sides.resize(contacts.size());

@@ -93,6 +93,7 @@ struct Step {
   // This is known after constraints were collected.
   Phase phase = Phase::CONTACT;
   bool bad_start = false;          // some overlap at the start is beyond the regular ones
+  bool keeps_overlaps = false;     // regular ones are given back by the push out of bad ones alone
   double largest_overlap = 0.0;    // [length] at the start
   double excess = 0.0;             // [length] the overlap at the end beyond the regular ones
   int relinearisations = 0;        // rounds that have looked at the end of the step

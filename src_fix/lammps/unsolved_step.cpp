@@ -26,7 +26,7 @@ UnsolvedStep::UnsolvedStep(LAMMPS *lmp, const Step &step, const Constraints &con
 void UnsolvedStep::note_worst(const inelastic::ProjectionResult &result)
 {
   double size = -1.0;
-  named_.clear();
+  std::string named;
   if (result.worst != inelastic::ProjectionResult::NONE) {
     const std::size_t c = result.worst;
     const int wall = step_.sides[c].wall;
@@ -35,13 +35,16 @@ void UnsolvedStep::note_worst(const inelastic::ProjectionResult &result)
         ? fmt::format("atom {} and wall {}", first, wall)
         : fmt::format("atoms {} and {}", first, atom->tag[step_.problem.contacts.second[c]]);
     size = std::abs(result.worst_gap);
-    named_ = result.worst_gap < 0.0
+    named = result.worst_gap < 0.0
         ? fmt::format("{} overlap by {:.4g} at its end", sides, size)
         : fmt::format("{} keep a gap of {:.4g} under a force", sides, size);
   }
   double largest;
   const int rank = ranks_.rank_of_largest(size, &largest);
-  named_ = ranks_.said_by(rank, named_);
+  named = ranks_.said_by(rank, named);
+  if (largest < worst_) return;
+  worst_ = largest;
+  named_ = named;
 }
 
 // [radians] By which a body would turn in the step without contacts. Collective.
@@ -122,7 +125,7 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
   else
     cause = fmt::format("Either the scene leaves no room for the spheres, or: {}", help);
   // The numbers may not be finite, and then there is no worst constraint.
-  return fmt::format("step {}: {} iterations left an overlap of {:.4g} and a gap under a "
+  return fmt::format("step {}: {} iterations left a gap short by {:.4g} and a gap under a "
                      "force of {:.4g}, where {:.4g} is allowed{}",
                      update->ntimestep, result.iterations, result.residual.feasibility,
                      result.residual.complementarity, step_.settings.tolerance,

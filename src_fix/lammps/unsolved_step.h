@@ -25,9 +25,13 @@ class UnsolvedStep : protected Pointers {
 
   // At the start of a step, and of every trial of it with another time step.
   void begin_step() { no_room_ = false; }
-  void begin_trial() { named_.clear(); }
+  void begin_trial()
+  {
+    named_.clear();
+    worst_ = -1.0;
+  }
 
-  // Notes the constraint of all ranks that is farthest from being met. Collective.
+  // Notes the constraint of all ranks that is farthest from being met, in any projection of the trial. Collective.
   void note_worst(const inelastic::ProjectionResult &result);
   const std::string &named() const { return named_; }
 
@@ -47,6 +51,7 @@ class UnsolvedStep : protected Pointers {
   const Constraints &constraints_;
   GhostExchange &ranks_;
   const RigidMotion *bodies_;
+  double worst_ = -1.0;    // [length] what the named one leaves
   std::string named_;
   bool no_room_ = false;
 };

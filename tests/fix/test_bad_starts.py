@@ -148,3 +148,36 @@ def test_a_sphere_that_overlaps_its_own_image_is_refused(
         options="",
     )
     assert "periodic image" in refused(deck + "run 1\n")
+
+
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_a_dense_random_start_opens(seed: int, tmp_path: Path, lmp: Runner) -> None:
+    """Random centres in a periodic box at a packing fraction of 0.60, below that of a jam.
+
+    Spheres jam for a moment on the way: less is opened in such a step, and none is refused.
+    """
+    number, eps = 40, 1e-4
+    width = (number * np.pi / 6 / 0.60) ** (1 / 3)
+    deck_text = f"""
+atom_style sphere
+boundary p p p
+region space block 0 {width:.17g} 0 {width:.17g} 0 {width:.17g}
+create_box 1 space
+create_atoms 1 random {number} {seed} space
+set group all diameter 1
+set group all density 1
+pair_style zero 1
+pair_coeff * *
+timestep 0.01
+neighbor 0.4 bin
+fix drag all viscous 0.5
+fix contact all inelastic {eps} shorten yes
+fix motion all nve
+thermo 1
+thermo_style custom step f_contact[4] f_contact[12]
+run 200
+"""
+    thermo = lmp(deck_text).thermo
+    # It was a bad start, for many steps.
+    assert thermo["f_contact[12]"][-1] > 10
+    assert thermo["f_contact[4]"][-1] <= eps * (1 + 1e-6)  # round-off of positions

@@ -111,10 +111,10 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
     ),
     (r"no time step above .* keeps the spheres apart", lambda facts: facts["closing"]),
     (
-        r"iterations left an overlap.*The gaps at the end of the step",
+        r"iterations left a gap short.*The gaps at the end of the step",
         lambda facts: not facts["shorten"],
     ),
-    (r"iterations left an overlap", _may_be_slow),
+    (r"iterations left a gap short", _may_be_slow),
     (
         r"is on the wrong side of region",
         lambda facts: (

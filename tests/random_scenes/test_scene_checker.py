@@ -377,7 +377,7 @@ def test_answers() -> None:
     assert said(1, reach) == ""
     assert "two different" in said(1, reach + "\nERROR: another\n")
     lost = "ERROR: Lost atoms: original 6 current 0"
-    unsolved = "WARNING: Fix inelastic: step 0: 5000 iterations left an overlap of 11.5\n"
+    unsolved = "WARNING: Fix inelastic: step 0: 5000 iterations left a gap short by 11.5\n"
     assert "no scene should meet" in said(1, unsolved + lost)
     facts["warn"] = True
     assert "no scene should meet" in said(1, lost)
