@@ -27,7 +27,7 @@ MISTAKES = {
     "not finite": ("set atom 7 vx 1e300", ["atom 7", "finite"]),
     "outside": ("set atom 7 y -0.01", ["atom 7", "region container"]),
     "moved": ("fix push one addforce 1e-3 0 0", ["atom 7", "did not move as predicted"]),
-    "held": ("fix hold one setforce 0 0 0", ["atom 7", "did not move as predicted"]),
+    "held": ("fix hold one setforce 0 0 0", ["fix hold (setforce)", "keyword frozen"]),
     "no radius": ("set atom 7 diameter 0", ["radius"]),
     "wide": ("set atom 7 diameter 0.5", ["neighbour list"]),
     "fast": ("set atom 7 vx 30", ["neighbour list"]),

@@ -88,7 +88,7 @@ def test_a_bed_at_rest_costs_nothing(ranks: int, tmp_path: Path, lmp: Runner) ->
     print(f"at rest from step {first} to {end}")
     assert end - first >= 200
     # What rolls on beside it costs single iterations.
-    assert result.thermo["f_contact[1]"][first + 20 : end].mean() <= 1
+    assert result.thermo["f_contact[1]"][first + 20 : end].mean() <= 2
     frames = read_dump(tmp_path / "particles.dump")[first + 1 : end]
     moved = np.max([np.abs(frame.positions - frames[0].positions) for frame in frames], axis=(0, 2))
     # Round-off: but for the few that nothing holds positions do not change.
