@@ -366,12 +366,18 @@ def _say_out_of_bed(bed: BoxInBed) -> None:
         bounds = ", ".join(f"{bound:g}" for bound in bed.inside.ravel())
         inside = f"[{bounds}] is inside"
     said = f"the bed ends at {bed.ends}, the numbers of the box are partly of empty space; {inside}"
-    print(f"{OUT_OF_BED}{said}", file=sys.stderr)
+    _say(f"{OUT_OF_BED}{said}")
 
 
 def _say_not_measured(what: str, why: str) -> None:
     """Say what a result lacks, in a line that the process around this one shows."""
-    print(f"{NOT_MEASURED}{what}: {why}", file=sys.stderr)
+    _say(f"{NOT_MEASURED}{what}: {why}")
+
+
+def _say(line: str) -> None:
+    """Print a line for the process around this one; a disk that is full may have no room for it."""
+    with suppress(OSError):
+        print(line, file=sys.stderr)
 
 
 def _evolution(
@@ -490,10 +496,7 @@ def main(arguments: Sequence[str]) -> int:
         write_result(Path(target), measure_case(Path(folder), Outputs.model_validate_json(outputs)))
     except (AnalysisError, WorkflowError, OSError) as error:
         # The caller says what to do, and names the folder that must go.
-        said = str(error).removesuffix(f"; {AGAIN}")
-        with suppress(OSError):
-            # A disk that is full has no room for the reason, either.
-            print(" ".join(said.split()), file=sys.stderr)
+        _say(" ".join(str(error).removesuffix(f"; {AGAIN}").split()))
         return 1 if isinstance(error, WriteError | PictureError | OSError) else NOT_WHOLE
     return 0
 
