@@ -54,8 +54,9 @@ std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
 
 // [length] A gap under a force is closed where it is, up to half a tolerance: positions are not known better, and
 // what they would give or take in a step would be velocities that nothing gives. Where that adds up along a chain,
-// or differs from step to step, a bed would never be quiet. Beyond it the gap closes, so little that the force stays. When the force goes, the contact is still closed at that gap until
-// the two have parted: what lies on a contact that loses its force for a step does not fall.
+// or differs from step to step, a bed would never be quiet. Beyond it the gap closes, so little that the force stays.
+// When the force goes, the contact is still closed at that gap until the two have parted: what lies on a contact that
+// loses its force for a step does not fall.
 double GapRules::closed_gap(const Side &side, double last, double most_closing) const
 {
   const double tolerance = step_.settings.tolerance;
