@@ -78,6 +78,8 @@ def _check_frames(dump: ParticleDump, source: Path) -> None:
     A dump that was named alone may be of another run than the contacts beside it.
     """
     contacts = source / CONTACT_DUMP
+    if dump.cut_off is not None and contacts.exists():
+        raise AnalysisError(f"{dump.cut_off}; --step N writes a frame that is there")
     try:
         open_in_folder(dump, contacts if contacts.exists() else None, alone=not source.is_dir())
     except UnfinishedRunError as error:

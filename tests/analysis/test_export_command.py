@@ -111,6 +111,21 @@ def test_a_dump_alone_has_no_contacts(run: Path) -> None:
     assert xyz_rows(run / "some.xyz")[2] == [*CENTRES[2], RADIUS, 3, 2]
 
 
+def test_a_dump_that_is_cut_off(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Alone, its whole frames are there, and it is said; in a run, a frame is named by its step."""
+    path = run / "particles.lammpsdump"
+    path.write_bytes(path.read_bytes()[:-9])
+    said = "the file ends inside the frame of step 90: 2 of 3 rows"
+    assert main(["export", str(path), "--format", "xyz"]) == 0
+    output = capsys.readouterr().out
+    assert "step 50" in output
+    assert f"only whole frames are read, 2 of them: {path}, line 36: {said}" in output
+    assert main(["export", str(run), "--format", "xyz"]) == 2
+    error = capsys.readouterr().err
+    assert error == f"inelastic: {path}, line 36: {said}; --step N writes a frame that is there\n"
+    assert main(["export", str(run), "--format", "xyz", "--step", "0"]) == 0
+
+
 def test_periodic_axes_are_said(run: Path) -> None:
     path = run / "particles.lammpsdump"
     path.write_text(path.read_text().replace("ff ff ff", "pp ff ff"))
