@@ -1,5 +1,8 @@
 """Particle frames: LAMMPS's custom text dump of spheres, ours or of others.
 
+Frames are read through MDAnalysis. It refuses dumps whose number of spheres changes, whose end is
+missing, and some headers of others, and does not tell which row is wrong: these are parsed here.
+
 A dump must have the columns `id`, positions and, unless the reader gives a radius, `radius` or
 `diameter`. Positions may be as they are (x, xu) or in shares of the box (xs, xsu).
 """
@@ -14,6 +17,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from MDAnalysis.coordinates.LAMMPS import DumpReader
 
 from .bodies import Particles, group_spheres
 from .dump_text import (
@@ -28,7 +32,7 @@ from .dump_text import (
     require_columns,
 )
 from .errors import CutOffError, DumpError, InputError, shortened
-from .geometry import FloatArray, IntArray
+from .geometry import BoolArray, FloatArray, IntArray
 
 # The first three of these columns that a dump has are read: positions in the box come before those
 # that left it through a periodic face, lengths before shares of the box, which have lost digits.
@@ -137,6 +141,8 @@ class ParticleDump:
         self._layout = _layout(self._headers[0], self.path, radius)
         self.steps: tuple[int, ...] = tuple(header.step for header in self._headers)
         self.spheres: tuple[int, ...] = tuple(header.rows for header in self._headers)
+        self._reader: DumpReader | None = None
+        self._is_known = self.cut_off is None and len(set(self.spheres)) == 1
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -144,11 +150,7 @@ class ParticleDump:
 
     def __iter__(self) -> Iterator[ParticleFrame]:
         """Read the frames one by one, never two at a time."""
-        # A compressed file is unpacked once.
-        with open_dump(self.path) as dump:
-            for header, offset in zip(self._headers, self._offsets, strict=True):
-                dump.seek(offset)
-                yield self._frame(header, read_rows(dump, self.path, header))
+        return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> ParticleFrame:
         """Read one frame; negative indices count from the end.
@@ -158,10 +160,31 @@ class ParticleDump:
         """
         if not -len(self) <= index < len(self):
             raise IndexError(f"{self.path}: no frame {index}, there are {len(self)}")
+        header = self._headers[index]
+        if self._is_known and header.rows > 0:
+            table = self._read(index % len(self))
+            if table is not None and self._fine(table).all():
+                return self._frame_of(header, table)
         with open_dump(self.path) as dump:
             dump.seek(self._offsets[index])
-            rows = read_rows(dump, self.path, self._headers[index])
-        return self._frame(self._headers[index], rows)
+            rows = read_rows(dump, self.path, header)
+        return self._frame(header, rows)
+
+    def _read(self, index: int) -> FloatArray | None:
+        """Read one frame's columns through MDAnalysis; None if it cannot."""
+        columns = self._layout.columns
+        try:
+            if self._reader is None:
+                # Additional columns are the only exact ones: MDAnalysis keeps positions as
+                # float32 and shifts them to the box's origin. dt only silences its warning.
+                self._reader = DumpReader(str(self.path), additional_columns=[*columns], dt=1.0)
+            data = self._reader[index].data
+            return np.column_stack([np.asarray(data[name], dtype=np.float64) for name in columns])
+        # An id of twenty digits makes an OverflowError; it knows no header of units or times.
+        except (ValueError, IndexError, KeyError, OverflowError):
+            self._reader = None
+            self._is_known = False
+            return None
 
     def _scan(self) -> None:
         """Read all headers; see that every frame is whole and has the same columns."""
@@ -200,7 +223,11 @@ class ParticleDump:
             )
         table = parsed_rows(rows, header, layout.columns, self.path, whole=("id",))
         self._check(header, table)
-        table = table[np.argsort(table[:, 0])]
+        return self._frame_of(header, table[np.argsort(table[:, 0])])
+
+    def _frame_of(self, header: FrameHeader, table: FloatArray) -> ParticleFrame:
+        """Make a frame of the columns of its layout, in the order of the ids."""
+        layout = self._layout
         data = dict(zip(layout.columns, table.T, strict=True))
         positions = _side_by_side(data, layout.positions)
         if layout.positions in SCALED:
@@ -222,24 +249,35 @@ class ParticleDump:
             contacts=data["contacts"].astype(np.int64) if "contacts" in data else None,
         )
 
-    def _check(self, header: FrameHeader, table: FloatArray) -> None:
-        """See that the rows of a frame, in the order of the file, can be spheres."""
+    def _fine(self, table: FloatArray) -> BoolArray:
+        """Tell which rows can be spheres; of two with one id the later one cannot."""
         columns, size, whole = self._layout.columns, self._layout.size, self._layout.whole
-        ids = table[:, 0]
-        named = (ids >= 1) & (ids < LARGEST_ID)
-        again = np.ones(len(ids), dtype=np.bool_)
-        again[np.unique(ids, return_index=True)[1]] = False
-        fine = np.isfinite(table).all(axis=1) & named & ~again
+        fine = np.isfinite(table).all(axis=1) & self._named(table)
         if size is not None:
             fine &= table[:, columns.index(size)] > 0
         for name in whole:
             values = table[:, columns.index(name)]
             fine &= (values >= 0) & (values < LARGEST_ID) & (values == np.rint(values))
+        return np.asarray(fine)
+
+    @staticmethod
+    def _named(table: FloatArray) -> BoolArray:
+        """Tell which rows have an id that can be one and is not there before."""
+        ids = table[:, 0]
+        named = (ids >= 1) & (ids < LARGEST_ID)
+        first = np.zeros(len(ids), dtype=np.bool_)
+        first[np.unique(ids, return_index=True)[1]] = True
+        return np.asarray(named & first)
+
+    def _check(self, header: FrameHeader, table: FloatArray) -> None:
+        """See that the rows of a frame, in the order of the file, can be spheres."""
+        columns, ids = self._layout.columns, table[:, 0]
+        fine, named = self._fine(table), self._named(table)
         if fine.all():
             return
         row = int(np.argmin(fine))
         line = header.first_row_line + row
-        if not named[row] or again[row]:
+        if not named[row]:
             said = f"step {header.step}: ids must be positive and each there once"
             raise DumpError(self.path, said, line)
         said = self._said_of(dict(zip(columns[1:], table[row, 1:].tolist(), strict=True)))
