@@ -150,7 +150,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   // In a chain residuals add up, and what is left of a velocity is many times what is left of a gap. So a search goes
   // on where velocities differ from those that a half to two thirds as many iterations had found by more than a
   // fortieth of what contacts change: this part of the sixteenth that targets are of it (contact_targets.cpp; of bodies
-  // half as much).
+  // a third as much).
   constexpr double MOST_MOVED = 0.4;
   const bool by_velocity = limits.accuracy > 0.0 && limits.coarseness == 1.0;
 

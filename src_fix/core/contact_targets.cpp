@@ -15,7 +15,7 @@ namespace {
   // times (which accelerated_gradient.h looks at).
   constexpr double IN_NETWORKS = 1.0 / 16.0;
   // Bodies turn, too: the softest motions of their networks are softer.
-  constexpr double OF_BODIES = 1.0 / 32.0;
+  constexpr double OF_BODIES = 1.0 / 48.0;
   // Of what a contact carries, where that changes no velocity.
   constexpr double PART_OF_LOAD = 2.0e-5;
   // Gaps are known to a few units of round-off of what they are added up from.

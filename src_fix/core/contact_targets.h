@@ -15,7 +15,7 @@
 //   l_c   the length by which the contact's own impulse of the first guess opens its gap. It matters where
 //         forces balance and change no velocity, and tells there what is small
 //
-// Changes of velocity are those of the present impulses. Contacts of bodies have A/32. A contact whose refinement
+// Changes of velocity are those of the present impulses. Contacts of bodies have A/48. A contact whose refinement
 // (contact_set.h) is below 1 has that part of A.
 
 #pragma once
@@ -55,7 +55,7 @@ class ContactTargets {
   // What follows is as judge() left it, without what changes of velocity add.
   // [length] The target is at least that.
   const std::vector<double> &least() const { return least_; }
-  // By this a change of velocity counts: A/16, or A/32, times the refinement.
+  // By this a change of velocity counts: A/16, or A/48, times the refinement.
   const std::vector<double> &part() const { return part_; }
   // [length / time] The changes of velocity by the first guess, 3 per particle.
   const std::vector<double> &change_by_guess() const { return change_by_guess_; }

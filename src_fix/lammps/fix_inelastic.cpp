@@ -406,8 +406,9 @@ inelastic::ProjectionResult FixInelastic::solve()
     if (result.status != inelastic::Status::CONVERGED) {
       const bool no_room = result.status == inelastic::Status::INFEASIBLE;
       if (no_room) unsolved_.note_no_room();
-      // Where the gaps at the end of the step were not to be had, those of a shorter one may be.
-      if ((no_room || constraints_.relinearised()) && length_.may_shorten_unsolved()) {
+      // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a shorter one.
+      if (length_.may_shorten_unsolved() &&
+          (no_room || constraints_.relinearised() || unsolved_.law_parts())) {
         length_.shorten(0.5, unsolved_.named());
         continue;
       }

@@ -57,6 +57,15 @@ double UnsolvedStep::largest_angle() const
   return angle;
 }
 
+bool UnsolvedStep::law_parts() const
+{
+  double any = 0.0;
+  for (const LawContact &contact : step_.law_contacts)
+    if (contact.demand.parts && contact.demand.parting_speed > 0.0) any = 1.0;
+  ranks_.reduce(nullptr, 0, &any, 1);
+  return any > 0.0;
+}
+
 void UnsolvedStep::report(const inelastic::ProjectionResult &result)
 {
   constexpr double LONG_ARC = 1.0;    // [radians]
@@ -64,9 +73,14 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
   const std::string message = no_room_ ? no_room(result, cause) : out_of_iterations(result, cause);
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
   const double angle = bodies_ && constraints_.relinearised() ? largest_angle() : 0.0;
+  const char *const or_shorter = step_.settings.shorten ? "" : ", or use shorten yes";
   if (angle > LONG_ARC)
     cause = fmt::format("Bodies spin by up to {:.3g} radians in this step: lower the timestep{}",
-                        angle, step_.settings.shorten ? "" : ", or use shorten yes");
+                        angle, or_shorter);
+  else if (law_parts())
+    cause = fmt::format("The contact law asks more surfaces to part than may have room to do so "
+                        "in one step: lower the timestep{}",
+                        or_shorter);
   if (!step_.settings.warn_only) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
 }
