@@ -278,14 +278,15 @@ void RegionWalls::view_moving(
   }
 
   set_clock(obstacle, 0);
+  const bool only_translates = !region->rotateflag && !region->varshape && !obstacle.joined;
   for (Seen &entry : seen) {
     const double *x = entry.from->where;
     if (entry.passed_over) {
       // The wall will have swept over the centre. LAMMPS then sees no wall, but for one that only
       // translates the distance it will have follows from the one it has now. (Of the parts of a
       // union or an intersection each may move in its own way.)
-      const bool seen_now = !region->rotateflag && !region->varshape && !obstacle.joined &&
-          see(obstacle, x, entry.from->reach + shift_length, views);
+      const bool seen_now =
+          only_translates && see(obstacle, x, entry.from->reach + shift_length, views);
       for (WallView &view : views) {
         if (!seen_now) break;
         for (int d = 0; d < 3; ++d) view.distance -= view.normal[d] * shift[d];
@@ -294,6 +295,9 @@ void RegionWalls::view_moving(
       if (!seen_now) outside(*entry.from, region->id);
       continue;
     }
+    // A wall that moves away is not seen yet where the sphere will be behind it as it is now.
+    if (only_translates)
+      for (int d = 0; d < 3; ++d) entry.view.distance_now += entry.view.normal[d] * shift[d];
     const int count = region->surface(x[0], x[1], x[2], EVERYTHING);
     for (int k = 0; k < count; ++k)
       if (obstacle.first_wall + region->contact[k].iwall == entry.view.wall)
