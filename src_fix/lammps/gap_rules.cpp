@@ -148,7 +148,6 @@ bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
 
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
 {
-  if (step_.keeps_overlaps) return 0;
   inelastic::ContactSet &contacts = step_.problem.contacts;
   constexpr double LEFT = 0.75;    // tolerances
   const double tolerance = step_.settings.tolerance;
@@ -170,7 +169,7 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     // A held contact is closed no faster than its gap asks for.
     const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
     const bool may_stay = holds || contacts.impulse[c] == 0.0;
-    if (at_end >= -allowed && (at_end <= allowed || may_stay)) continue;
+    if ((at_end >= -allowed || step_.keeps_overlaps) && (at_end <= allowed || may_stay)) continue;
     allowed = LEFT * tolerance;
     if (contacts.impulse[c] > 0.0) contacts.least[c] = 0.0;
     const bool first_time = side.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
