@@ -44,10 +44,22 @@ def loaded_and_unloaded(
 
 
 @pytest.mark.parametrize("way", UNLOADING)
-@pytest.mark.parametrize("factor", [10.0, 1e3])
-@pytest.mark.parametrize("kind", ["spheres", "dimers"])
-def test_gravity_that_is_multiplied(kind: str, factor: float, way: str, tmp_path: Path) -> None:
-    thermo = loaded_and_unloaded(kind, tmp_path, factor, 1e-3, way)
+@pytest.mark.parametrize(
+    ("kind", "factor", "accuracy"),
+    [
+        ("spheres", 10.0, 1e-3),
+        ("spheres", 1e3, 1e-3),
+        ("dimers", 10.0, 1e-3),
+        ("dimers", 1e3, 1e-3),
+        # Forces on held grains balance to 5 accuracies, of which a million times the gravity makes
+        # a fall of twenty tolerances in a step with the default one.
+        ("dimers", 1e6, 1e-5),
+    ],
+)
+def test_gravity_that_is_multiplied(
+    kind: str, factor: float, accuracy: float, way: str, tmp_path: Path
+) -> None:
+    thermo = loaded_and_unloaded(kind, tmp_path, factor, accuracy, way)
     speed = thermo["c_fastest"] / (GRAVITY * STEP)
     print(
         f"{kind}: {speed[RESTED - 1]:.4f} g h before, {speed[RESTED:].max():.4f} g h from then on"
@@ -58,26 +70,27 @@ def test_gravity_that_is_multiplied(kind: str, factor: float, way: str, tmp_path
 
 
 @pytest.mark.parametrize("way", UNLOADING)
-@pytest.mark.parametrize("kind", ["spheres", "dimers"])
-def test_gravity_that_is_a_million_times(kind: str, way: str, tmp_path: Path) -> None:
+def test_gravity_that_is_a_million_times(way: str, tmp_path: Path) -> None:
     """What fell under the load flies on when it goes, but nothing becomes faster.
 
-    Forces on held grains balance to 5 accuracies, and single grains that nothing holds slide on
-    slopes of 1e-4: a million times the gravity lets them fall, and the bed with them, before it
-    rests again. So there is motion when the load goes, which has to be no more than accuracies of
-    the load, and to which unloading must add nothing.
+    These spheres are not all at rest before: some slide on slopes of 1e-4, held by nothing. A
+    million times the gravity lets them fall, and the bed with them, before it rests again. So there
+    is motion when the load goes, which has to be no more than accuracies of the load, and to which
+    unloading must add nothing.
     """
     accuracy, factor = 1e-5, 1e6
-    thermo = loaded_and_unloaded(kind, tmp_path, factor, accuracy, way)
+    thermo = loaded_and_unloaded("spheres", tmp_path, factor, accuracy, way)
     speed, load = thermo["c_fastest"] / (GRAVITY * STEP), thermo["v_load"]
     begins = RESTED + PRESSED
     gone = begins + int(np.argmax(load[begins:] < 2))
     print(
-        f"{kind}, {way}: {speed[begins - 20 : begins].max():.3g} g h in twenty steps before, "
+        f"{way}: {speed[begins - 20 : begins].max():.3g} g h in twenty steps before, "
         f"{speed[begins:gone].max(initial=0):.3g} until it is gone, then {speed[gone:].max():.3g}"
     )
-    # Some steps that are each off by 5 accuracies of the load add up.
-    assert (speed[begins:gone] <= 50 * accuracy * load[begins - 1 : gone - 1]).all()
+    # Some steps that are each off by 5 accuracies of the load add up; and 1e-5 of the whole load,
+    # as for beds that were at rest.
+    allowed = np.maximum(50 * accuracy * load[begins - 1 : gone - 1], 1e-5 * factor)
+    assert (speed[begins:gone] <= allowed).all()
     # A tenth of g h for what the weight alone moves.
     assert speed[gone:].max() <= speed[gone - 20 : gone].max() + 0.1
 
