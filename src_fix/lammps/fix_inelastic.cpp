@@ -392,8 +392,11 @@ inelastic::ProjectionResult FixInelastic::solve()
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
     constraints_.overlaps().share();
-    if (result.status != inelastic::Status::CONVERGED && step_.bad_start && !step_.keeps_overlaps) {
-      step_.keeps_overlaps = true;
+    // Beside bad overlaps regular ones are kept where they cannot all be given back in one step, and from then on.
+    const bool unsolved = result.status != inelastic::Status::CONVERGED;
+    const bool keeps = step_.bad_start && (step_.keeps_overlaps || unsolved);
+    if (keeps != step_.keeps_overlaps) {
+      step_.keeps_overlaps = keeps;
       continue;
     }
     if (settings_.record_every > 0 && step_.kick == Kick::WHOLE &&
