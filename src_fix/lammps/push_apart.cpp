@@ -35,6 +35,8 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   // All of them may not be had at once: spheres jam for a moment. Then less is.
   constexpr double LESS = 0.25;
   constexpr int TRIALS = 6;
+  // Iterations, of thousands of spheres, with room for what they may open: many times what it takes.
+  constexpr long MOST = 10000;
   double part = 1.0;
   for (int trial = 0; trial < TRIALS; ++trial, part *= LESS) {
     problem.contacts = contacts;
@@ -50,7 +52,8 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
     }
     if (bodies_) constraints_.entangled().disentangle(atom, constraints_.overlaps());
     const long left = std::max(0L, step_.settings.max_iterations - result.iterations);
-    const inelastic::ProjectionResult pushed = project(trial + 1 < TRIALS ? left / 4 : left);
+    const inelastic::ProjectionResult pushed =
+        project(trial + 1 < TRIALS ? std::min(MOST, left / 4) : left);
     const bool solved = pushed.status == inelastic::Status::CONVERGED;
     if (solved || trial + 1 == TRIALS) add(result, pushed);
     if (solved) break;
