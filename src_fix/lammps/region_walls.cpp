@@ -48,7 +48,7 @@ WallView make_view(const Region::Contact &contact, int first_wall)
 }    // namespace
 
 RegionWalls::RegionWalls(LAMMPS *lmp, std::vector<std::string> region_ids) :
-    Pointers(lmp), ids_(std::move(region_ids))
+    Pointers(lmp), wrong_(lmp), ids_(std::move(region_ids))
 {
 }
 
@@ -73,16 +73,8 @@ void RegionWalls::init()
     const bool convex_obstacle =
         !region->interior && !region->openflag && strcmp(region->style, "intersect") != 0;
     const bool exact = (flat && !region->openflag) || convex_obstacle;
-    refuse_wrong(region, region->id);
-    const bool joined = strcmp(region->style, "union") == 0 ||
-        strcmp(region->style, "intersect") == 0;
-    // LAMMPS keeps those surface points of a part that lie in the other parts, and drops all others.
-    if (strcmp(region->style, "union") == 0 && !region->interior)
-      error->all(
-          FLERR,
-          "Fix inelastic: region {} is a union with side out, of whose parts LAMMPS does not show "
-          "the walls: list the parts instead, each with side out",
-          id);
+    wrong_.refuse(region);
+    const bool joined = region->reglist != nullptr;
     let_only_parts_move(region);
     // Cones can also be parts of joined regions.
     const bool cone = joined || strcmp(region->style, "cone") == 0;
@@ -91,29 +83,6 @@ void RegionWalls::init()
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
   }
-}
-
-// Refuses a region whose walls LAMMPS shows too late, or not at all where a sphere is (up to update 4 of 22 Jul 2025):
-// `used` itself, or a part of it.
-void RegionWalls::refuse_wrong(const Region *region, const std::string &used) const
-{
-  for (int k = 0; region->reglist && k < region->nregion; ++k)
-    refuse_wrong(region->reglist[k], used);
-  const std::string what = region->id == used
-      ? fmt::format("region {} is", used)
-      : fmt::format("region {}, a part of region {}, is", region->id, used);
-  constexpr int SIDE = 2;
-  if (strcmp(region->style, "ellipsoid") == 0)
-    error->all(FLERR,
-               "Fix inelastic: {} an ellipsoid, whose wall LAMMPS shows too late: use a sphere, a "
-               "cylinder or a cone",
-               what);
-  if (strcmp(region->style, "cylinder") == 0 && region->open_faces[SIDE])
-    error->all(FLERR,
-               "Fix inelastic: {} a cylinder with an open side, whose rims LAMMPS does not show: "
-               "use a cone with two "
-               "equal radii",
-               what);
 }
 
 bool RegionWalls::any_moves() const
@@ -149,6 +118,24 @@ void RegionWalls::view(const std::vector<Viewpoint> &viewpoints, bool inexact_on
   }
 }
 
+// What LAMMPS shows of a region from a point, into its array `contact`: how many walls are within reach.
+// To points outside a cone whose radius is a variable it shows nothing beyond the largest radius at first
+// and the reach: it is given a longer one.
+int RegionWalls::look(const Obstacle &obstacle, const double *where, double reach) const
+{
+  Region *region = obstacle.region;
+  const bool may_grow = obstacle.cone && region->varshape;
+  int count = region->surface(where[0], where[1], where[2], may_grow ? EVERYTHING : reach);
+  if (may_grow) {
+    Region::Contact *const end = std::remove_if(region->contact, region->contact + count,
+                                                [reach](const Region::Contact &contact) {
+                                                  return contact.r >= reach;
+                                                });
+    count = static_cast<int>(end - region->contact);
+  }
+  return count;
+}
+
 // The walls of one region within reach of a point; empty when LAMMPS shows none. False when the
 // point lies on a wall or beyond it.
 bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reach,
@@ -161,7 +148,7 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
   if (!obstacle.exact || obstacle.cone)
     for (int d = 0; d < 3; ++d) x[d] += OFF_AXIS[d] * std::min(reach, 1.0);
   views.clear();
-  const int count = region->surface(x[0], x[1], x[2], reach);
+  const int count = look(obstacle, x, reach);
   for (int k = 0; k < count; ++k) {
     if (!(region->contact[k].r > 0.0)) return false;
     views.push_back(make_view(region->contact[k], obstacle.first_wall));
@@ -181,7 +168,7 @@ void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallVie
   constexpr double SAME_DISTANCE = 1.0e-6;    // relative; round-off is far below
   auto distance_from = [&](const double *point) {
     Region *region = obstacle.region;
-    const int count = region->surface(point[0], point[1], point[2], 2.0 * view.distance);
+    const int count = look(obstacle, point, 2.0 * view.distance);
     for (int k = 0; k < count; ++k)
       if (obstacle.first_wall + region->contact[k].iwall == view.wall) return region->contact[k].r;
     return -1.0;
@@ -246,6 +233,7 @@ void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)
   update->ntimestep += steps_ahead;
   obstacle.region->prematch();
   update->ntimestep -= steps_ahead;
+  if (obstacle.cone && obstacle.region->varshape) wrong_.open_tips(obstacle.region);
   modify->addstep_compute(update->ntimestep + 1);
 }
 

@@ -4,6 +4,8 @@
 #ifndef INELASTIC_REGION_WALLS_H
 #define INELASTIC_REGION_WALLS_H
 
+#include "wrong_regions.h"
+
 #include "pointers.h"
 
 #include <functional>
@@ -29,8 +31,8 @@ class RegionWalls : protected Pointers {
  public:
   RegionWalls(class LAMMPS *lmp, std::vector<std::string> region_ids);
 
-  // Finds the regions and numbers their walls. Errors: a region that does not exist, or one whose walls
-  // LAMMPS does not show (an ellipsoid, a cylinder with an open side, a union with side out).
+  // Finds the regions and numbers their walls. Errors: a region that does not exist, or one of which
+  // LAMMPS shows walls wrong.
   void init();
 
   bool empty() const { return ids_.empty(); }
@@ -79,7 +81,7 @@ class RegionWalls : protected Pointers {
     bool cone;
   };
 
-  void refuse_wrong(const Region *region, const std::string &used) const;
+  int look(const Obstacle &, const double *where, double reach) const;
   bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &) const;
   void correct_cap(const Obstacle &, const double *x, WallView &) const;
 
@@ -91,6 +93,7 @@ class RegionWalls : protected Pointers {
                    const std::function<void(const Viewpoint &, const std::string &)> &);
   void set_clock(const Obstacle &, int steps_ahead);
 
+  WrongRegions wrong_;
   std::vector<std::string> ids_;
   std::vector<Obstacle> obstacles_;
   int number_of_walls_ = 0;
