@@ -7,14 +7,13 @@
 #include "wrong_regions.h"
 
 #include "pointers.h"
+#include "region.h"
 
 #include <functional>
 #include <string>
 #include <vector>
 
 namespace LAMMPS_NS {
-
-class Region;
 
 // One wall seen from the centre of one sphere.
 struct WallView {
@@ -81,9 +80,13 @@ class RegionWalls : protected Pointers {
     bool cone;
   };
 
-  int look(const Obstacle &, const double *where, double reach) const;
-  bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &) const;
-  void correct_cap(const Obstacle &, const double *x, WallView &) const;
+  using Contact = Region::Contact;
+  using Contacts = std::vector<Contact>;
+
+  void look(Region *region, const double *x, double reach, Contacts &found) const;
+  void look_at_parts(Region *joined, const double *x, double reach, Contacts &found) const;
+  void correct_cap(Region *cone, const double *x, Contact &cap) const;
+  bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &);
 
   void view_static(const Obstacle &, const std::vector<Viewpoint> &,
                    const std::function<void(const Viewpoint &, const WallView &)> &,
@@ -96,6 +99,7 @@ class RegionWalls : protected Pointers {
   WrongRegions wrong_;
   std::vector<std::string> ids_;
   std::vector<Obstacle> obstacles_;
+  Contacts seen_;    // in one look, kept to spare its memory
   int number_of_walls_ = 0;
   bool exact_ = true;
 };

@@ -1,5 +1,5 @@
-// What LAMMPS shows wrong of a region's walls (up to update 4 of 22 Jul 2025): mended where a flag of
-// the region does it, refused otherwise.
+// What LAMMPS shows wrong of a region's walls (up to update 4 of 22 Jul 2025), and the region is refused for,
+// or a flag of it mends. What the way of looking at it mends is in RegionWalls::look.
 
 #ifndef INELASTIC_WRONG_REGIONS_H
 #define INELASTIC_WRONG_REGIONS_H

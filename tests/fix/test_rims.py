@@ -92,6 +92,40 @@ def test_a_sphere_falls_on_the_tip_of_a_cone(
     assert (distance < 0.5 + 2 * EPS).sum() > 3  # it touched
 
 
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("end", [0.0, 4.0], ids=["lower", "upper"])
+@pytest.mark.parametrize("aside", [-0.4, 0.4])
+def test_a_sphere_flies_against_the_cap_of_a_cone_in_a_union(
+    axis: str, end: float, aside: float, tmp_path: Path, lmp: Runner
+) -> None:
+    """The cap belongs to the union where the sphere is; a ball is beside the sphere."""
+    k = "xyz".index(axis)
+    across = [d for d in range(3) if d != k]
+    away = 1.0 if end == 0 else -1.0
+    start, velocity, ball = np.zeros((3, 3))
+    start[k], start[across[1]] = end + 0.8 * away, aside
+    velocity[k] = -away
+    # Half the sphere's radius farther than its surface, and so far into the cone
+    ball[k], ball[across[1]] = end + 0.5 * away, 5 * aside
+    deck = spheres_of(
+        start,
+        tmp_path,
+        velocities=velocity,
+        tolerance=EPS,
+        timestep=0.005,
+        gravity=False,
+        setup="",
+        fixes=f"region cone cone {axis} 0 0 2 2 0 4\n"
+        f"region ball sphere {ball[0]} {ball[1]} {ball[2]} 1.2\n"
+        "region table union 2 cone ball\n",
+        options="region table shorten yes",
+    )
+    lmp(deck + DUMP_PARTICLES + "run 100\n")
+    height = np.abs(path(tmp_path)[:, 0, k] - end)
+    assert height.min() >= 0.5 - 2 * EPS  # what the page promises at unions
+    assert height[-1] < 0.5 + 2 * EPS
+
+
 def test_a_cone_pushes_where_it_grows_to(tmp_path: Path, lmp: Runner) -> None:
     """A radius of 0.2 grows to 1.7, a reach of LAMMPS from the first one and more."""
     deck = spheres_of(

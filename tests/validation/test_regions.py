@@ -359,8 +359,6 @@ def joined_scenes() -> dict[str, Scene]:
         "cylinder-and-sphere": (tube("x"), ball(0.6)),
         "two-cylinders": (tube("x"), tube("z")),
         "prism-and-cone": (tilted(), funnel("x")),
-        # LAMMPS looks for the caps of a y-cone in the direction z, as far away as they are: where a
-        # grain touches them that is within all other parts, too, and nothing is left out.
         "cone-y-and-slot": (funnel("y"), block(((-2, 2), (-2, 2), (-0.125, 0.125)))),
         "cone-y-and-sphere": (funnel("y"), ball(0.65)),
         "cone-and-half-space": (funnel("z"), half_space((1, 2, -1))),
@@ -377,6 +375,8 @@ def joined_scenes() -> dict[str, Scene]:
             balls = [ball(0.5, tuple(centre), motion=motion) for centre in centres]
             capsule = (tube(axis, motion=motion), *balls)
             found[f"union-capsule-{axis}{name}"] = joined("union", *capsule)
+            of_cone = (funnel(axis, (0.5, 0.5), (-0.6, 0.5), motion=motion), *balls)
+            found[f"union-capsule-of-cone-{axis}{name}"] = joined("union", *of_cone)
     apart = (ball(0.45, (-0.7, 0, 0)), block(((0.1, 1.1), (-0.5, 0.5), (-0.6, 0.5))))
     found["union-apart"] = joined("union", *apart)
     # An obstacle: grains lie on its faces only
