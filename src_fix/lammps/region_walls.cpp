@@ -7,11 +7,10 @@
 #include "region.h"
 #include "update.h"
 
-#include "fmt/format.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 using namespace LAMMPS_NS;
 
@@ -48,7 +47,7 @@ WallView make_view(const Region::Contact &contact, int first_wall)
 }    // namespace
 
 RegionWalls::RegionWalls(LAMMPS *lmp, std::vector<std::string> region_ids) :
-    Pointers(lmp), ids_(std::move(region_ids))
+    Pointers(lmp), wrong_(lmp), ids_(std::move(region_ids))
 {
 }
 
@@ -73,16 +72,8 @@ void RegionWalls::init()
     const bool convex_obstacle =
         !region->interior && !region->openflag && strcmp(region->style, "intersect") != 0;
     const bool exact = (flat && !region->openflag) || convex_obstacle;
-    refuse_wrong(region, region->id);
-    const bool joined = strcmp(region->style, "union") == 0 ||
-        strcmp(region->style, "intersect") == 0;
-    // LAMMPS keeps those surface points of a part that lie in the other parts, and drops all others.
-    if (strcmp(region->style, "union") == 0 && !region->interior)
-      error->all(
-          FLERR,
-          "Fix inelastic: region {} is a union with side out, of whose parts LAMMPS does not show "
-          "the walls: list the parts instead, each with side out",
-          id);
+    wrong_.refuse(region);
+    const bool joined = region->reglist != nullptr;
     let_only_parts_move(region);
     // Cones can also be parts of joined regions.
     const bool cone = joined || strcmp(region->style, "cone") == 0;
@@ -91,29 +82,6 @@ void RegionWalls::init()
     number_of_walls_ += region->cmax;
     exact_ = exact_ && exact;
   }
-}
-
-// Refuses a region whose walls LAMMPS shows too late, or not at all where a sphere is (up to update 4 of 22 Jul 2025):
-// `used` itself, or a part of it.
-void RegionWalls::refuse_wrong(const Region *region, const std::string &used) const
-{
-  for (int k = 0; region->reglist && k < region->nregion; ++k)
-    refuse_wrong(region->reglist[k], used);
-  const std::string what = region->id == used
-      ? fmt::format("region {} is", used)
-      : fmt::format("region {}, a part of region {}, is", region->id, used);
-  constexpr int SIDE = 2;
-  if (strcmp(region->style, "ellipsoid") == 0)
-    error->all(FLERR,
-               "Fix inelastic: {} an ellipsoid, whose wall LAMMPS shows too late: use a sphere, a "
-               "cylinder or a cone",
-               what);
-  if (strcmp(region->style, "cylinder") == 0 && region->open_faces[SIDE])
-    error->all(FLERR,
-               "Fix inelastic: {} a cylinder with an open side, whose rims LAMMPS does not show: "
-               "use a cone with two "
-               "equal radii",
-               what);
 }
 
 bool RegionWalls::any_moves() const
@@ -149,10 +117,63 @@ void RegionWalls::view(const std::vector<Viewpoint> &viewpoints, bool inexact_on
   }
 }
 
+// What LAMMPS shows of a region from a point, and within reach of it. To points outside a cone whose
+// radius is a variable it shows nothing beyond the largest radius at first and the reach: it is given
+// a longer one.
+void RegionWalls::look(Region *region, const double *x, double reach, Contacts &found) const
+{
+  found.clear();
+  if (region->reglist) {
+    look_at_parts(region, x, reach, found);
+    return;
+  }
+  const bool cone = strcmp(region->style, "cone") == 0;
+  const int count =
+      region->surface(x[0], x[1], x[2], cone && region->varshape ? EVERYTHING : reach);
+  std::copy_if(region->contact, region->contact + count, std::back_inserter(found),
+               [reach](const Contact &contact) {
+                 return contact.r < reach;
+               });
+  if (cone)
+    for (Contact &contact : found) correct_cap(region, x, contact);
+}
+
+// The walls of the parts of a union or an intersection, as LAMMPS chooses and numbers them. It would
+// choose by the uncorrected vectors to the caps of cones.
+void RegionWalls::look_at_parts(Region *joined, const double *x, double reach,
+                                Contacts &found) const
+{
+  const bool unite = strcmp(joined->style, "union") == 0;
+  const bool outside = !joined->interior;
+  Region **const parts = joined->reglist;
+  const auto turn_over = [&] {
+    for (int k = 0; outside && k < joined->nregion; ++k) parts[k]->interior ^= 1;
+  };
+  turn_over();
+  Contacts of_part;
+  int first_wall = 0;
+  for (int k = 0; k < joined->nregion; ++k) {
+    look(parts[k], x, reach, of_part);
+    for (Contact &contact : of_part) {
+      const double place[3] = {x[0] - contact.delx, x[1] - contact.dely, x[2] - contact.delz};
+      const auto leaves = [&](Region *other) {
+        if (other == parts[k]) return true;
+        const bool within = other->match(place[0], place[1], place[2]) != 0;
+        return unite ? !within || other->openflag : within != outside;
+      };
+      if (!std::all_of(parts, parts + joined->nregion, leaves)) continue;
+      contact.iwall = outside ? k : first_wall + contact.iwall;
+      found.push_back(contact);
+    }
+    first_wall += parts[k]->cmax;
+  }
+  turn_over();
+}
+
 // The walls of one region within reach of a point; empty when LAMMPS shows none. False when the
 // point lies on a wall or beyond it.
 bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reach,
-                      std::vector<WallView> &views) const
+                      std::vector<WallView> &views)
 {
   Region *region = obstacle.region;
   double x[3] = {where[0], where[1], where[2]};
@@ -161,40 +182,37 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
   if (!obstacle.exact || obstacle.cone)
     for (int d = 0; d < 3; ++d) x[d] += OFF_AXIS[d] * std::min(reach, 1.0);
   views.clear();
-  const int count = region->surface(x[0], x[1], x[2], reach);
-  for (int k = 0; k < count; ++k) {
-    if (!(region->contact[k].r > 0.0)) return false;
-    views.push_back(make_view(region->contact[k], obstacle.first_wall));
+  look(region, x, reach, seen_);
+  for (const Contact &contact : seen_) {
+    if (!(contact.r > 0.0)) return false;
+    views.push_back(make_view(contact, obstacle.first_wall));
     views.back().convex = obstacle.convex;
   }
-  if (obstacle.cone)
-    for (WallView &view : views) correct_cap(obstacle, x, view);
-  return count > 0 || region->match(x[0], x[1], x[2]) != 0;
+  return !seen_.empty() || region->match(x[0], x[1], x[2]) != 0;
 }
 
 // LAMMPS points the vector to the caps of a cone along y in the wrong direction (update 4 of 22 Jul
 // 2025), though their distance is right. A vector is right if the wall is half as far from half
 // way; otherwise it is the gradient of the distance, which is linear for a cap.
-void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallView &view) const
+void RegionWalls::correct_cap(Region *cone, const double *x, Contact &cap) const
 {
   constexpr double PROBE = 1.0e-3;            // of the distance: stays on the same side of the wall
   constexpr double SAME_DISTANCE = 1.0e-6;    // relative; round-off is far below
+  if (!(cap.r > 0.0)) return;
   auto distance_from = [&](const double *point) {
-    Region *region = obstacle.region;
-    const int count = region->surface(point[0], point[1], point[2], 2.0 * view.distance);
+    const double reach = cone->varshape ? EVERYTHING : 2.0 * cap.r;
+    const int count = cone->surface(point[0], point[1], point[2], reach);
     for (int k = 0; k < count; ++k)
-      if (obstacle.first_wall + region->contact[k].iwall == view.wall) return region->contact[k].r;
+      if (cone->contact[k].iwall == cap.iwall) return cone->contact[k].r;
     return -1.0;
   };
-  double half_way[3];
-  for (int d = 0; d < 3; ++d) half_way[d] = x[d] - 0.5 * view.distance * view.normal[d];
-  if (std::abs(distance_from(half_way) - 0.5 * view.distance) < SAME_DISTANCE * view.distance)
-    return;
+  const double half_way[3] = {x[0] - 0.5 * cap.delx, x[1] - 0.5 * cap.dely, x[2] - 0.5 * cap.delz};
+  if (std::abs(distance_from(half_way) - 0.5 * cap.r) < SAME_DISTANCE * cap.r) return;
 
   double gradient[3];
   double length_squared = 0.0;
   for (int d = 0; d < 3; ++d) {
-    double step = PROBE * view.distance;
+    double step = PROBE * cap.r;
     double point[3] = {x[0], x[1], x[2]};
     point[d] += step;
     double there = distance_from(point);
@@ -203,10 +221,13 @@ void RegionWalls::correct_cap(const Obstacle &obstacle, const double *x, WallVie
       point[d] = x[d] + step;
       there = distance_from(point);
     }
-    gradient[d] = (there - view.distance) / step;
+    gradient[d] = (there - cap.r) / step;
     length_squared += gradient[d] * gradient[d];
   }
-  for (int d = 0; d < 3; ++d) view.normal[d] = gradient[d] / std::sqrt(length_squared);
+  const double scale = cap.r / std::sqrt(length_squared);
+  cap.delx = scale * gradient[0];
+  cap.dely = scale * gradient[1];
+  cap.delz = scale * gradient[2];
 }
 
 void RegionWalls::view_static(
@@ -246,6 +267,7 @@ void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)
   update->ntimestep += steps_ahead;
   obstacle.region->prematch();
   update->ntimestep -= steps_ahead;
+  if (obstacle.cone && obstacle.region->varshape) wrong_.open_tips(obstacle.region);
   modify->addstep_compute(update->ntimestep + 1);
 }
 
@@ -298,10 +320,10 @@ void RegionWalls::view_moving(
     // A wall that moves away is not seen yet where the sphere will be behind it as it is now.
     if (only_translates)
       for (int d = 0; d < 3; ++d) entry.view.distance_now += entry.view.normal[d] * shift[d];
-    const int count = region->surface(x[0], x[1], x[2], EVERYTHING);
-    for (int k = 0; k < count; ++k)
-      if (obstacle.first_wall + region->contact[k].iwall == entry.view.wall)
-        entry.view.distance_now = region->contact[k].r;
+    look(region, x, EVERYTHING, seen_);
+    for (const Contact &contact : seen_)
+      if (obstacle.first_wall + contact.iwall == entry.view.wall)
+        entry.view.distance_now = contact.r;
     found(*entry.from, entry.view);
   }
 }

@@ -4,15 +4,16 @@
 #ifndef INELASTIC_REGION_WALLS_H
 #define INELASTIC_REGION_WALLS_H
 
+#include "wrong_regions.h"
+
 #include "pointers.h"
+#include "region.h"
 
 #include <functional>
 #include <string>
 #include <vector>
 
 namespace LAMMPS_NS {
-
-class Region;
 
 // One wall seen from the centre of one sphere.
 struct WallView {
@@ -29,8 +30,8 @@ class RegionWalls : protected Pointers {
  public:
   RegionWalls(class LAMMPS *lmp, std::vector<std::string> region_ids);
 
-  // Finds the regions and numbers their walls. Errors: a region that does not exist, or one whose walls
-  // LAMMPS does not show (an ellipsoid, a cylinder with an open side, a union with side out).
+  // Finds the regions and numbers their walls. Errors: a region that does not exist, or one of which
+  // LAMMPS shows walls wrong.
   void init();
 
   bool empty() const { return ids_.empty(); }
@@ -79,9 +80,13 @@ class RegionWalls : protected Pointers {
     bool cone;
   };
 
-  void refuse_wrong(const Region *region, const std::string &used) const;
-  bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &) const;
-  void correct_cap(const Obstacle &, const double *x, WallView &) const;
+  using Contact = Region::Contact;
+  using Contacts = std::vector<Contact>;
+
+  void look(Region *region, const double *x, double reach, Contacts &found) const;
+  void look_at_parts(Region *joined, const double *x, double reach, Contacts &found) const;
+  void correct_cap(Region *cone, const double *x, Contact &cap) const;
+  bool see(const Obstacle &, const double *where, double reach, std::vector<WallView> &);
 
   void view_static(const Obstacle &, const std::vector<Viewpoint> &,
                    const std::function<void(const Viewpoint &, const WallView &)> &,
@@ -91,8 +96,10 @@ class RegionWalls : protected Pointers {
                    const std::function<void(const Viewpoint &, const std::string &)> &);
   void set_clock(const Obstacle &, int steps_ahead);
 
+  WrongRegions wrong_;
   std::vector<std::string> ids_;
   std::vector<Obstacle> obstacles_;
+  Contacts seen_;    // in one look, kept to spare its memory
   int number_of_walls_ = 0;
   bool exact_ = true;
 };

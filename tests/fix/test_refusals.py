@@ -445,7 +445,7 @@ def test_a_union_seen_from_outside(ranks: int, tmp_path: Path, refused: Refused)
     )
     text = deck(tmp_path, setup=setup, options="region container ab")
     error = refused(text + "run 1\n", ranks=ranks)
-    assert "region ab is a union with side out" in error, error
+    assert "region ab is a union seen from outside" in error, error
     assert "list the parts instead" in error, error
 
 
