@@ -293,13 +293,18 @@ void StepLength::fit_to_list()
     shorten(room_in_list(unhindered_spread(0.0), motion), "");
 }
 
-bool StepLength::accepts(const std::string &named)
+bool StepLength::accepts(const std::string &named, const std::string &squeezed)
 {
   const bool may_shorten = step_.settings.shorten;
   // Pairs that are not listed were at least list_reach_ apart when the list was built.
   const double motion = spread(step_.motion().data());
   if (!(spread_at_start_ + update->dt * motion <= list_reach_)) {
     if (!may_shorten || spread_at_start_ >= list_reach_) {
+      if (!squeezed.empty())
+        error->all(FLERR,
+                   "Fix inelastic: step {}: {}, and further than the neighbour list reaches: keep "
+                   "them further apart than its diameter",
+                   update->ntimestep, squeezed);
       const double needed = spread_at_start_ + step_.problem.timestep * motion;
       error->all(
           FLERR,

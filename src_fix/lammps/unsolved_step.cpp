@@ -82,8 +82,9 @@ std::string UnsolvedStep::no_room(const inelastic::ProjectionResult &result,
   const bool at_end_alone = constraints_.solved_relinearised() && !step_.settings.shorten;
   cause = at_end_alone
       ? fmt::format("There are some for the gaps as they change at first, and none for those at "
-                    "the end of the step, until which {}: lower the timestep, or use shorten yes",
-                    bodies_ ? "bodies turn" : "walls curve")
+                    "the end of the step, until which {}: lower the timestep, or use shorten yes{}",
+                    bodies_ ? "bodies turn" : "walls curve",
+                    constraints_.walls_move() ? ". Or walls that move leave no room" : "")
       : "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
         "are too many spheres";
   return fmt::format("step {}: no velocities keep the surfaces apart{}{}, where {:.4g} is allowed",
