@@ -69,6 +69,7 @@ class StepLength : protected Pointers {
 
  private:
   const char *name_of_group() const;
+  void warn_of_tolerance() const;
   void check_reach() const;
   void check_reach_of_types() const;
   void set_timestep(double timestep);

@@ -100,9 +100,12 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
   // In half of the iterations or more; without room it stays, and otherwise falls by half or faster.
   constexpr double STILL_FALLS = 0.7;
   constexpr double UNSEEN = 100.0;
+  // Up to such a part of a radius a tolerance may be raised.
+  constexpr double COARSE = 0.1;
+  const bool may_raise = step_.settings.tolerance < COARSE * step_.largest_radius;
   const std::string help =
-      fmt::format("raise maxiter ({}), raise the tolerance, or lower the timestep",
-                  step_.settings.max_iterations);
+      fmt::format("raise maxiter ({}){} or lower the timestep", step_.settings.max_iterations,
+                  may_raise ? ", raise the tolerance," : "");
   double before = result.trend.earlier();
   const double now = result.trend.least();
   // The trend knows nothing of constraints that were found after the last iteration.
