@@ -383,7 +383,11 @@ class _Part:
         # What the fix owned up to at the end of the last step.
         bound = bound + last.thermo["f_contact[11]"]
         if self.facts["warn"]:
-            bound = bound + max(0.0, last.thermo["f_contact[2]"] - self.eps)
+            short = max(0.0, last.thermo["f_contact[2]"] - self.eps)
+            # Beside a bad start regular overlaps are kept until the push, for which an unsolved
+            # step has no iterations left: what is lacking comes on top.
+            keeps = short > 0.0 and last.deepest > REGULAR * self.eps
+            bound = bound + short + (REGULAR * self.eps if keeps else 0.0)
         beyond = np.flatnonzero(depth > bound)
         if not len(beyond):
             return
