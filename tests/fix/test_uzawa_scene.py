@@ -34,7 +34,7 @@ VELOCITIES = """
 7 -0.14201336142405893 0.34901475271618687 0.063272824088314833
 """
 # A point of each wall, its normal (axis, sign), and how it moves along x and z.
-WALLS = {
+WALLS: dict[str, tuple[float, int, int, str, str]] = {
     "right": (18.446419758871844, 0, -1, "-0.0014498754850209409*time",
               "0.00029263231132843658*time"),
     "bottom": (3.0365948757283006, 2, 1, "-0.0018370732746817767*time",
@@ -58,8 +58,8 @@ def scene(folder: Path, solver: str) -> str:
     lines += [f"{a:.17g} {b:.17g} {x}lo {x}hi" for (a, b), x in zip(BOX, "xyz", strict=True)]
     lines += ["", "Atoms", ""]
     for line in SPHERES.split("\n")[1:-1]:
-        name, place = line.split(maxsplit=1)
-        lines.append(f"{name} 1 {DIAMETER} {density} {place}")
+        name, centre = line.split(maxsplit=1)
+        lines.append(f"{name} 1 {DIAMETER} {density} {centre}")
     lines += ["", "Velocities", "", *(f"{line} 0 0 0" for line in VELOCITIES.split("\n")[1:-1])]
     (folder / "spheres.data").write_text("\n".join(lines) + "\n")
     walls = []
