@@ -27,6 +27,7 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
               const ContactMemory &memory, LawContacts &laws, RigidMotion *bodies);
 
   RegionWalls &walls() { return walls_; }
+  bool walls_move() const { return walls_.any_moves(); }
   OverlapWatch &overlaps() { return overlaps_; }
   const OverlapWatch &overlaps() const { return overlaps_; }
   EntangledBodies &entangled() { return entangled_; }

@@ -51,8 +51,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     push_apart_(step_, constraints_, bodies_.get()), length_(lmp, step_, ranks_),
     rest_(lmp, step_, ranks_, state_), hold_still_(step_, ranks_, bodies_.get()),
     check_(lmp, this, step_, ranks_, state_, bodies_.get()),
-    unsolved_(lmp, step_, constraints_, ranks_, bodies_.get()), output_(lmp, step_, ranks_),
-    summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
+    unsolved_(lmp, step_, constraints_, ranks_, bodies_.get()), squeezed_(lmp, step_, ranks_),
+    output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
   if (bodies_) movers_.push_back(bodies_.get());
   constraints_.walls().init();
@@ -190,6 +190,7 @@ void FixInelastic::begin_run()
   constraints_.begin_run(length_.smallest_radius());
   length_.begin_run();
   constraints_.overlaps().begin_run();
+  squeezed_.begin_run();
   begin_summary();
 }
 
@@ -418,7 +419,13 @@ inelastic::ProjectionResult FixInelastic::solve()
       summary_.add_unconverged();
       unsolved_.report(result);
     }
-    if (length_.accepts(unsolved_.named())) return result;
+    // A step that is not solved, or pushes a bad start apart, says so itself.
+    const bool solved = result.status == inelastic::Status::CONVERGED && !step_.bad_start;
+    if (solved && constraints_.walls().any_moves())
+      squeezed_.look();
+    else
+      squeezed_.skip();
+    if (length_.accepts(unsolved_.named(), squeezed_.said())) return result;
   }
 }
 
@@ -464,6 +471,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
 {
   OverlapWatch &overlaps = constraints_.overlaps();
   overlaps.warn_of_unexpected();
+  squeezed_.warn();
   {
     const PhaseClock::Within within(clock_, PhaseClock::APPLY);
     if (laws_.has_law()) laws_.take_impulses();

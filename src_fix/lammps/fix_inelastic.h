@@ -32,6 +32,7 @@ FixStyle(inelastic,FixInelastic);
 #include "run_summary.h"
 #include "solver.h"
 #include "sphere_motion.h"
+#include "squeezed_grains.h"
 #include "step.h"
 #include "step_length.h"
 #include "unsolved_step.h"
@@ -100,6 +101,7 @@ class FixInelastic : public Fix {
   HoldStill hold_still_;
   MotionCheck check_;
   UnsolvedStep unsolved_;
+  SqueezedGrains squeezed_;
   ContactOutput output_;
   RunSummary summary_;
   ProblemRecord record_;

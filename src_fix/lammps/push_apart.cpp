@@ -23,6 +23,18 @@ void add(inelastic::ProjectionResult &result, const inelastic::ProjectionResult 
 
 }    // namespace
 
+// Sets the contacts back to those of the first projection. What earlier trials have found stays: it is known to be in
+// the problem, and nobody would find it again.
+void PushApart::begin_trial(const inelastic::ContactSet &contacts)
+{
+  inelastic::ContactSet &present = step_.problem.contacts;
+  const inelastic::ContactSet last = present;
+  present = contacts;
+  for (std::size_t c = contacts.size(); c < last.size(); ++c)
+    present.add(last.first[c], last.second[c], &last.normal[3 * c], last.gap[c], 0.0,
+                last.compliance[c], last.least[c], last.refinement[c]);
+}
+
 void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const Project &project)
 {
   inelastic::ContactProblem &problem = step_.problem;
@@ -39,8 +51,7 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   constexpr long MOST = 10000;
   double part = 1.0;
   for (int trial = 0; trial < TRIALS; ++trial, part *= LESS) {
-    problem.contacts = contacts;
-    step_.sides.resize(contacts.size());
+    begin_trial(contacts);
     for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
       const Side &side = step_.sides[c];
       // A gap that counts as closed is one here.

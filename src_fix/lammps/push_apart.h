@@ -31,6 +31,8 @@ class PushApart {
   void run(const Atom *atom, inelastic::ProjectionResult &result, const Project &project);
 
  private:
+  void begin_trial(const inelastic::ContactSet &contacts);
+
   Step &step_;
   Constraints &constraints_;
   RigidMotion *bodies_;

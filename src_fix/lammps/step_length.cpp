@@ -26,6 +26,7 @@ using inelastic::norm;
 namespace {
 
 constexpr double BELOW_ONE = 1.0 - 1.0e-12;    // by the round-off of a sum of a cutoff and a skin
+constexpr double ABOVE_ONE = 1.0 + 1.0e-12;    // by that of a quotient
 constexpr double SHORTEST_STEP = 1.0e-6;       // of the regular one: below, something else is wrong
 constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
 // An overlap of two spheres is not known better than this part of the largest coordinate. Each of the
@@ -34,6 +35,8 @@ constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon
 // An atom may stray by this part of what its rank owns of the box: LAMMPS brings it back from the next part
 // alone.
 constexpr double MOST_STRAYED = 0.5;
+// Of the smallest radius: a tolerance that serves nearly every packing, and one beyond which there is little of one.
+constexpr double USUAL_TOLERANCE = 0.001, COARSE_TOLERANCE = 0.1;
 
 }    // namespace
 
@@ -63,8 +66,9 @@ void StepLength::measure_radii()
     error->all(
         FLERR,
         "Fix inelastic: the tolerance {:.4g}, the largest overlap allowed, must be below the "
-        "smallest radius of group {}, {:.4g}",
-        step_.settings.tolerance, name_of_group(), smallest_radius_);
+        "smallest radius of group {}, {:.4g}: give a thousandth of that, {:.2g}, or less",
+        step_.settings.tolerance, name_of_group(), smallest_radius_,
+        USUAL_TOLERANCE * smallest_radius_);
 }
 
 const char *StepLength::name_of_group() const
@@ -79,8 +83,22 @@ void StepLength::choose_list()
   one_cutoff_ = step_.largest_radius <= SIMILAR * smallest_radius_;
 }
 
+void StepLength::warn_of_tolerance() const
+{
+  const double part = step_.settings.tolerance / smallest_radius_;
+  if (comm->me != 0 || !(part > COARSE_TOLERANCE * ABOVE_ONE) || step_.largest_radius == 0.0)
+    return;
+  error->warning(
+      FLERR,
+      "Fix inelastic: the tolerance {:.4g} lets spheres overlap by {:.2g} of the smallest "
+      "radius of group {}, {:.4g}: give a thousandth of that, {:.2g}, or less",
+      step_.settings.tolerance, part, name_of_group(), smallest_radius_,
+      USUAL_TOLERANCE * smallest_radius_);
+}
+
 void StepLength::begin_run()
 {
+  warn_of_tolerance();
   restore();
   step_.regular_timestep = update->dt;
 }
@@ -293,13 +311,18 @@ void StepLength::fit_to_list()
     shorten(room_in_list(unhindered_spread(0.0), motion), "");
 }
 
-bool StepLength::accepts(const std::string &named)
+bool StepLength::accepts(const std::string &named, const std::string &squeezed)
 {
   const bool may_shorten = step_.settings.shorten;
   // Pairs that are not listed were at least list_reach_ apart when the list was built.
   const double motion = spread(step_.motion().data());
   if (!(spread_at_start_ + update->dt * motion <= list_reach_)) {
     if (!may_shorten || spread_at_start_ >= list_reach_) {
+      if (!squeezed.empty())
+        error->all(FLERR,
+                   "Fix inelastic: step {}: {}, and further than the neighbour list reaches: keep "
+                   "them further apart than its diameter",
+                   update->ntimestep, squeezed);
       const double needed = spread_at_start_ + step_.problem.timestep * motion;
       error->all(
           FLERR,

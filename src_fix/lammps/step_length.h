@@ -45,8 +45,9 @@ class StepLength : protected Pointers {
   void fit_to_list();
 
   // Tells whether the step, solved, may be made. Otherwise it is shorter now, or there is an error. `named`
-  // tells of the constraint that is farthest from being met, if any. Collective.
-  bool accepts(const std::string &named);
+  // tells of the constraint that is farthest from being met, if any, `squeezed` of what walls throw (squeezed_grains.h).
+  // Collective.
+  bool accepts(const std::string &named, const std::string &squeezed);
 
   // Makes the time step shorter. Errors: it is so short already that something else is wrong.
   void shorten(double factor, const std::string &named);
@@ -68,6 +69,7 @@ class StepLength : protected Pointers {
 
  private:
   const char *name_of_group() const;
+  void warn_of_tolerance() const;
   void check_reach() const;
   void check_reach_of_types() const;
   void set_timestep(double timestep);

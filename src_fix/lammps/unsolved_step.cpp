@@ -96,8 +96,9 @@ std::string UnsolvedStep::no_room(const inelastic::ProjectionResult &result,
   const bool at_end_alone = constraints_.solved_relinearised() && !step_.settings.shorten;
   cause = at_end_alone
       ? fmt::format("There are some for the gaps as they change at first, and none for those at "
-                    "the end of the step, until which {}: lower the timestep, or use shorten yes",
-                    bodies_ ? "bodies turn" : "walls curve")
+                    "the end of the step, until which {}: lower the timestep, or use shorten yes{}",
+                    bodies_ ? "bodies turn" : "walls curve",
+                    constraints_.walls_move() ? ". Or walls that move leave no room" : "")
       : "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
         "are too many spheres";
   return fmt::format("step {}: no velocities keep the surfaces apart{}{}, where {:.4g} is allowed",
@@ -113,9 +114,12 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
   // In half of the iterations or more; without room it stays, and otherwise falls by half or faster.
   constexpr double STILL_FALLS = 0.7;
   constexpr double UNSEEN = 100.0;
+  // Up to such a part of a radius a tolerance may be raised.
+  constexpr double COARSE = 0.1;
+  const bool may_raise = step_.settings.tolerance < COARSE * step_.largest_radius;
   const std::string help =
-      fmt::format("raise maxiter ({}), raise the tolerance, or lower the timestep",
-                  step_.settings.max_iterations);
+      fmt::format("raise maxiter ({}){} or lower the timestep", step_.settings.max_iterations,
+                  may_raise ? ", raise the tolerance," : "");
   double before = result.trend.earlier();
   const double now = result.trend.least();
   // The trend knows nothing of constraints that were found after the last iteration.

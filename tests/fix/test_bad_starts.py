@@ -181,3 +181,15 @@ run 200
     # It was a bad start, for many steps.
     assert thermo["f_contact[12]"][-1] > 10
     assert thermo["f_contact[4]"][-1] <= eps * (1 + 1e-6)  # round-off of positions
+
+
+@pytest.mark.parametrize("number", [120, 200])
+def test_walls_hold_where_spheres_jam(number: int, tmp_path: Path, lmp: Runner) -> None:
+    """What one trial of a push has found is known to the next ones: nobody passes a wall."""
+    radius, box = 0.12, ((0, 1),) * 3
+    points = np.random.default_rng(1).uniform(1.1 * radius, 1 - 1.1 * radius, (number, 3))
+    deck = scene(points, radius, tmp_path, tolerance=5e-4 * radius, skin=0.4, box=box)
+    lmp(deck + DUMP_PARTICLES + "run 6\n")
+    for frame in read_dump(tmp_path / "particles.dump"):
+        # Regular overlaps are up to two tolerances.
+        assert deepest_in_box(frame.positions, frame["radius"], box) <= 1e-3 * radius

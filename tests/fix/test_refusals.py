@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.fix.bodies import body_scene, dimer, placed
 from tests.fix.lammps_run import Runner
 from tests.fix.scenes import (
     DUMP_PARTICLES,
@@ -471,7 +472,7 @@ MESSAGES: dict[str, tuple[dict[str, Any], list[str]]] = {
     ),
     "a tolerance as large as a sphere": (
         {"tolerance": 0.05},
-        ["the tolerance 0.05", "must be below the smallest radius of group all, 0.05"],
+        ["the tolerance 0.05", "the smallest radius of group all, 0.05: give", "5e-05, or less"],
     ),
 }
 
@@ -482,6 +483,37 @@ def test_the_cause_is_named(name: str, tmp_path: Path, refused: Refused) -> None
     error = refused(deck(tmp_path, **options) + "run 5\n")
     for word in words:
         assert word in error, error
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("bodies", [False, True], ids=["spheres", "dimers"])
+def test_a_tolerance_near_the_radius(
+    bodies: bool, part: float, tmp_path: Path, lmp: Runner
+) -> None:
+    """Above a tenth of a radius a warning names what is usual; the run goes on."""
+    tolerance = part * RADIUS
+    if bodies:
+        body = placed(2 * RADIUS * dimer(1.5), [0.5, 0.5, 0.5])
+        text = body_scene(body, RADIUS, tmp_path, inertia="solid", tolerance=tolerance)
+    else:
+        text = deck(tmp_path, tolerance=tolerance)
+    result = lmp(text + "run 2\n")
+    said = [line for line in result.warnings if "lets spheres overlap by" in line]
+    assert len(said) == (part > 0.1), result.warnings
+    for line in said:
+        assert f"overlap by {part} of the smallest radius of group all, {RADIUS}" in line
+        assert f"{RADIUS / 1000:.2g}, or less" in line
+
+
+@pytest.mark.parametrize(("part", "raising"), [(0.01, True), (0.9, False)])
+def test_no_tolerance_above_the_radius_is_advised(
+    part: float, raising: bool, tmp_path: Path, refused: Refused
+) -> None:
+    """Where iterations run out, to raise the tolerance is advice as long as that is allowed."""
+    text = column(tmp_path, maxiter=2, lid=-40, tolerance=part * RADIUS)
+    error = refused(text + "run 1\n")
+    assert "raise maxiter (2)" in error, error
+    assert ("raise the tolerance" in error) == raising, error
 
 
 def test_gaps_that_follow_a_curved_wall_far(tmp_path: Path, refused: Refused) -> None:
@@ -505,7 +537,7 @@ def test_gaps_that_follow_a_curved_wall_far(tmp_path: Path, refused: Refused) ->
     assert "use shorten yes" in error, error
 
 
-def column(folder: Path, maxiter: int, lid: float) -> str:
+def column(folder: Path, maxiter: int, lid: float, tolerance: float = 1e-9) -> str:
     """Return 50 spheres that stand on one another and just touch floor and lid."""
     x = np.full(50, 0.5)
     y = 0.05 + 0.1 * np.arange(50)
@@ -514,7 +546,7 @@ def column(folder: Path, maxiter: int, lid: float) -> str:
         RADIUS,
         folder,
         box=((0.0, 1.0), (0.0, 7.0), (0.0, 1.0)),
-        tolerance=1e-9,
+        tolerance=tolerance,
         setup=f"variable down equal {lid}*time\n"
         "region lid plane 0 5 0 0 -1 0 move NULL v_down NULL",
         options=f"region container lid maxiter {maxiter}",

@@ -357,6 +357,46 @@ def test_shapes(number: int, motion: dict[str, Any]) -> None:
     assert (others * view.normal[~solid][:, None]).sum(axis=2).max() <= 1e-12  # round-off
 
 
+# Obstacles, and the least radius of curvature of their walls.
+OBSTACLES = {
+    "sphere": ({"kind": "sphere", "centre": [0.0] * 3, "radius": 1.0}, 1.0),
+    "cylinder": (
+        {"kind": "cylinder", "axis_name": "z", "centre": [0.0, 0.0], "ends": [-9.0, 9.0],
+         "radius": 1.0},
+        1.0,
+    ),
+    "cone": (
+        {"kind": "cone", "axis_name": "y", "centre": [0.0, 0.0], "ends": [-1.0, 1.0],
+         "radii": [1.5, 0.2]},
+        0.0,
+    ),
+    "block": ({"kind": "block", "faces": [[-1.0, 1.0]] * 3}, 0.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_what_passes_an_obstacle_parts_faster_than_its_gap_has_grown(name: str) -> None:
+    """By up to h v^2 / d, as the page of the laws says of pairs and of obstacles."""
+    parameters, curvature = OBSTACLES[name]
+    shape = parameters | {"inside": False, "number": 1}
+    random = np.random.default_rng(7)
+    size, steps = 0.5, np.linspace(0, 1, 21)
+    start, motion = random.uniform(-3, 3, (2, 20000, 3))
+    paths = start[None] + steps[:, None, None] * motion[None]
+    away = np.array([views(shape, points, 0.0)[0].distance for points in paths])
+    # Those that touch nothing before the end, where their gap is small.
+    passing = (away > size).all(axis=0) & (away[-1] < size + 0.3)
+    end = views(shape, paths[-1], 0.0)[0]
+    opening = (end.normal * motion).sum(axis=1)
+    excess = (opening - (end.distance - size))[passing]
+    speed = np.linalg.norm(motion, axis=1)[passing]
+    bound = speed**2 / (away.min(axis=0)[passing] + curvature)
+    parting = opening[passing] > 0
+    assert parting.sum() > 20
+    assert (excess <= bound)[parting].all()
+    assert excess[parting].max() > 0
+
+
 def test_answers() -> None:
     facts = {
         "shorten": True, "closing": False, "bad_start": False, "spread": 1.0, "warn": False,
