@@ -10,6 +10,9 @@ using namespace LAMMPS_NS;
 
 namespace {
 
+// All overlaps may not be had opened at once: spheres jam for a moment. Then so much less is asked for.
+constexpr double LESS = 0.25;
+
 // Both projections of a step as one result.
 void add(inelastic::ProjectionResult &result, const inelastic::ProjectionResult &pushed)
 {
@@ -35,6 +38,54 @@ void PushApart::begin_trial(const inelastic::ContactSet &contacts)
                 last.compliance[c], last.least[c], last.refinement[c]);
 }
 
+// A push that begins asks for everything.
+void PushApart::begin_push()
+{
+  part_ = 1.0;
+  easy_ = looked_ = 0;
+  stuck_ = false;
+}
+
+// Where only parts are opened, and overlaps get no smaller by that, there is no room.
+void PushApart::look_for_progress()
+{
+  constexpr int EVERY = 50;    // steps
+  constexpr double PROGRESS = 0.9;
+  if (part_ == 1.0) looked_ = 0;
+  if (looked_ == 0) largest_before_ = step_.largest_overlap;
+  if (part_ == 1.0 || ++looked_ <= EVERY) return;
+  stuck_ = step_.largest_overlap > PROGRESS * largest_before_;
+  looked_ = 0;
+}
+
+// Asks for this part of what bad overlaps are to be opened by.
+void PushApart::ask_for(double part, const Atom *atom)
+{
+  inelastic::ContactSet &contacts = step_.problem.contacts;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const Side &side = step_.sides[c];
+    // A gap that counts as closed is one here.
+    if (side.gap_now <= step_.settings.tolerance)
+      contacts.gap[c] =
+          (side.gap_now < 0.0 ? part : 1.0) * constraints_.rules().effective_gap(side) -
+          side.wall_motion;
+    contacts.impulse[c] = 0.0;
+  }
+  if (bodies_) constraints_.entangled().disentangle(atom, constraints_.overlaps());
+}
+
+// The next step begins with what was to be had, and now and then asks for more.
+void PushApart::note_solved(double part, bool at_once)
+{
+  constexpr int EASY = 8;    // steps
+  stuck_ = false;
+  easy_ = at_once ? easy_ + 1 : 0;
+  part_ = part;
+  if (easy_ < EASY) return;
+  part_ = std::min(1.0, part / LESS);
+  easy_ = 0;
+}
+
 void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const Project &project)
 {
   inelastic::ContactProblem &problem = step_.problem;
@@ -44,32 +95,28 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   step_.phase = Phase::PUSH;
   step_.relinearisations = 0;
   if (bodies_) constraints_.entangled().find();
-  // All of them may not be had at once: spheres jam for a moment. Then less is.
-  constexpr double LESS = 0.25;
-  constexpr int TRIALS = 6;
+  if (!constraints_.overlaps().pushed_before()) begin_push();
+  look_for_progress();
   // Iterations, of thousands of spheres, with room for what they may open: many times what it takes.
   constexpr long MOST = 10000;
-  double part = 1.0;
-  for (int trial = 0; trial < TRIALS; ++trial, part *= LESS) {
+  constexpr double LEAST = 1.0e-3;
+  double part = stuck_ ? 1.0 : part_;
+  bool solved = false;
+  for (int trial = 0; !solved; ++trial) {
     begin_trial(contacts);
-    for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
-      const Side &side = step_.sides[c];
-      // A gap that counts as closed is one here.
-      if (side.gap_now <= step_.settings.tolerance)
-        problem.contacts.gap[c] =
-            (side.gap_now < 0.0 ? part : 1.0) * constraints_.rules().effective_gap(side) -
-            side.wall_motion;
-      problem.contacts.impulse[c] = 0.0;
-    }
-    if (bodies_) constraints_.entangled().disentangle(atom, constraints_.overlaps());
+    ask_for(part, atom);
+    const bool last = stuck_ || LESS * part < LEAST;
     const long left = std::max(0L, step_.settings.max_iterations - result.iterations);
     const inelastic::ProjectionResult pushed =
-        project(trial + 1 < TRIALS ? std::min(MOST, left / 4) : left);
-    const bool solved = pushed.status == inelastic::Status::CONVERGED;
-    if (solved || trial + 1 == TRIALS) add(result, pushed);
-    if (solved) break;
-    result.iterations += trial + 1 < TRIALS ? pushed.iterations : 0;
+        project(last && !stuck_ ? left : std::min(MOST, left / 4));
+    solved = pushed.status == inelastic::Status::CONVERGED;
+    if (solved || last) add(result, pushed);
+    if (solved) note_solved(part, trial == 0);
+    if (solved || last) break;
+    result.iterations += pushed.iterations;
+    part *= LESS;
   }
+  if (stuck_ && !solved) result.status = inelastic::Status::INFEASIBLE;
 
   problem.contacts = contacts;
   step_.sides.resize(contacts.size());

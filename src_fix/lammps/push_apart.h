@@ -31,11 +31,21 @@ class PushApart {
   void run(const Atom *atom, inelastic::ProjectionResult &result, const Project &project);
 
  private:
+  void begin_push();
+  void look_for_progress();
   void begin_trial(const inelastic::ContactSet &contacts);
+  void ask_for(double part, const Atom *atom);
+  void note_solved(double part, bool at_once);
 
   Step &step_;
   Constraints &constraints_;
   RigidMotion *bodies_;
+
+  double part_ = 1.0;    // of what overlaps are opened by, as the last step could
+  int easy_ = 0;         // steps in a row that could at once
+  int looked_ = 0;       // steps since the largest overlap [length] was this
+  double largest_before_ = 0.0;
+  bool stuck_ = false;    // it has not got smaller, so that all is asked for
 };
 
 }    // namespace LAMMPS_NS

@@ -382,6 +382,9 @@ class _Part:
             return
         # What the fix owned up to at the end of the last step.
         bound = bound + last.thermo["f_contact[11]"]
+        if last.deepest > REGULAR * self.eps:
+            # Beside a bad start regular overlaps are kept, to within the residual.
+            bound = np.maximum(bound, (REGULAR + 1) * self.eps)
         if self.facts["warn"]:
             short = max(0.0, last.thermo["f_contact[2]"] - self.eps)
             # Beside a bad start regular overlaps are kept until the push, for which an unsolved

