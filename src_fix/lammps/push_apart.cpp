@@ -107,8 +107,7 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
     ask_for(part, atom);
     const bool last = stuck_ || LESS * part < LEAST;
     const long left = std::max(0L, step_.settings.max_iterations - result.iterations);
-    const inelastic::ProjectionResult pushed =
-        project(last && !stuck_ ? left : std::min(MOST, left / 4));
+    const inelastic::ProjectionResult pushed = project(last ? left : std::min(MOST, left / 4));
     solved = pushed.status == inelastic::Status::CONVERGED;
     if (solved || last) add(result, pushed);
     if (solved) note_solved(part, trial == 0);
@@ -116,7 +115,6 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
     result.iterations += pushed.iterations;
     part *= LESS;
   }
-  if (stuck_ && !solved) result.status = inelastic::Status::INFEASIBLE;
 
   problem.contacts = contacts;
   step_.sides.resize(contacts.size());
