@@ -188,7 +188,8 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
     views.push_back(make_view(contact, obstacle.first_wall));
     views.back().convex = obstacle.convex;
   }
-  return !seen_.empty() || region->match(x[0], x[1], x[2]) != 0;
+  // Beyond the wall of one part of an intersection LAMMPS may still show another one's.
+  return (!seen_.empty() && !obstacle.joined) || region->match(x[0], x[1], x[2]) != 0;
 }
 
 // LAMMPS points the vector to the caps of a cone along y in the wrong direction (update 4 of 22 Jul
