@@ -689,6 +689,11 @@ class _Part:
                 # What a push has left in bodies in a line is still being taken away.
                 for _, mine, arm in self.members(new):
                     alike[mine] &= not self.is_in_line(arm)
+            if new.bodies is not None:
+                # The round-off of a moment, of forces as far out as the surface, over short arms.
+                for _, mine, arm in self.members(new):
+                    longest = np.linalg.norm(arm, axis=1).max()
+                    slack[mine] *= 1 + new.radius[mine].max() / max(longest, 1e-300)
             self.close(
                 "force added to a sphere", added[alike], wanted[alike], slack[alike], new.id[alike]
             )
