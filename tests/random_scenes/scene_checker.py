@@ -348,18 +348,25 @@ class _Part:
                     factor * self.eps + slack,
                     shape,
                 )
-        # The fix looks at curved walls, and at cones, from a point that is off, in each direction,
-        # by 1e-12 of how far it looks, or by 1e-12: as far as the step without contacts takes a
-        # sphere, and more; for a wall that may move away from what it holds, as the box is wide.
+        slack += self.off_axis(frame)
+        self.close("reported overlap", frame.thermo["f_contact[4]"], frame.deepest, slack)
+        self.report.seen["overlapping frames"] += int(frame.deepest > REGULAR * self.eps)
+
+    def off_axis(self, frame: _Frame) -> float:
+        """By how much the fix sees the distance of a wall wrong, length.
+
+        It looks at curved walls, and at cones, from a point that is off, in each direction, by
+        1e-12 of how far it looks, or by 1e-12: as far as the step without contacts takes a sphere,
+        and more; for a wall that may move away from what it holds, as the box is wide.
+        """
+        if not (self.curved or any(shape["kind"] == "cone" for shape in self.shapes)):
+            return 0.0
         forced = self.to_v / frame.mass * np.linalg.norm(frame.before, axis=1)
         goes = frame.h * (np.linalg.norm(frame.v, axis=1) + frame.h * forced)
         far = 10 * self.facts["largest"] + 2 * float(goes.max(initial=0.0))
         if "law gluey" in self.facts["words"] and any(moves(shape) for shape in self.shapes):
             far = max(far, frame.widest)
-        off_axis = self.curved or any(shape["kind"] == "cone" for shape in self.shapes)
-        looks = 2e-12 * min(1.0, far) if off_axis else 0.0
-        self.close("reported overlap", frame.thermo["f_contact[4]"], frame.deepest, slack + looks)
-        self.report.seen["overlapping frames"] += int(frame.deepest > REGULAR * self.eps)
+        return 2e-12 * min(1.0, far)
 
     def deep(
         self,
@@ -545,7 +552,7 @@ class _Part:
 
     def wall_contacts(self, frame: _Frame, listed: dict[str, Array]) -> None:
         """Normals and gaps of walls, where these are not tangent planes added for the end."""
-        slack = 10 * ROUND_OFF * self.lengths(frame)
+        slack = 10 * ROUND_OFF * self.lengths(frame) + self.off_axis(frame)
         for row in np.flatnonzero(~listed["pair"]):
             k, number = listed["i"][row], listed["wall"][row]
             found = [
@@ -887,7 +894,7 @@ class _Part:
         assert frame.bodies is not None
         half = 0.5 * frame.h * self.to_v
         mass, v = frame.bodies["mass"], frame.bodies["vx vy vz"]
-        size = np.linalg.norm(v, axis=1) + half * self.to_strength(frame, frame.force) / mass
+        size = np.linalg.norm(v, axis=1) + half * self.to_strength(frame, frame.before) / mass
         after = v.copy()
         for row, mine, _ in self.members(frame):
             after[row] += half * frame.force[mine].sum(axis=0) / mass[row]

@@ -137,7 +137,7 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
 
 
 # The warning of a step that was not solved begins so.
-UNSOLVED = r"WARNING: Fix inelastic: step \d+: \d+ iterations left"
+UNSOLVED = r"WARNING: Fix inelastic: step \d+: (\d+ iterations left|no velocities keep)"
 
 
 def finding(of: Answer, facts: Facts) -> str:
