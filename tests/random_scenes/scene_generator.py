@@ -706,8 +706,8 @@ class _Draw:
         else:
             lines += [f"pair_style zero {numbers(largest)}", "pair_coeff * *"]
         list_style = self.one(*["bin"] * 17, "nsq", "nsq", "multi")
-        if "s" in self.flags or "m" in self.flags:
-            # LAMMPS makes no bins in a box that few spheres have shrunk.
+        if "s" in self.flags or "m" in self.flags or self.skin > 200 * self.largest:
+            # LAMMPS makes no bins in a box that few spheres have shrunk, or far wider than it.
             list_style = "nsq"
         lines.append(f"neighbor {numbers(self.skin)} {list_style}")
         often = self.one(
