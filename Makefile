@@ -14,7 +14,7 @@ BIN := $(VENV)/bin
 # Folders that the environment uses where they are: a change in them needs no installation.
 LINKED := workflow analysis inputs
 # All else that ends up in the installed package: it is compiled again when any of it changes.
-SOURCES := $(shell find src_fix -type f -not -path '*/__pycache__/*' -not -path 'src_fix/doc/*') \
+SOURCES := $(shell find src_fix -type f -not -path '*/__pycache__/*') \
            CMakeLists.txt pyproject.toml
 # The environment's mpicxx and mpiexec come before any of the system's.
 export PATH := $(abspath $(BIN)):$(PATH)

@@ -419,7 +419,7 @@ def test_how_much_longer_uzawa_takes() -> None:
 
 
 def page() -> str:
-    return " ".join((ROOT / "src_fix/doc/fix_inelastic.md").read_text().split())
+    return " ".join((ROOT / "docs/reference/fix-inelastic.md").read_text().split())
 
 
 def test_what_is_said_of_velocities_is_said_with_the_accuracy() -> None:
@@ -432,7 +432,7 @@ def test_what_is_said_of_velocities_is_said_with_the_accuracy() -> None:
 
 def test_the_number_of_contacts_shows_no_trend_with_the_time_step() -> None:
     """The page's own table, at each tolerance; rows of two time steps are independent."""
-    lines = (ROOT / "src_fix/doc/fix_inelastic.md").read_text().splitlines()
+    lines = (ROOT / "docs/reference/fix-inelastic.md").read_text().splitlines()
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
     number = re.compile(r"([\d.]+) ± [\d.]+ \(([\d.]+)\)")
     found: dict[str, list[tuple[float, float]]] = {}
