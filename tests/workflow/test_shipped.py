@@ -1,4 +1,4 @@
-"""What is shipped, where stored results are looked for, and decks as docs/reference/decks.md has them."""
+"""What is shipped, where stored results are looked for, and decks as their page has them."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ TABLE_OF = {"dimers": "spheres", "clusters": "dimers", "response": "spheres", "g
 
 
 def documented(name: str) -> list[tuple[str, str, str]]:
-    """Return the rows of a deck's tables in docs/reference/decks.md: variable, default and meaning."""
+    """Return the rows of a deck's tables on its page: variable, default and meaning."""
     document = (ROOT / "docs" / "reference" / "decks.md").read_text()
     (section,) = re.findall(rf"^## {name}\.in\n(.*?)(?=^## |\Z)", document, re.M | re.S)
     tables = re.findall(r"^\| name \|.*?(?=\n\n|\Z)", section, re.M | re.S)
