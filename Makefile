@@ -5,6 +5,7 @@
 # make validate  set up, check the physics (an hour)
 # make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
+# make docs      build the documentation as a site, build/site/index.html, and check its links
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
 # make clean     remove the environment, build and out; results of hours stay (paper, benchmark, and studies of one's own)
 
@@ -21,7 +22,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # Two processes; the tests of a file stay together, since they share the fixtures of its module.
 PYTEST := pytest -n 2 --dist loadfile
 
-.PHONY: run report test test-all style validate tables bench bench-quick setup clean
+.PHONY: run report test test-all style validate tables bench bench-quick docs setup clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -54,6 +55,9 @@ bench: setup
 bench-quick: setup
 	python -m tests.benchmark --quick
 
+docs: $(VENV)/site_builder
+	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
+
 setup: $(VENV)/installed
 
 # All that is needed to build, to run and to test, as pyproject.toml says.
@@ -71,6 +75,13 @@ $(VENV)/requirements.txt: pyproject.toml
 	@command -v c++ >/dev/null || { echo 'A C++ compiler is missing: apt-get install g++'; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -c '$(REQUIREMENTS)' > $@.new
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
+	mv $@.new $@
+
+# The site needs nothing that is compiled.
+$(VENV)/site_builder: $(VENV)/requirements.txt
+	$(BIN)/python -c 'import tomllib; file = tomllib.load(open("pyproject.toml", "rb")); \
+	  print(*file["project"]["optional-dependencies"]["docs"], sep="\n")' > $@.new
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
 	mv $@.new $@
 
