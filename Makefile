@@ -5,7 +5,7 @@
 # make validate  set up, check the physics (an hour)
 # make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
-# make docs      build the documentation as a site, build/site/index.html, and check its links
+# make docs      build the documentation as a site, build/site, and check its links
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
 # make clean     remove the environment, build and out; results of hours stay (paper, benchmark, and studies of one's own)
 
@@ -56,7 +56,8 @@ bench-quick: setup
 	python -m tests.benchmark --quick
 
 docs: $(VENV)/site_builder
-	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 mkdocs build --strict --quiet
+	@echo 'The site is in build/site. To read it, with search: mkdocs serve'
 
 setup: $(VENV)/installed
 
