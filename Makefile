@@ -5,6 +5,7 @@
 # make validate  set up, check the physics (an hour)
 # make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
+# make docs      build the documentation as a site, build/site, and check its links
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
 # make clean     remove the environment, build and out; results of hours stay (paper, benchmark, and studies of one's own)
 
@@ -14,14 +15,14 @@ BIN := $(VENV)/bin
 # Folders that the environment uses where they are: a change in them needs no installation.
 LINKED := workflow analysis inputs
 # All else that ends up in the installed package: it is compiled again when any of it changes.
-SOURCES := $(shell find src_fix -type f -not -path '*/__pycache__/*' -not -path 'src_fix/doc/*') \
+SOURCES := $(shell find src_fix -type f -not -path '*/__pycache__/*') \
            CMakeLists.txt pyproject.toml
 # The environment's mpicxx and mpiexec come before any of the system's.
 export PATH := $(abspath $(BIN)):$(PATH)
 # Two processes; the tests of a file stay together, since they share the fixtures of its module.
 PYTEST := pytest -n 2 --dist loadfile
 
-.PHONY: run report test test-all style validate tables bench bench-quick setup clean
+.PHONY: run report test test-all style validate tables bench bench-quick docs setup clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -54,6 +55,10 @@ bench: setup
 bench-quick: setup
 	python -m tests.benchmark --quick
 
+docs: $(VENV)/site_builder
+	NO_MKDOCS_2_WARNING=1 mkdocs build --strict --quiet
+	@echo 'The site is in build/site. To read it, with search: mkdocs serve'
+
 setup: $(VENV)/installed
 
 # All that is needed to build, to run and to test, as pyproject.toml says.
@@ -71,6 +76,13 @@ $(VENV)/requirements.txt: pyproject.toml
 	@command -v c++ >/dev/null || { echo 'A C++ compiler is missing: apt-get install g++'; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -c '$(REQUIREMENTS)' > $@.new
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
+	mv $@.new $@
+
+# The site needs nothing that is compiled.
+$(VENV)/site_builder: $(VENV)/requirements.txt
+	$(BIN)/python -c 'import tomllib; file = tomllib.load(open("pyproject.toml", "rb")); \
+	  print(*file["project"]["optional-dependencies"]["docs"], sep="\n")' > $@.new
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
 	mv $@.new $@
 

@@ -1,7 +1,7 @@
 """LAMMPS decks as a study sees them: a text, and the parameters that the command line may set.
 
 Names, defaults and what each parameter may be stand in the deck's own table, which LAMMPS's command
-`parameters` reads too (src_fix/doc/parameters.md), so that a study is checked before anything runs.
+`parameters` (docs/reference/parameters.md) reads too, so that a study is checked before it runs.
 A deck of the user's own may have a table as well; one that has none is only asked for the names in
 its lines `variable NAME index DEFAULT`.
 """

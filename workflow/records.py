@@ -19,7 +19,7 @@ class Recorded:
 
     Attributes
     ----------
-    arrays : arrays of the file by their names (doc/fix_inelastic.md, the record)
+    arrays : arrays of the file by their names (docs/reference/record.md)
     first : indices of the first spheres, (m,)
     second : indices of the second ones, -1 for a wall, (m,)
     """

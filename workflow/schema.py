@@ -1,7 +1,7 @@
 """The layout of a result: every dataset with its shape, unit and meaning.
 
-A study's file holds one group a case, /STUDY/cases/CASE, laid out as here; README.md beside this
-file shows the same.
+A study's file holds one group a case, /STUDY/cases/CASE, laid out as here;
+docs/reference/hdf5.md shows the same.
 """
 
 from __future__ import annotations

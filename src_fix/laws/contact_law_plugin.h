@@ -1,4 +1,4 @@
-// A contact law of one's own, in a file of its own that is built as a LAMMPS plugin (doc/contact_laws.md).
+// A contact law of one's own, in a file of its own that is built as a LAMMPS plugin (docs/reference/laws.md).
 //
 //   INELASTIC_CONTACT_LAW("name", &make)
 //

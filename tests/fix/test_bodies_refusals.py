@@ -33,7 +33,7 @@ BODIES = random_bodies(
     [dimer(1.5), SPHERE, BENT] * 5, RADIUS, np.array(BOX) + np.array([RADIUS, -RADIUS]), seed=1
 )
 Refused = Callable[..., str]
-PAGE = (Path(__file__).parents[2] / "src_fix/doc/fix_inelastic.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs/reference/bodies.md").read_text()
 
 
 def deck(folder: Path, inertia: str = "solid", **options: Any) -> str:

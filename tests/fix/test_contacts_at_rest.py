@@ -1,6 +1,6 @@
 """Columns at rest stay where they are and give nothing back, and beds are quiet.
 
-See "What each tolerance bounds" and "What is at rest" in src_fix/doc/fix_inelastic.md.
+See "What each tolerance bounds" and "What is at rest" in docs/method.
 """
 
 from __future__ import annotations

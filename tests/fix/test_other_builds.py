@@ -165,8 +165,8 @@ def test_which_build_it_is(texts: bytes, header: str | None, build: str, tmp_pat
 
 def test_the_page_lists_the_sources() -> None:
     """Without the plugin, LAMMPS is built with these files and no others."""
-    page = (REPOSITORY / "src_fix" / "doc" / "fix_inelastic.md").read_text()
-    section = page.split("## Building into LAMMPS")[1]
+    page = (REPOSITORY / "docs" / "how-to" / "building.md").read_text()
+    section = page.split("# Building into LAMMPS")[1]
     listed = re.findall(r"\b\w+\.(?:cpp|h)\b", section.split("```")[1])
     sources = [
         path.name

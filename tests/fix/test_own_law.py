@@ -14,7 +14,7 @@ from lammps_inelastic.plugin import include_folder
 from tests.fix.lammps_run import Runner
 from tests.fix.scenes import DUMP_PARTICLES, read_dump, scene
 
-PAGE = Path(__file__).parents[2] / "src_fix" / "doc" / "contact_laws.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "laws.md"
 RADIUS = 0.5
 
 

@@ -1,6 +1,6 @@
 """A scene at rest does not move and costs no iteration; what disturbs it moves it at once.
 
-See "What is at rest" in src_fix/doc/fix_inelastic.md.
+See "What is at rest" in docs/method.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Scenes at the ends of every scale. Each prints one line with what was measured.
 
 Overlaps come from a dump of every step, residuals and energies from the recorded problems, by the
-formulas below; nothing is taken from the solver. src_fix/doc/extremes.md has the numbers.
+formulas below; nothing is taken from the solver. docs/measured/extremes.md has the numbers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is shipped, where stored results are looked for, and decks as inputs/README.md has them."""
+"""What is shipped, where stored results are looked for, and decks as their page has them."""
 
 from __future__ import annotations
 
@@ -96,8 +96,8 @@ TABLE_OF = {"dimers": "spheres", "clusters": "dimers", "response": "spheres", "g
 
 
 def documented(name: str) -> list[tuple[str, str, str]]:
-    """Return the rows of a deck's tables in inputs/README.md: variable, default and meaning."""
-    document = (ROOT / "inputs" / "README.md").read_text()
+    """Return the rows of a deck's tables on its page: variable, default and meaning."""
+    document = (ROOT / "docs" / "reference" / "decks.md").read_text()
     (section,) = re.findall(rf"^## {name}\.in\n(.*?)(?=^## |\Z)", document, re.M | re.S)
     tables = re.findall(r"^\| name \|.*?(?=\n\n|\Z)", section, re.M | re.S)
     return [row for table in tables for row in ROW.findall(table)]
@@ -117,7 +117,7 @@ def test_the_documentation_has_every_variable(name: str) -> None:
 
 @pytest.mark.parametrize("name", DECKS)
 def test_the_tables_of_the_documentation_are_those_of_the_deck(name: str) -> None:
-    """Names, defaults, words and the ends of ranges in inputs/README.md."""
+    """Names, defaults, words and the ends of ranges in docs/reference/decks.md."""
     deck = find_deck(name, Path())
     rows = documented(name)
     assert len(rows) >= 4

@@ -415,16 +415,16 @@ def test_how_much_longer_uzawa_takes() -> None:
     assert f"takes {ratios[0]}, {ratios[1]} and {ratios[2]} times as long as `apgd` at" in said()
 
 
-# The page of the fix
+# The pages of the fix
 
 
-def page() -> str:
-    return " ".join((ROOT / "src_fix/doc/fix_inelastic.md").read_text().split())
+def page(name: str) -> str:
+    return " ".join((ROOT / "docs" / name).read_text().split())
 
 
 def test_what_is_said_of_velocities_is_said_with_the_accuracy() -> None:
     """tests/fix/test_slow_contacts.py measures it."""
-    text = page()
+    text = page("method/projection.md")
     assert "Nothing bounces: " not in text
     said = "a rigid contact of any speed separates with at most the part `accuracy`, a thousandth,"
     assert said in text
@@ -432,7 +432,7 @@ def test_what_is_said_of_velocities_is_said_with_the_accuracy() -> None:
 
 def test_the_number_of_contacts_shows_no_trend_with_the_time_step() -> None:
     """The page's own table, at each tolerance; rows of two time steps are independent."""
-    lines = (ROOT / "src_fix/doc/fix_inelastic.md").read_text().splitlines()
+    lines = (ROOT / "docs/measured/contacts.md").read_text().splitlines()
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
     number = re.compile(r"([\d.]+) ± [\d.]+ \(([\d.]+)\)")
     found: dict[str, list[tuple[float, float]]] = {}
@@ -444,11 +444,11 @@ def test_the_number_of_contacts_shows_no_trend_with_the_time_step() -> None:
         assert len(at_steps) == 3
         low, high = min(at_steps), max(at_steps)
         assert high[0] - low[0] <= 2 * math.hypot(low[1], high[1])
-    assert "z shows no trend with h." in page()
+    assert "z shows no trend with h." in page("measured/contacts.md")
 
 
 def test_newton_off_is_not_said_to_need_nothing() -> None:
     """What the fix does for it stands with it; tests/fix/test_scene_changes.py runs it."""
-    text = page()
+    text = page("reference/fix-inelastic.md")
     assert "and any `newton`." not in text
     assert "LAMMPS then sizes its messages for the pair style alone" in text

@@ -4,7 +4,7 @@ How a report comes about: data.py reads the files, contents.py lists the section
 sections/ makes blocks (blocks.py, figures.py) and comparisons with the paper from the data, and
 page.py writes them as one page, markdown.py their tables as text.
 
-DESIGN.md says under "To add ..." which files a new number or a new section changes.
+CONTRIBUTING.md says under "To add ..." which files a new number or a new section changes.
 """
 
 from .contents import all_sections
