@@ -149,6 +149,7 @@ def draw_network(
     up: int = 1,
     across: int = 0,
     lower_half: bool = False,
+    slab: tuple[float, float] | None = None,
     palette: str = PALETTE,
 ) -> Axes:
     """Draw the edges between particles as lines between their centres; walls are not drawn.
@@ -164,6 +165,8 @@ def draw_network(
     across : axis that runs to the right on flat axes, other than `up`
     lower_half : only edges whose particles are both in the lower half of the packing's height, as
         in the paper
+    slab : only edges whose particles both have their centres between these two places along the
+        third axis, so that one can look into the packing
     palette : name of a colour map of matplotlib
 
     Raises InputError for axes that are not two of x, y and z, and for a graph without particles.
@@ -173,8 +176,11 @@ def draw_network(
 
     if not (up in (0, 1, 2) and across in (0, 1, 2) and up != across):
         raise InputError(f"up and across must be two of the axes 0, 1, 2, not {up} and {across}")
-    ends, force = _edges(graph, up if lower_half else None)
     depth = 3 - up - across
+    ends, force = _edges(graph, up if lower_half else None)
+    if slab is not None:
+        inside = ((ends[..., depth] >= slab[0]) & (ends[..., depth] <= slab[1])).all(axis=1)
+        ends, force = ends[inside], None if force is None else force[inside]
     order = [across, depth, up] if isinstance(ax, Axes3D) else [across, up]
     # The strongest are drawn last, on top of the others.
     rank = np.arange(len(ends)) if force is None else np.argsort(np.abs(force), kind="stable")

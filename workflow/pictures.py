@@ -24,6 +24,8 @@ from lammps_inelastic.analysis.pictures import few_colours
 from .study import Outputs
 
 NETWORK_INCHES, NETWORK_DPI = 7.0, 150
+# The network is that of a slab of so many diameters: of a whole packing one sees only its front.
+NETWORK_DIAMETERS = 3
 # The longer side of a picture in a result has at most so many pixels.
 MOST_PIXELS = 900
 
@@ -102,6 +104,14 @@ def _small(path: Path) -> bytes:
     return buffer.getvalue()
 
 
+def _middle(frame: ParticleFrame) -> tuple[float, float]:
+    """Return where the slab that is drawn begins and ends along z, in the middle."""
+    z = frame.positions[:, 2]
+    centre = float(z.min() + z.max()) / 2
+    half = NETWORK_DIAMETERS * float(frame.radii.max())
+    return centre - half, centre + half
+
+
 def _draw_contact_network(path: Path, frame: ParticleFrame, contacts: ContactFrame) -> None:
     graph = contact_graph(
         contacts.ids, frame.ids, frame.positions, contacts.forces, frame.particles
@@ -110,6 +120,11 @@ def _draw_contact_network(path: Path, frame: ParticleFrame, contacts: ContactFra
     from matplotlib import pyplot
 
     figure, ax = pyplot.subplots(figsize=(NETWORK_INCHES, NETWORK_INCHES), layout="constrained")
-    draw_network(ax, graph, lower_half=True)
+    draw_network(ax, graph, lower_half=True, slab=_middle(frame))
+    ax.set_xlabel("x [length]")
+    ax.set_ylabel("y [length]")
+    figure.colorbar(
+        ax.collections[0], label="force / mean force", extend="max", shrink=0.6, aspect=30
+    )
     figure.savefig(path, dpi=NETWORK_DPI)
     pyplot.close(figure)

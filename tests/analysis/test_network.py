@@ -85,6 +85,17 @@ def test_lower_half_only() -> None:
     assert lines_of(ax) == {((0.5, 1), (0.5, 2))}
 
 
+def test_a_slab_only() -> None:
+    places = [[0, 0, 0], [1, 0, 0.4], [2, 0, 0.6], [3, 0, 2]]
+    ax = Figure().add_subplot()
+    graph = contact_graph([[0, 1], [1, 2], [2, 3]], np.arange(4), places, [1, 2, 30])
+    draw_network(ax, graph, slab=(0, 0.5))
+    # The second contact ends beyond the slab, the third one lies beyond it.
+    assert lines_of(ax) == {((0, 0), (1, 0))}
+    # In mean forces of what is drawn.
+    assert ax.collections[0].get_array().tolist() == [1.0]
+
+
 def test_drawing_in_space_is_no_mirror_image() -> None:
     figure = Figure()
     ax = figure.add_subplot(projection="3d")

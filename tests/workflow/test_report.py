@@ -29,20 +29,27 @@ from lammps_inelastic.analysis.plots import (
     plot_wall_profile,
 )
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.report.blocks import Cell, Section, Table
+from lammps_inelastic.workflow.report.blocks import Block, Cell, Section, Table, Text
 from lammps_inelastic.workflow.report.columns import Column, table
 from lammps_inelastic.workflow.report.contents import all_sections
 from lammps_inelastic.workflow.report.data import Data, paper_numbers, profile, read_data
 from lammps_inelastic.workflow.report.figures import Figure, Panel, curve
 from lammps_inelastic.workflow.report.markdown import render_markdown
-from lammps_inelastic.workflow.report.page import render, summarise
+from lammps_inelastic.workflow.report.page import MOST_ROWS, render, side_by_side, summarise
 from lammps_inelastic.workflow.report.sections.any_study import study_section
 from lammps_inelastic.workflow.report.sections.checks import checks
 from lammps_inelastic.workflow.report.sections.dimer_orientation import ratio_apart
 from lammps_inelastic.workflow.report.statistics import (
     Stated,
 )
-from lammps_inelastic.workflow.report.text import as_short, as_stated, as_text, as_value
+from lammps_inelastic.workflow.report.text import (
+    as_short,
+    as_span,
+    as_stated,
+    as_text,
+    as_value,
+)
+from lammps_inelastic.workflow.report.verdict import TOPICS, verdict
 from lammps_inelastic.workflow.shipped import QUICK_FOLDER, STUDIES, STUDIES_FOLDER
 from lammps_inelastic.workflow.store import Result, StoredStudy, write_studies
 
@@ -303,6 +310,9 @@ class Page(HTMLParser):
         self.text = ""
         # The style sheet; of each table, listing and figure its own rule's name and its parents'.
         self.text_of_style = ""
+        # The text of each folded part, and whether it is open.
+        self.folded: list[tuple[str, bool]] = []
+        self._folds: list[int] = []
         self.wide: list[list[str]] = []
         self._names: list[list[str]] = []
         self.feed(text)
@@ -318,6 +328,9 @@ class Page(HTMLParser):
         if tag in {"table", "pre"} or ".plot" in names:
             self.wide.append([name for names in self._names[-2:] for name in names])
         assert tag not in {"script", "link", "iframe", "object"}
+        if tag == "details":
+            self._folds.append(len(self.folded))
+            self.folded.append(("", "open" in values))
         if "id" in values:
             self.ids.append(values["id"])
         if "href" in values:
@@ -328,11 +341,16 @@ class Page(HTMLParser):
 
     def handle_endtag(self, tag: str) -> None:
         assert self.opened.pop() == tag
+        if tag == "details":
+            self._folds.pop()
         self._names.pop()
 
     def handle_data(self, data: str) -> None:
         if self.opened[-1:] != ["style"]:
             self.text += data
+            for number in self._folds:
+                text, is_open = self.folded[number]
+                self.folded[number] = (text + data, is_open)
         else:
             self.text_of_style += data
             # Nothing is loaded from anywhere.
@@ -501,6 +519,121 @@ def test_why_is_said_of_large_differences_alone() -> None:
         phi, z = (row[7].text for row in summary.numbers.rows)
         assert ("more seeds" in phi) == said
         assert "solver" not in z
+
+
+def table_1(z: float, tolerance: float = 0.0005) -> list[Result]:
+    """Return three runs of a row of Table 1 with the paper's packing fraction at 0.0005 r."""
+    return [
+        measured(phi=0.6322 + 0.001 * more, z=z + 0.05 * more, tolerance=tolerance, seed=2 + more)
+        for more in (-1, 0, 1)
+    ]
+
+
+def test_the_verdict_says_what_agrees_and_within_what() -> None:
+    found = verdict(list(sections_of(study("table-1", table_1(5.99))).values()))
+    # The paper has 63.22 % and 5.97.
+    assert found.text.startswith("Yes: packing fraction (within 0 percentage points), contacts (")
+    assert "within 0.02)" in found.text
+    assert found.text.endswith(" agree with the paper.")
+    assert found.exceptions == []
+
+
+def test_the_verdict_says_what_differs_by_how_much() -> None:
+    found = verdict(list(sections_of(study("table-1", table_1(6.97))).values()))
+    assert found.text.startswith("In part: packing fraction")
+    assert found.text.endswith(" agree with the paper. Ours differs in contacts.")
+    assert found.exceptions == ["contacts: at ε = 0.0005 r, 1 above the paper's 5.97"]
+    # At the loosest tolerance the way to count is known to matter.
+    loose = verdict(list(sections_of(study("table-1", table_1(6.68, 0.005))).values()))
+    (line,) = loose.exceptions
+    assert line.startswith("contacts: at ε = 0.005 r, 0.5 above the paper's 6.18; at a loose ε")
+
+
+def test_the_verdict_has_a_line_for_each_sentence_that_does_not_hold(
+    sections: dict[str, Section],
+) -> None:
+    found = verdict(list(sections.values()))
+    broken = [
+        one for section in sections.values() for one in section.statements if one.holds is False
+    ]
+    assert len(found.exceptions) >= len(broken) > 0
+    for one in broken:
+        assert any((one.otherwise or one.text) in line for line in found.exceptions), one.text
+    # Every line names what it is about, and so does the verdict.
+    named = {line.partition(":")[0] for line in found.exceptions}
+    assert named <= set(TOPICS)
+    assert all(name in found.text.lower() for name in named)
+
+
+def test_the_verdict_of_nothing_is_not_known() -> None:
+    found = verdict(list(sections_of(own_study()).values()))
+    assert found.text.startswith("Not known")
+    assert found.exceptions == []
+
+
+def test_the_verdict_is_the_first_thing_on_the_page(
+    page: Page, sections: dict[str, Section]
+) -> None:
+    text = " ".join(page.text.split())
+    said = verdict(list(sections.values())).text
+    assert said in text
+    assert text.index(said) < text.index("Contents") < text.index("The paper's numbers and ours")
+
+
+def test_contents_are_closed_and_long_tables_folded(
+    page: Page, sections: dict[str, Section]
+) -> None:
+    contents = [is_open for text, is_open in page.folded if text.split()[:1] == ["Contents"]]
+    assert contents == [False]
+    tables = [
+        block
+        for section in sections.values()
+        for block in section.blocks
+        if isinstance(block, Table)
+    ]
+    starts = [" ".join(text.split()) for text, _ in page.folded]
+    for block in tables:
+        title = f"{block.caption}: {len(block.rows)} rows"
+        assert any(text.startswith(title) for text in starts) == (len(block.rows) > MOST_ROWS)
+    assert any(len(block.rows) > MOST_ROWS for block in tables)
+
+
+def test_a_plot_stands_beside_what_belongs_to_it() -> None:
+    narrow, other, wide = (
+        Figure(name, "", [Panel("x", "y", [curve("a", [0], [1])])] * panels)
+        for name, panels in (("narrow", 1), ("other", 1), ("wide", 2))
+    )
+    text, rows = Text("words"), table("table", [Column("number", str)], [1, 2])
+    blocks: list[Block] = [text, narrow, rows, text, wide, rows, narrow, other, text]
+    assert side_by_side(blocks) == [
+        [text],
+        [narrow, rows, text],
+        [wide],
+        [rows],
+        [narrow, other, text],
+    ]
+
+
+def test_the_papers_points_are_in_the_figures(sections: dict[str, Section]) -> None:
+    drawn = {
+        float(row["number of spheres"]): float(row["packing fraction [%]"])
+        for row in rows_of(sections["table-2"], "table-2")
+        if row["curve"] == "paper"
+    }
+    # The last column of the paper's Table 2, with the decimals that Table 1 has for 1,000 spheres.
+    assert drawn == {1000: 63.22, 10_000: 63.6, 100_000: 63.7}
+    z = [
+        float(row["coordination number"])
+        for row in rows_of(sections["table-1"], "table-1")
+        if row["curve"] == "paper, random force" and row.get("coordination number")
+    ]
+    # The miniature has more seeds at two tolerances.
+    assert sorted(z) == [5.97, 6.18]
+    lying = [
+        row for row in rows_of(sections["anisotropy"], "anisotropy") if "paper" in row["curve"]
+    ]
+    assert {float(row["aspect ratio L/d"]) for row in lying} == {1.8}
+    assert {round(float(row["a / isotropic a"]), 3) for row in lying} == {1.083, 0.796, 1.092}
 
 
 def statements_of(section: Section) -> dict[str, bool | None]:
@@ -990,6 +1123,15 @@ def test_numbers_as_text() -> None:
     tiny = [as_short(v).replace("\N{MINUS SIGN}", "-") for v in (5.6e-10, 2e-10, -1e-20, 1e200)]
     assert tiny == ["5.6e-10", "2e-10", "-1e-20", "1e+200"]
     assert as_short(math.inf) == as_text(math.inf, 3) == "inf"
+    # No row of zeros before two digits and more; a tolerance stays as decks have it.
+    small = [as_short(v).replace("\N{MINUS SIGN}", "-") for v in (5.607e-6, -2.65e-5, 1e-6, 1.2e-4)]
+    assert small == ["5.6e-6", "-2.7e-5", "0.000001", "0.00012"]
+
+
+def test_the_span_of_numbers_as_text() -> None:
+    assert as_span([0.24, 0.218], 2) == "0.22 to 0.24"
+    assert as_span([1.351, 1.349], 2) == "1.35"
+    assert as_span([], 2) == ""
 
 
 def test_numbers_of_the_paper_have_as_many_decimals_as_their_error() -> None:

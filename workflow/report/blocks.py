@@ -103,6 +103,8 @@ class Comparison:
     unit : the unit of both; empty for a pure number
     note : what of our runs is not as in the paper
     why : where a large difference comes from, as far as it is known
+    topic : what it belongs to in the verdict; empty for the topic of its section
+    place : where the verdict finds it, such as a tolerance; alike ones are told together
     """
 
     what: str
@@ -112,6 +114,8 @@ class Comparison:
     unit: str = ""
     note: str = ""
     why: str = ""
+    topic: str = ""
+    place: str = ""
 
     @property
     def difference(self) -> Difference:
@@ -128,11 +132,15 @@ class Statement:
     text : what the paper says
     holds : whether it does here; None where nothing was run that could tell
     evidence : the numbers by which that is decided
+    otherwise : what is so instead, for the verdict; empty where the evidence says it
+    topic : what it belongs to in the verdict; empty for the topic of its section
     """
 
     text: str
     holds: bool | None
     evidence: str
+    otherwise: str = ""
+    topic: str = ""
 
 
 @dataclass(frozen=True)
@@ -163,6 +171,7 @@ class Section:
     comparisons : the section's numbers in the summary
     studies : names of the studies that the section needs
     statements : the section's sentences in the summary
+    topic : what its numbers and sentences belong to in the verdict, where they do not say it
     """
 
     anchor: str
@@ -171,6 +180,7 @@ class Section:
     comparisons: Sequence[Comparison] = ()
     studies: Sequence[str] = ()
     statements: Sequence[Statement] = ()
+    topic: str = ""
 
     @property
     def is_missing(self) -> bool:

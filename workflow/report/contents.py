@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..shipped import STUDIES as OF_THE_PAPER
+from . import verdict
 from .blocks import Content, Section, missing, nothing_run
 from .data import Data
 from .sections import (
@@ -47,11 +48,13 @@ class Entry:
     build : the function that makes the section's content from the data
     studies : names of the studies that it shows, the most important one first; none for a section
         that shows every study or needs none
+    topic : what its numbers and sentences belong to in the verdict, where they do not say it
     """
 
     title: str
     build: Callable[[Data], Content]
     studies: Sequence[str] = ()
+    topic: str = ""
 
     def section(self, name: str, data: Data) -> Section:
         """Return the section, with a note in it if there is nothing to show."""
@@ -66,6 +69,7 @@ class Entry:
             tuple(content.comparisons),
             tuple(self.studies),
             tuple(content.statements),
+            self.topic,
         )
 
 
@@ -75,6 +79,7 @@ SECTIONS: Mapping[str, Entry] = {
         "Figure 5: the packing comes to rest",
         coming_to_rest.coming_to_rest,
         ["table-2", "more-seeds"],
+        verdict.COMING_TO_REST,
     ),
     "table-1": Entry(
         "Table 1: tolerance and random force",
@@ -88,38 +93,58 @@ SECTIONS: Mapping[str, Entry] = {
         "Contacts while agitated and at rest",
         agitation.agitation,
         ["table-1", "table-2", "protocol"],
+        verdict.CONTACTS,
     ),
     "table-2": Entry(
-        "Table 2: number of spheres", number_of_spheres.number_of_spheres, ["table-2"]
+        "Table 2: number of spheres",
+        number_of_spheres.number_of_spheres,
+        ["table-2"],
+        verdict.PACKING_FRACTION,
     ),
     "figure-6": Entry(
-        "Figure 6: packing fraction near a wall", sphere_wall.sphere_wall, ["table-2"]
+        "Figure 6: packing fraction near a wall",
+        sphere_wall.sphere_wall,
+        ["table-2"],
+        verdict.WALL_PROFILE,
     ),
     "figure-7": Entry(
-        "Figure 7: distribution of contacts", sphere_contacts.sphere_contacts, ["table-2"]
+        "Figure 7: distribution of contacts",
+        sphere_contacts.sphere_contacts,
+        ["table-2"],
+        verdict.CONTACTS,
     ),
     "figure-8": Entry("Figure 8: network of contacts", pictures.network, ["figure-8"]),
     "figure-9": Entry("Figure 9: one dimer", pictures.one_dimer),
     "figure-10": Entry("Figure 10: dimers fall", pictures.falling_dimers, ["figure-10"]),
-    "anisotropy": Entry("Orientation of dimers", dimer_orientation.against_aspect, ["dimers"]),
+    "anisotropy": Entry(
+        "Orientation of dimers", dimer_orientation.against_aspect, ["dimers"], verdict.ORIENTATION
+    ),
     "dimers-agitation": Entry(
         "Orientation of dimers and the random force",
         dimer_orientation.against_force,
         ["dimers-agitation"],
+        verdict.ORIENTATION,
     ),
     "figure-11": Entry(
         "Figure 11: packing fraction against aspect ratio",
         dimer_packing_fraction.dimer_packing_fraction,
         ["dimers"],
+        verdict.PACKING_FRACTION_OF_DIMERS,
     ),
-    "figure-12": Entry("Figure 12: dimers near a wall", dimer_wall.dimer_wall, ["dimers"]),
+    "figure-12": Entry(
+        "Figure 12: dimers near a wall", dimer_wall.dimer_wall, ["dimers"], verdict.WALL_PROFILE
+    ),
     "figure-13": Entry(
-        "Figure 13: contacts and neighbours", dimer_contacts.contacts_and_neighbours, ["dimers"]
+        "Figure 13: contacts and neighbours",
+        dimer_contacts.contacts_and_neighbours,
+        ["dimers"],
+        verdict.CONTACTS_OF_DIMERS,
     ),
     "figure-14": Entry(
         "Figure 14: distribution of contacts and neighbours",
         dimer_contacts.distributions,
         ["dimers"],
+        verdict.CONTACTS_OF_DIMERS,
     ),
     "structure": Entry(
         "Are the packings random? Structure", structure.structure, ["table-2", "dimers"]

@@ -20,6 +20,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 from PIL import Image, ImageOps
 
@@ -125,7 +126,7 @@ class Panel:
     moments : vertical lines, and what is written beside them
     title : above the axes
     log : whether y is on a logarithmic scale
-    log_x : whether x is, too
+    log_x : whether x is
     ticks : names of x = 0, 1, ...
     top : upper end of y, where the highest values say little
     """
@@ -164,6 +165,11 @@ class Figure:
     def kind(self) -> str:
         """The name by which the template tells blocks apart."""
         return "figure"
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether several panels stand side by side."""
+        return max(len(self.panels), len(self.drawing)) > 1
 
     @property
     def svg(self) -> str:
@@ -357,6 +363,9 @@ def _draw(ax: Axes, panel: Panel) -> None:
     if panel.ticks:
         ax.set_xticks(range(len(panel.ticks)), panel.ticks, rotation=30, ha="right")
         ax.set_xlim(-0.5, len(panel.ticks) - 0.5)
+    elif any(one.kind == "distribution" for one in panel.curves):
+        # There is no half contact.
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     if panel.top is not None:
         ax.set_ylim(0, panel.top)
     ax.set_xlabel("" if panel.ticks else panel.x)

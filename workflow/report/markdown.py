@@ -41,6 +41,9 @@ def render_markdown(data: Data, sections: Sequence[Section], figures: str = "") 
 
 
 def _summary(summary: Summary) -> Iterator[str]:
+    yield _escaped(summary.verdict.text)
+    if summary.verdict.exceptions:
+        yield "\n".join(f"- {_escaped(line)}" for line in summary.verdict.exceptions)
     yield (
         f"{summary.compared} comparisons of a number of the paper with ours. {summary.remaining} "
         f"differ; {summary.significant} would if each were the only one, of which chance alone "

@@ -12,16 +12,21 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined, select_autoescape
 
 from ..provenance import THIS, versions
-from .blocks import Cell, Comparison, Section, Statement, Table
+from .blocks import Block, Cell, Comparison, Section, Statement, Table, Text
 from .columns import Column, difference_cell, ours_text, table
 from .data import Data
+from .figures import Figure, Pictures
 from .sections.provenance import codes_line, commands
 from .statistics import SIGNIFICANT, adjusted, computing_seconds
 from .text import DASH, as_probability, as_stated, as_text, as_time
+from .verdict import Verdict, differs, verdict
 
 TEMPLATE = "template.html.j2"
 # The headings of a report, and of what compares it with the paper where there is anything to.
 OF_RESULTS, OF_COMPARISON = "Hard random packings: results", "Does it reproduce the paper?"
+OF_NUMBERS = "The paper's numbers and sentences"
+# A table of more rows is folded up.
+MOST_ROWS = 16
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,7 @@ class Summary:
 
     Attributes
     ----------
+    verdict : the answer in words
     numbers : the paper's numbers beside ours
     compared : how many of them have a difference whose error is known
     significant : how many of these differences chance alone would hardly make, each by itself
@@ -38,6 +44,7 @@ class Summary:
     held, told : how many of the sentences hold, and of how many it is known
     """
 
+    verdict: Verdict
     numbers: Table
     compared: int
     significant: int
@@ -72,7 +79,9 @@ class _Row:
             return DASH
         if not self.comparison.difference.is_significant:
             return "agrees"
-        return "differs" if self.corrected < SIGNIFICANT else "differs, perhaps by chance"
+        if differs(self.comparison, self.corrected):
+            return "differs"
+        return "differs, perhaps by chance"
 
     @property
     def remarks(self) -> str:
@@ -139,6 +148,9 @@ def render(data: Data, sections: Sequence[Section]) -> str:
         paper=data.paper["source"],
         of_results=OF_RESULTS,
         of_comparison=OF_COMPARISON,
+        of_numbers=OF_NUMBERS,
+        most_rows=MOST_ROWS,
+        side_by_side=side_by_side,
         sections=sections,
         summary=summarise(sections),
         commands=partial(commands, data),
@@ -149,6 +161,30 @@ def render(data: Data, sections: Sequence[Section]) -> str:
         version=versions()[THIS],
         codes=codes_line(list(once)),
     )
+
+
+def side_by_side(blocks: Sequence[Block]) -> list[list[Block]]:
+    """Return the blocks in groups: a narrow figure with what belongs to it, or one block.
+
+    Tables and texts below a figure belong to it; without any, the next narrow figure does.
+
+    The page shows a group side by side where it is wide enough.
+    """
+    groups: list[list[Block]] = []
+    for block in blocks:
+        before = groups[-1] if groups else []
+        of_figure = isinstance(block, Table | Text) and before and _is_narrow(before[0])
+        if of_figure or (len(before) == 1 and _is_narrow(before[0]) and _is_narrow(block)):
+            groups[-1].append(block)
+        else:
+            groups.append([block])
+    return groups
+
+
+def _is_narrow(block: Block) -> bool:
+    if isinstance(block, Pictures):
+        return len(block.pictures) == 1
+    return isinstance(block, Figure) and not block.is_wide
 
 
 def summarise(sections: Sequence[Section]) -> Summary | None:
@@ -162,6 +198,7 @@ def summarise(sections: Sequence[Section]) -> Summary | None:
     rows = [_Row(*pair, p) for pair, p in zip(pairs, corrected, strict=True)]
     told = [one.statement.holds for one in said if one.statement.holds is not None]
     return Summary(
+        verdict(sections),
         table(
             "The paper's numbers and ours",
             COLUMNS,

@@ -15,6 +15,8 @@ DASH, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
 DECIMALS_OF_SERIES = 2
 # A number of so many digits before or behind the point is written with a power of ten.
 LONGEST = 12
+# A number below this is written with a power of ten if it has more letters: 0.00001 stays.
+SMALL, MOST_OF_SMALL = 1e-4, 8
 
 
 def as_text(value: float, decimals: int) -> str:
@@ -27,7 +29,10 @@ def as_text(value: float, decimals: int) -> str:
 
 
 def as_short(value: float) -> str:
-    """Write a number in as few digits as it needs, at most four, or a dash for NaN."""
+    """Write a number in as few digits as it needs, at most four, or a dash for NaN.
+
+    One that would begin with a row of zeros is written as 5.6e-6: two digits and a power of ten.
+    """
     if value == 0 or not math.isfinite(value):
         return as_text(value, 0)
     # Fixed notation is read more easily; a tiny or huge number would be zeros alone.
@@ -37,6 +42,9 @@ def as_short(value: float) -> str:
     else:
         text = f"{value:.{max(decimals, 0)}f}"
         text = text.rstrip("0").rstrip(".") if "." in text else text
+        if abs(value) < SMALL and len(text.lstrip("-")) > MOST_OF_SMALL:
+            digits, power = f"{value:.1e}".split("e")
+            text = f"{digits}e{int(power)}"
     return text.replace("-", MINUS)
 
 
@@ -114,6 +122,15 @@ def as_difference(value: float) -> str:
 def as_probability(value: float) -> str:
     """Write a probability: `0.03`, `< 0.001`, or a dash for NaN."""
     return "< 0.001" if value < 0.001 else as_text(value, 3 if value < 0.1 else 2)
+
+
+def as_span(values: Sequence[float], decimals: int) -> str:
+    """Write the smallest and the largest of some numbers, `0.22 to 0.24`; one if they look alike.
+
+    It is empty without any number.
+    """
+    ends = [as_text(end(values), decimals) for end in (min, max)] if values else []
+    return " to ".join(dict.fromkeys(ends))
 
 
 def as_choice(values: Sequence[int]) -> str:

@@ -85,13 +85,22 @@ def coming_to_rest(data: Data) -> Content:
                 "figure-5",
                 f"Packing fraction and coordination number in the box against the step, "
                 f"{as_count(count_of(results))} spheres. The two steps that the paper names are "
-                "those of its own code.",
+                "those of its own code; dashed and shaded: its numbers of packings at rest.",
                 [
-                    Panel("step", text, _curves(results, quantity), moments=moments)
-                    for text, quantity in (
-                        ("packing fraction", PACKING_FRACTION),
-                        ("coordination number", COORDINATION_NUMBER),
-                    )
+                    Panel(
+                        "step",
+                        "packing fraction",
+                        _curves(results, PACKING_FRACTION),
+                        references=_stated_packing_fraction(data, count_of(results)),
+                        moments=moments,
+                    ),
+                    Panel(
+                        "step",
+                        "coordination number",
+                        _curves(results, COORDINATION_NUMBER),
+                        bounds=stated_contacts(data),
+                        moments=moments,
+                    ),
                 ],
             ),
             table(
@@ -136,6 +145,22 @@ def coming_to_rest(data: Data) -> Content:
     )
 
 
+def _stated_packing_fraction(data: Data, spheres: int) -> list[tuple[str, float]]:
+    """Return the packing fraction of the paper's Table 2 for so many spheres, if it has them."""
+    return [
+        (f"paper: {row['phi_percent']} %", row["phi_percent"] / PACKING_FRACTION.factor)
+        for row in data.paper["table2"]
+        if row["spheres"] == spheres
+    ]
+
+
+def stated_contacts(data: Data) -> tuple[str, float, float]:
+    """Return the paper's range of the coordination number of spheres, and what it is."""
+    z = data.paper["spheres"]["z"]
+    value, reach = z["value"], z["tolerance"]
+    return f"paper: {as_text(value, 2)} ± {as_short(reach)}", value - reach, value + reach
+
+
 def _statements(runs: Sequence[_Run]) -> list[Statement]:
     """Say whether both numbers come to a plateau in all runs."""
     found = []
@@ -165,6 +190,13 @@ def _statements(runs: Sequence[_Run]) -> list[Statement]:
                     ""
                     if math.isnan(scatter)
                     else f"; at rest, frames scatter by {as_text(100 * scatter, 2)} %"
+                ),
+                f"the {name} is constant within ±{as_text(100 * band, 2)} % in {len(steps)} of "
+                f"{len(plateaus)} runs"
+                + (
+                    ""
+                    if math.isnan(scatter)
+                    else f"; frames at rest scatter by {as_text(100 * scatter, 2)} %"
                 ),
             )
         )

@@ -15,7 +15,7 @@ from ...store import Result
 from ..blocks import Block, Comparison, Content, Statement, Text
 from ..columns import RUNS, Column, table
 from ..data import Data
-from ..figures import Curve, Figure, Panel, points
+from ..figures import Curve, Figure, Panel, curve, points
 from ..groups import by_size, by_value, grouped
 from ..quantities import COORDINATION_NUMBER, PACKING_FRACTION
 from ..statistics import (
@@ -216,7 +216,7 @@ def against_aspect(data: Data) -> Content:
             "anisotropy",
             "Root mean square of the components of the vector between the two spheres of a "
             "dimer, over what each would be if no direction was preferred, by the random force. y "
-            "is along gravity.",
+            f"is along gravity. The paper's numbers are those of L/d = {as_short(consistent)}.",
             [
                 Panel(
                     "aspect ratio L/d",
@@ -226,6 +226,15 @@ def against_aspect(data: Data) -> Content:
                             f"a_{axis}",
                             [row.value for row in rows if row.force == force],
                             [row.ratios[axis] for row in rows if row.force == force],
+                        )
+                        for axis in AXES
+                    ]
+                    + [
+                        curve(
+                            f"a_{axis}, paper",
+                            [consistent],
+                            [_stated_ratio(stated, axis)],
+                            kind="apart",
                         )
                         for axis in AXES
                     ],
@@ -323,6 +332,9 @@ def _statement_on_length(aspects: Sequence[float], a_y: Sequence[Sample]) -> Sta
         f"{as_measured(end.value, end.error, 2)} at the longest (p {as_probability(end.p)})"
         if not math.isnan(end.p)
         else "",
+        "the longest lie down less again"
+        if end.value > 0 and line.value < 0
+        else "they lie down less the longer they are",
     )
 
 
@@ -369,7 +381,7 @@ def against_force(data: Data) -> Content:
             "of a sphere. Lines: the paper's numbers.",
             [
                 Panel(
-                    "random force",
+                    "random force [length/time²]",
                     "a / isotropic a",
                     _agitated_curves(rows),
                     references=[(f"a_{axis}, paper", _stated_ratio(stated, axis)) for axis in AXES],

@@ -16,7 +16,7 @@ from ..figures import Curve, Figure, Panel, curve
 from ..groups import count_of
 from ..quantities import PACKING_FRACTION, PACKING_FRACTION_WITH_NECKS, Quantity
 from ..statistics import Difference, all_hold
-from ..text import as_count, as_measured, as_sample, as_short
+from ..text import as_count, as_measured, as_sample, as_short, as_span
 from .aspect_ratios import HEAD, POOLED, Row, against_aspect, rows_of, shaken
 
 # Dimers are densest between these aspect ratios, whatever shakes them.
@@ -57,7 +57,7 @@ def dimer_packing_fraction(data: Data) -> Content:
                 "sphere can reach counts as solid. Spheres at L/d = 1. Grey: largest packing "
                 "fractions from mean-field theory (Baule et al. 2013); ellipsoids (Donev et al. "
                 "2004): largest, at its aspect ratio.",
-                [_panel(curves, elsewhere)],
+                [_panel(curves, elsewhere, stated)],
             ),
             table(
                 "Packing fraction against aspect ratio",
@@ -82,8 +82,14 @@ def _statements(raw: Sequence[Curve], necks: Sequence[Curve], stated: float) -> 
     """Say whether φ grows up to about the paper's aspect ratio and falls from there."""
     said = f"The packing fraction grows with L/d and falls above about {as_short(stated)}."
     alike = "With the volume of the necks the curve is qualitatively the same."
+    places = as_span([_place(one)[0] for one in raw if _is_known(one)], 2)
     return [
-        Statement(said, all_hold(_turns_at(one, stated) for one in raw), _tops(raw)),
+        Statement(
+            said,
+            all_hold(_turns_at(one, stated) for one in raw),
+            _tops(raw),
+            f"largest at L/d = {places}, not at about {as_short(stated)}" if places else "",
+        ),
         Statement(alike, all_hold(_rises_and_falls(one, stated) for one in necks), _tops(necks)),
     ]
 
@@ -119,7 +125,7 @@ def _tops(curves: Sequence[Curve]) -> str:
     return "; ".join(f"{one.label}: largest at {_top(one)}" for one in curves if _is_known(one))
 
 
-def _panel(ours: Sequence[Curve], elsewhere: Mapping[str, Any]) -> Panel:
+def _panel(ours: Sequence[Curve], elsewhere: Mapping[str, Any], stated: float) -> Panel:
     """Return our curves with the largest packing fractions that others found."""
     theory, ellipsoids = elsewhere["baule2013"], elsewhere["donev2004"]
     of_ellipsoids = curve(
@@ -132,6 +138,7 @@ def _panel(ours: Sequence[Curve], elsewhere: Mapping[str, Any]) -> Panel:
         "aspect ratio L/d",
         "packing fraction [%]",
         [*ours, of_ellipsoids],
+        moments=[("paper: falls above", stated)],
         references=[
             (name, PACKING_FRACTION.factor * theory[f"{key}_largest_phi"])
             for name, key in (

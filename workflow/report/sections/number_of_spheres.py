@@ -10,6 +10,7 @@ from ...store import Result
 from ..blocks import Block, Comparison, Content, Statement, Text
 from ..columns import Column, difference_cell, ours_text, table
 from ..data import Data
+from ..figures import Figure, Panel, curve, points
 from ..groups import by_size, grouped, matching, nearest_size, unlike
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION
 from ..statistics import Stated, difference
@@ -81,6 +82,7 @@ def number_of_spheres(data: Data) -> Content:
             )
         )
     blocks: list[Block] = [
+        *_figure(of_paper),
         table(
             "Packing fraction against the number of spheres",
             COLUMNS,
@@ -97,6 +99,37 @@ def number_of_spheres(data: Data) -> Content:
         ),
     ]
     return Content(blocks, comparisons, _statements(of_paper))
+
+
+def _figure(rows: Sequence[_Row]) -> list[Block]:
+    """Return our packing fractions against the number of spheres beside the paper's."""
+    run = [row for row in rows if row.group]
+    if not run:
+        return []
+    return [
+        Figure(
+            "table-2",
+            "Packing fraction against the number of spheres; error bars: standard error over the "
+            "runs, where it is known.",
+            [
+                Panel(
+                    "number of spheres",
+                    f"packing fraction [{PACKING_FRACTION.unit}]",
+                    [
+                        points("ours", [row.spheres for row in run], [r.phi.ours for r in run]),
+                        curve(
+                            "paper",
+                            [row.spheres for row in rows],
+                            [row.phi.stated.value for row in rows],
+                            [row.phi.stated.error for row in rows],
+                            "apart",
+                        ),
+                    ],
+                    log_x=True,
+                )
+            ],
+        )
+    ]
 
 
 def _statements(rows: Sequence[_Row]) -> list[Statement]:

@@ -7,6 +7,7 @@ from functools import partial
 
 from lammps_inelastic.analysis.plots import draw_dimer, draw_dimer_section
 
+from ...pictures import NETWORK_DIAMETERS
 from ...store import Result
 from ..blocks import Block, Content, Text
 from ..data import Data
@@ -39,8 +40,9 @@ def network(data: Data) -> Content:
     if not drawn:
         return Content()
     caption = (
-        f"Contacts of {as_count(count_of(drawn))} spheres, lower half of the packing; width and "
-        "colour grow with the force."
+        f"Contacts of {as_count(count_of(drawn))} spheres in the lower half of the packing; width "
+        "and colour grow with the force. A picture with a scale shows a slab of "
+        f"{NETWORK_DIAMETERS} diameters in the middle, one without it the whole depth."
     )
     return Content(network_picture(drawn, "figure-8", caption))
 

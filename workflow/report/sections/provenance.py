@@ -95,7 +95,9 @@ def provenance_section(data: Data, files: Sequence[str]) -> Section:
     results = [result for study in data.studies.values() for result in study.results]
     if data.studies:
         blocks.append(_runs_table(data.studies.values()))
-        blocks.append(Listing("\n".join(commands(data, data.studies))))
+        blocks.append(
+            Listing("\n".join(commands(data, data.studies)), "The commands of all studies")
+        )
     else:
         blocks.append(nothing_run())
     blocks.append(

@@ -75,6 +75,7 @@ def sphere_contacts(data: Data) -> Content:
                         )
                         for run in runs
                     ],
+                    moments=[("paper: most probable", stated["z_most_probable"])],
                 )
             ],
         ),

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...store import Result
+from .. import verdict
 from ..blocks import Comparison, Content, Statement, Table
 from ..columns import RUNS, RUNS_OF_PAPER, Column, table
 from ..data import RUNS_OF_TABLE_1, Data
+from ..figures import Curve, Figure, Panel, curve, points
 from ..groups import (
     count_of,
     grouped,
@@ -105,7 +107,7 @@ def tolerance_and_force(data: Data) -> Content:
         )
     run = [row for row in (*of_paper, *more) if row.group]
     return Content(
-        tables,
+        [*_figure(more or of_paper), *tables],
         [one for row in run for one in (row.phi, row.z)],
         [
             *_statements_on_force(more),
@@ -113,6 +115,62 @@ def tolerance_and_force(data: Data) -> Content:
             *(_statements_on_tolerance(data, more) or _statements_on_tolerance(data, of_paper)),
         ],
     )
+
+
+def _figure(rows: Sequence[_Row]) -> list[Figure]:
+    """Return both numbers of our solver against the tolerance beside the paper's."""
+    known = [row for row in rows if row.group and row.solver == our_solver()]
+    forces = {"yes": "random force", "no": "no random force"}
+    kinds = [([r for r in known if r.force == force], words) for force, words in forces.items()]
+    if not known:
+        return []
+    return [
+        Figure(
+            "table-1",
+            "Packing fraction and coordination number against the tolerance; error bars: standard "
+            "error.",
+            [
+                Panel(
+                    "ε / r",
+                    label,
+                    [
+                        one
+                        for of_kind, words in kinds
+                        if of_kind
+                        for one in _pair(of_kind, words, [number(row) for row in of_kind])
+                    ],
+                    log_x=True,
+                )
+                for label, number in (
+                    ("packing fraction [%]", _phi),
+                    ("coordination number", _z),
+                )
+            ],
+        )
+    ]
+
+
+def _phi(row: _Row) -> Comparison:
+    return row.phi
+
+
+def _z(row: _Row) -> Comparison:
+    return row.z
+
+
+def _pair(rows: Sequence[_Row], words: str, compared: Sequence[Comparison]) -> list[Curve]:
+    """Return our curve of some rows, and the paper's points."""
+    places = [row.tolerance for row in rows]
+    return [
+        points(f"ours, {words}", places, [one.ours for one in compared]),
+        curve(
+            f"paper, {words}",
+            places,
+            [one.stated.value for one in compared],
+            [one.stated.error for one in compared],
+            "apart",
+        ),
+    ]
 
 
 def _statements_on_force(more: Sequence[_Row]) -> list[Statement]:
@@ -136,6 +194,7 @@ def _statements_on_force(more: Sequence[_Row]) -> list[Statement]:
             f"by {as_measured(-phi.value, phi.error, 2)} percentage points, "
             f"p {as_probability(phi.p)}, {len(still.group)} and {len(shaken.group)} runs, in pairs "
             "from the same start",
+            topic=verdict.PACKING_FRACTION,
         ),
         Statement(
             "At rest, the coordination number is the same with and without random force.",
@@ -143,6 +202,7 @@ def _statements_on_force(more: Sequence[_Row]) -> list[Statement]:
             f"without less with, in pairs from the same start: {as_measured(z.value, z.error, 3)} "
             f"(p {as_probability(z.p)})"
             + (f", within the ± {as_text(reach, 2)} of the paper's own errors" if same else ""),
+            topic=verdict.CONTACTS,
         ),
     ]
 
@@ -178,6 +238,7 @@ def _statements_on_tolerance(data: Data, rows: Sequence[_Row]) -> list[Statement
             f"{as_measured(abs(largest.value), largest.error, 2)} percentage points (smallest p, "
             f"Holm: {as_probability(min(corrected))}); the paper's own errors tell ± "
             f"{as_text(reach, 2)}",
+            topic=verdict.PACKING_FRACTION,
         ),
         *_statement_on_contacts(data, [row.tolerance for row in known]),
     ]
@@ -201,6 +262,7 @@ def _statement_on_contacts(data: Data, tolerances: Sequence[float]) -> list[Stat
             far.is_significant and not close.is_significant if known else None,
             "each packing counted at its own ε: "
             + ", ".join(f"{as_mean(z[one], 3)} at {as_short(one)} r" for one in z),
+            topic=verdict.CONTACTS,
         )
     ]
 
@@ -294,8 +356,8 @@ def _row(
     more_seeds: bool = False,
 ) -> _Row:
     """Compare packing fraction and coordination number with a row of the paper's Table 1."""
-    words = f"ε = {as_short(stated['eps_over_r'])} r, "
-    words += f"{'with' if stated['random_force'] else 'no'} random force"
+    place = f"ε = {as_short(stated['eps_over_r'])} r"
+    words = f"{place}, {'with' if stated['random_force'] else 'no'} random force"
     if solver != our_solver():
         words += f", {solver}"
     if more_seeds:
@@ -316,6 +378,8 @@ def _row(
             PACKING_FRACTION.unit,
             note,
             "" if more_seeds else CHANCE,
+            verdict.PACKING_FRACTION,
+            place,
         ),
         Comparison(
             f"z, {words}",
@@ -325,5 +389,7 @@ def _row(
             COORDINATION_NUMBER.unit,
             of_z,
             cause(data, solver) if stated["eps_over_r"] == _loosest(data) else "",
+            verdict.CONTACTS,
+            place,
         ),
     )
