@@ -6,7 +6,8 @@
 # make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
-# make clean     remove the environment, build and out; results of hours stay (paper, benchmark, and studies of one's own)
+# make wheel     set up, put the package with its compiled parts into dist: for machines without a compiler
+# make clean     remove the environment, build, dist and out; results of hours stay (paper, benchmark, and studies of one's own)
 
 PYTHON ?= python3
 VENV := .venv
@@ -21,7 +22,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # Two processes; the tests of a file stay together, since they share the fixtures of its module.
 PYTEST := pytest -n 2 --dist loadfile
 
-.PHONY: run report test test-all style validate tables bench bench-quick setup clean
+.PHONY: run report test test-all style validate tables bench bench-quick setup wheel clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -55,6 +56,13 @@ bench-quick: setup
 	python -m tests.benchmark --quick
 
 setup: $(VENV)/installed
+
+# What setup has compiled is not compiled again. An earlier wheel goes.
+wheel: setup
+	rm -f dist/lammps_inelastic-*.whl
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-build-isolation --no-deps -w dist .
+	@for file in dist/*.whl; do echo "Written: $$file"; done
+	@echo 'Next, with the same Python and a C library no older than here: pip install the file'
 
 # All that is needed to build, to run and to test, as pyproject.toml says.
 REQUIREMENTS := import tomllib; file = tomllib.load(open("pyproject.toml", "rb")); \
@@ -95,4 +103,4 @@ $(VENV)/installed: $(VENV)/requirements.txt $(SOURCES)
 	touch $@
 
 clean:
-	rm -rf $(VENV) build out
+	rm -rf $(VENV) build dist out

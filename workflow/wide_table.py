@@ -1,7 +1,7 @@
 """Text that fits a terminal: tables, parted where they are wider, and notes in several lines.
 
-What goes into a file or a pipe keeps one line a row, and no cell is ever cut: names in it are there
-to be copied.
+In a file or a pipe a table keeps one line a row. No cell is ever cut: names in it are there to be
+copied.
 """
 
 from __future__ import annotations
