@@ -7,7 +7,8 @@
 # make tables    set up, print the measured tables of the documentation (hours)
 # make docs      build the documentation as a site, build/site, and check its links
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
-# make clean     remove the environment, build and out; results of hours stay (paper, benchmark, and studies of one's own)
+# make wheel     set up, put the package with its compiled parts into dist: for machines without a compiler
+# make clean     remove the environment, build, dist and out; results of hours stay (paper, benchmark, and studies of one's own)
 
 PYTHON ?= python3
 VENV := .venv
@@ -22,7 +23,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # Two processes; the tests of a file stay together, since they share the fixtures of its module.
 PYTEST := pytest -n 2 --dist loadfile
 
-.PHONY: run report test test-all style validate tables bench bench-quick docs setup clean
+.PHONY: run report test test-all style validate tables bench bench-quick docs setup wheel clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -60,6 +61,13 @@ docs: $(VENV)/site_builder
 	@echo 'The site is in build/site. To read it, with search: mkdocs serve'
 
 setup: $(VENV)/installed
+
+# What setup has compiled is not compiled again. An earlier wheel goes.
+wheel: setup
+	rm -f dist/lammps_inelastic-*.whl
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-build-isolation --no-deps -w dist .
+	@for file in dist/*.whl; do echo "Written: $$file"; done
+	@echo 'Next, with the same Python and a C library no older than here: pip install the file'
 
 # All that is needed to build, to run and to test, as pyproject.toml says.
 REQUIREMENTS := import tomllib; file = tomllib.load(open("pyproject.toml", "rb")); \
@@ -107,4 +115,4 @@ $(VENV)/installed: $(VENV)/requirements.txt $(SOURCES)
 	touch $@
 
 clean:
-	rm -rf $(VENV) build out
+	rm -rf $(VENV) build dist out

@@ -9,6 +9,7 @@ from typing import Any
 from lammps_inelastic.analysis import BoxInBed, CoordinationNumber, Orientation, ParticleFrame
 
 from .look import Look, as_ranges
+from .wide_table import wrapped
 
 NO_WALLS = "the box is not fixed: give --container or --walls"
 
@@ -29,7 +30,7 @@ def as_text(found: Look) -> str:
         *_overlap_rows(found),
     ]
     left, right = (max(len(row[column]) for row in rows) for column in (0, 1))
-    lines = [f"{name:<{left}}  {value:<{right}}  {note}" for name, value, note in rows]
+    lines = [wrapped(f"{name:<{left}}  {value:<{right}}  ", note) for name, value, note in rows]
     files = [
         ("particle dump", found.dump),
         ("contact dump", found.contact_dump)
@@ -46,7 +47,7 @@ def as_text(found: Look) -> str:
             f"{'  in the bed':<{left}}  {_part_in_bed(found.packing.bed)}",
             f"{'r':<{left}}  {found.smallest_radius:.6g}, the smallest radius",
             *(f"{name:<{left}}  {path}" for name, path in files),
-            *(f"{'note':<{left}}  {note}" for note in found.notes),
+            *(wrapped(f"{'note':<{left}}  ", note) for note in found.notes),
         ]
     )
 

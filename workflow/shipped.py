@@ -14,6 +14,8 @@ from .errors import WorkflowError
 
 # The deck that changes walls or gravity, and the one that lets a start fall until it rests.
 RESPONSE, SETTLING = "response", "settling"
+# The smallest deck has no variables, and is none for studies.
+MINIMAL = "minimal"
 # These are the names of the decks, in files with the ending `.in`.
 DECKS = ("spheres", "dimers", "clusters", RESPONSE, "gluey", SETTLING)
 # These are the names of the studies, in files with the ending `.toml`, in the order of the paper.
@@ -46,6 +48,11 @@ RESULTS_VARIABLE = "INELASTIC_RESULTS"
 def deck_text(name: str) -> str:
     """Return the text of a shipped deck."""
     return (_INPUTS / f"{name}.in").read_text()
+
+
+def first_study_text() -> str:
+    """Return the text of the study with which a study of one's own begins."""
+    return (_INPUTS / "study.toml").read_text()
 
 
 def shipped_studies() -> dict[str, Path]:

@@ -578,7 +578,6 @@ def test_wrong_values(
 @pytest.mark.parametrize(
     "arguments",
     [
-        [],
         ["fly"],
         ["look"],
         ["look", "x", "--points", "many"],

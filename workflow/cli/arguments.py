@@ -11,6 +11,7 @@ from pathlib import Path
 from ..errors import StudyError, WorkflowError, meant
 from ..launch import Options, cores
 from ..shipped import shipped_studies
+from ..starting_points import STUDY_ENDING
 from ..study import Case, Study, read_study
 
 # A longer timeout is a slip of the pen [seconds].
@@ -116,9 +117,11 @@ def study_path(path: Path) -> Path:
         return path
     shipped = shipped_studies()
     if str(path) not in shipped:
-        near = meant(str(path), shipped)
+        file = path.suffix == STUDY_ENDING
+        near = meant(path.stem if file else str(path), shipped)
+        there = f" that is there (`inelastic new {path}` writes one)" if file else ""
         raise WorkflowError(
-            f"no study {path}{near}: it must be a TOML file or {', '.join(shipped)}"
+            f"no study {path}{near}: it must be a TOML file{there} or {', '.join(shipped)}"
         )
     return shipped[str(path)]
 

@@ -16,8 +16,10 @@ from .. import provenance
 from ..errors import INTERRUPTED, StudyError, WorkflowError
 from . import (
     collect,
+    deck,
     export,
     look,
+    new,
     report,
     reproduce,
     slurm,
@@ -29,7 +31,9 @@ from . import run as run_cases
 
 # The help lists them in this order. Each adds a parser, whose default `run` is called.
 SUBCOMMANDS = (
+    deck,
     look,
+    new,
     validate,
     run_cases,
     status,
@@ -41,6 +45,10 @@ SUBCOMMANDS = (
     report,
 )
 
+# The last line of each help names the page of the repository that has all commands.
+PAGE = "docs/reference/commands.md"
+SEE = f"More: {PAGE} of lammps-inelastic."
+
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand; 0 if all went well, else one line on stderr for each thing that did not.
@@ -51,8 +59,12 @@ def run(arguments: Sequence[str] | None = None) -> int:
     with suppress(AttributeError):
         # A name may have bytes that no encoding knows, and a terminal an encoding of few letters.
         sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     try:
+        if options.command is None:
+            parser.print_help()
+            return 0
         code = int(options.run(options))
         sys.stdout.flush()
         return code
@@ -99,13 +111,16 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="inelastic",
         description="Packings of hard spheres, and of rigid bodies of them, with LAMMPS.",
+        epilog=SEE,
     )
     parser.add_argument(
         "--version", action=_Version, nargs=0, help="print which code this is, and leave"
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     for subcommand in SUBCOMMANDS:
         subcommand.add_parser(commands)
+    for each in commands.choices.values():
+        each.epilog = SEE
     return parser
 
 

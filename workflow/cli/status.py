@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from rich.table import Table
@@ -15,7 +16,7 @@ from ..launch import MEASURED, failure_in
 from ..provenance import differs
 from ..store import read_result
 from ..study import Case, Study
-from ..wide_table import print_wide
+from ..wide_table import COLUMNS, on_terminal, print_wide, width_of, wrapped
 from .arguments import add_out, add_studies, read_studies
 
 
@@ -40,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print_status(study: Study, folder: Folder) -> None:
-    table = Table("", "case", "state", "", title=Text(study.title), title_justify="left", box=None)
+    rows: list[tuple[str, str, str, str]] = []
     states: Counter[str] = Counter()
     other = 0
     for number, case in enumerate(study.cases, 1):
@@ -56,11 +57,26 @@ def _print_status(study: Study, folder: Folder) -> None:
             other += not same
         if damage := folder.damage(study, case):
             note = f"{note}; {damage}" if note else damage
-        table.add_row(str(number), Text(case.name), state, Text(note))
-    print_wide(table)
+        rows.append((str(number), case.name, state, note))
+    _print_rows(study.title, rows)
     print(f"{study.name}: " + ", ".join(f"{count} {state}" for state, count in states.items()))
     if other:
         print(other_code(other, folder.result_folder(study)))
+
+
+def _print_rows(title: str, rows: Sequence[tuple[str, str, str, str]]) -> None:
+    """Print number, name, state and note of each case; in two lines where one is too wide."""
+    table = Table("", "case", "state", "", title=Text(title), title_justify="left", box=None)
+    for number, name, state, note in rows:
+        table.add_row(number, Text(name), state, Text(note))
+    if not on_terminal() or width_of(table) <= COLUMNS:
+        print_wide(table)
+        return
+    print(title)
+    wide, widest = (max(len(row[column]) for row in rows) for column in (0, 2))
+    for number, name, state, note in rows:
+        print(wrapped(f"{number:>{wide}}  {state:<{widest}}  ", note).rstrip())
+        print(f"{' ' * wide}  {name}")
 
 
 def _of_result(study: Study, case: Case, folder: Folder) -> tuple[str, bool]:

@@ -3,7 +3,7 @@
 from .case import INPUTS, Case, Input, Stage, Study, is_word, stage_of
 from .file_format import MOST_POINTS, PAPER_BOX, Outputs, ProfileOutput
 from .stages import steps_of
-from .study_file import read_study
+from .study_file import mistake_in_name, read_study
 from .values import MOST_CASES
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Stage",
     "Study",
     "is_word",
+    "mistake_in_name",
     "read_study",
     "stage_of",
     "steps_of",

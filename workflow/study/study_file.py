@@ -49,7 +49,7 @@ def read_study(path: Path) -> Study:
 
     Raises StudyError with one line for every mistake.
     """
-    if mistake := _of_name(path.stem):
+    if mistake := mistake_in_name(path.stem):
         raise StudyError([shown(f"{path}: {mistake}")])
     try:
         text = read_regular(path, LARGEST_FILE).decode("utf-8-sig")
@@ -85,7 +85,7 @@ def read_study(path: Path) -> Study:
     return Study(path.stem, file.title, text, cases, file.outputs, tuple(warnings))
 
 
-def _of_name(name: str) -> str | None:
+def mistake_in_name(name: str) -> str | None:
     """Return why a study file's name cannot name its results; None if it can."""
     if name.startswith(".") or not name.isprintable() or name != name.strip():
         return (

@@ -56,6 +56,8 @@ COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
     ("drift", _number(".1e", "drift")),
     ("soft/hard time", lambda row: ratio_text(row.slower) if len(row.slower) else MISSING),
 )
+# The first so many of them say which configuration a row is of.
+KEYS = 5
 LEGEND = (
     "Medians over the starts. At rest: starts that came to rest within the run; the others have no "
     "time and no errors, nor is anything compared with them. Overlap: largest at rest, and before. "
@@ -121,7 +123,7 @@ def print_comparison(comparison: Comparison, lines: Sequence[str]) -> None:
             table.add_column(head, justify="left" if number < 2 else "right", no_wrap=True)
         for row in comparison.rows:
             table.add_row(*(Text(write(row)) for _, write in COLUMNS))
-        print_wide(table)
+        print_wide(table, keys=KEYS)
         lines = [*_heading(comparison), LEGEND, *lines]
     for line in lines:
         console.print(line, markup=False, soft_wrap=not console.is_terminal)
@@ -203,7 +205,7 @@ def print_states(curves: Sequence[WayMedians]) -> None:
     for cells in _states_cells(curves):
         table.add_row(*(Text(cell) for cell in cells))
     console.print(f"{STATES_TITLE}.", markup=False)
-    print_wide(table)
+    print_wide(table, keys=2)
     console.print(STATES_LEGEND, markup=False, soft_wrap=not console.is_terminal)
 
 
