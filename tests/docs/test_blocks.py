@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -77,6 +78,17 @@ def test_blocks_run_as_they_are_printed(page: Path, tmp_path: Path) -> None:
     blocks = blocks_of(page.read_text())
     assert [text for block in blocks if (text := unexplained(block))] == []
     assert run_page(blocks, tmp_path) == ""
+
+
+def test_shipped_decks_are_printed_as_they_are() -> None:
+    decks = [
+        (block.text, match[1])
+        for page in PAGES
+        for block in blocks_of(page.read_text())
+        if (match := re.match(r"it is (inputs/\S+\.in)\b", block.reason or ""))
+    ]
+    assert decks
+    assert [name for text, name in decks if (ROOT / name).read_text() != text] == []
 
 
 def test_the_pages_are_there() -> None:
