@@ -23,7 +23,7 @@ PAGES = [
     and page.relative_to(ROOT).as_posix() not in ("docs/trouble.md", "docs/how-to/clusters.md")
 ]
 # Pages that take more than some seconds, and run what other pages run, too.
-SLOW = {"docs/tutorials/pictures.md", "docs/tutorials/study.md"}
+SLOW = {f"docs/tutorials/{name}.md" for name in ("pictures", "python", "study")}
 
 
 def name_of(page: Path) -> str:
