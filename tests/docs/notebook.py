@@ -1,0 +1,68 @@
+"""The notebook of a page: its text and its blocks as cells.
+
+python -m tests.docs.notebook        # writes docs/tutorials/first-hour.ipynb
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from .blocks import BLOCK, Block, blocks_of
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "tutorials" / "first-hour.md"
+NOTEBOOK = PAGE.with_suffix(".ipynb")
+# A notebook starts in its own folder, a reader of the page in the clone.
+FIRST = "%cd ../.."
+LINK_TO_ITSELF = " The same page is a [notebook](first-hour.ipynb)."
+
+
+def notebook_of(page: str) -> str:
+    """Return a page as a notebook: files are written by cells, outputs come of themselves."""
+    cells = [_cell("code", FIRST)]
+    end = 0
+    for match, block in zip(BLOCK.finditer(page), blocks_of(page), strict=True):
+        cells += _text(page[end : match.start()])
+        end = match.end()
+        cells += _code(block)
+    cells += _text(page[end:])
+    for number, cell in enumerate(cells):
+        cell["id"] = f"cell-{number}"
+    notebook = {
+        "cells": cells,
+        "metadata": {
+            "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+            "language_info": {"name": "python"},
+        },
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
+
+
+def _text(text: str) -> list[dict[str, object]]:
+    stripped = re.sub(r"\s+$", "", text.replace(LINK_TO_ITSELF, "")).strip("\n")
+    return [_cell("markdown", stripped)] if stripped else []
+
+
+def _code(block: Block) -> list[dict[str, object]]:
+    if block.is_file:
+        return [_cell("code", f"%%writefile {block.file}\n{block.text}")]
+    if not block.is_run:
+        return []
+    return [_cell("code", block.text if block.language == "python" else f"%%sh\n{block.text}")]
+
+
+def _cell(kind: str, text: str) -> dict[str, object]:
+    cell: dict[str, object] = {
+        "cell_type": kind,
+        "metadata": {},
+        "source": text.rstrip("\n").splitlines(keepends=True),
+    }
+    return cell | ({"execution_count": None, "outputs": []} if kind == "code" else {})
+
+
+if __name__ == "__main__":
+    NOTEBOOK.write_text(notebook_of(PAGE.read_text()))
