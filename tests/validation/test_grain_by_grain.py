@@ -61,17 +61,12 @@ def test_spheres(particles: int, diameter: float, tmp_path: Path) -> None:
     assert_kept({f"{particles:,} spheres": compare_folder(tmp_path)})
 
 
-@pytest.mark.parametrize(("aspect_ratio", "beyond"), [(1.01, 2), (1.5, 0)])
-def test_dimers(aspect_ratio: float, beyond: int, tmp_path: Path) -> None:
-    """The default deck of dimers in all its phases: their centres, and each of their spheres.
-
-    One of the 88 steps with an aspect ratio of 1.01 does not keep the bound, a shaken one whose
-    softest motions have 120 times the velocity of a residual (1.36 times the bound; on ten recorded
-    shaken steps half the targets leave 0.82, and take a fifth more iterations).
-    """
+@pytest.mark.parametrize("aspect_ratio", [1.01, 1.5])
+def test_dimers(aspect_ratio: float, tmp_path: Path) -> None:
+    """The default deck of dimers in all its phases: their centres, and each of their spheres."""
     values: dict[str, object] = {"aspect_ratio": aspect_ratio}
     run_deck(tmp_path, recording(shipped_deck("dimers"), EVERY), NO_DUMP | values)
-    assert_kept({f"dimers of {aspect_ratio}": compare_folder(tmp_path)}, beyond)
+    assert_kept({f"dimers of {aspect_ratio}": compare_folder(tmp_path)})
 
 
 def test_layer_that_a_sphere_falls_on(tmp_path: Path) -> None:
