@@ -121,11 +121,14 @@ def test_a_bed_of_dimers(inertia: str, ranks: int, tmp_path: Path, lmp: Runner) 
     first, end = longest_rest(result, -1)
     print(f"at rest from step {first} to {end}")
     assert end - first >= 200
-    assert result.thermo["f_contact[1]"][first + 20 : end].mean() <= 1
     frames = read_dump(tmp_path / "particles.dump")[first + 1 : end]
     moved = np.max([np.abs(frame.positions - frames[0].positions) for frame in frames], axis=(0, 2))
     # Round-off of bodies, whose spheres are placed anew in every step.
-    assert np.count_nonzero(moved > 1e-11) <= 5
+    moving = np.count_nonzero(moved > 1e-11)
+    assert moving <= 5
+    # Where all rest nothing is solved; a dimer that slides on takes some tens of iterations a step.
+    iterations = result.thermo["f_contact[1]"][first + 20 : end].mean()
+    assert iterations <= (100 if moving else 1)
     assert moved.max() <= drift(len(frames))
 
 
