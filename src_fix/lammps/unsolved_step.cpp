@@ -124,6 +124,7 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
   const double now = result.trend.least();
   // The trend knows nothing of constraints that were found after the last iteration.
   if (result.residual.feasibility > UNSEEN * now) before = std::numeric_limits<double>::infinity();
+  const bool falls = now < STILL_FALLS * before && std::isfinite(before);
   if (step_.settings.tolerance < NEAR_ROUND_OFF * result.round_off)
     cause = fmt::format("The tolerance is below the round-off of these forces: raise it to {:.2g}",
                         NEAR_ROUND_OFF * result.round_off);
@@ -131,11 +132,12 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
     cause = fmt::format("The gaps at the end of the step, until which {}, may not all be had "
                         "together: lower the timestep, use shorten yes, or raise maxiter ({})",
                         bodies_ ? "bodies turn" : "walls curve", step_.settings.max_iterations);
-  else if (now < STILL_FALLS * before && std::isfinite(before))
+  // (Of a step that is shortened already the residual falls where there is no room, too.)
+  else if (falls && update->dt == step_.regular_timestep)
     cause = fmt::format("The residual is still coming down, as it does where there is room "
                         "(from {:.3g} to {:.3g} lately): {}",
                         before, now, help);
-  else if (std::isfinite(before))
+  else if (!falls && std::isfinite(before))
     cause =
         fmt::format("The residual no longer comes down (from {:.3g} to {:.3g} lately): the scene "
                     "leaves no room for the spheres, or needs far more iterations: {}",
