@@ -97,7 +97,7 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   if (bodies_) constraints_.entangled().find();
   if (!constraints_.overlaps().pushed_before()) begin_push();
   look_for_progress();
-  // Iterations, of thousands of spheres, with room for what they may open: many times what it takes.
+  // Iterations of a trial. Thousands of spheres that have room for what is asked take far fewer.
   constexpr long MOST = 10000;
   constexpr double LEAST = 1.0e-3;
   double part = stuck_ ? 1.0 : part_;

@@ -26,6 +26,7 @@ def test_every_page_is_in_the_navigation() -> None:
 
 
 def build(folder: Path, site: Path) -> subprocess.CompletedProcess[str]:
+    # An optional dependency: `make docs` installs it, and CI does so before the tests.
     pytest.importorskip("mkdocs")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(site)]
     environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
