@@ -30,9 +30,10 @@ constexpr char LIST[] = "parameters";
 constexpr char IS_FILE[] = "_is_file";
 constexpr std::size_t LONGEST_SHOWN = 100;
 
-// Dumps and restart files give * and % a meaning, input scripts and the shell the others.
+// Dumps and restart files give * and % a meaning, the functions of variables the comma, input scripts and
+// the shell the others.
 constexpr char NOT_IN_FILES[] = "\"'`$&#";
-constexpr char NOT_IN_FOLDERS[] = "\"'`$&#*?%{}()[]~;<>|\\!";
+constexpr char NOT_IN_FOLDERS[] = "\"'`$&#*?%{}()[]~;<>|\\!,";
 
 bool is_name(const std::string &word)
 {
@@ -386,7 +387,7 @@ std::string Parameters::mistake_in_folder(const std::string &name) const
   if (name.empty()) return ": it needs a name";
   if (has_any_of(name, NOT_IN_FOLDERS))
     return ": its name must be without white space, quotes and $ & # * ? % { } ( ) [ ] ~ ; < > | "
-           "\\ !";
+           "\\ ! ,";
   struct stat status;
   const bool other = stat(name.c_str(), &status) == 0 && !S_ISDIR(status.st_mode);
   return said_by_first_rank(other) ? ", which is there and is no folder" : "";

@@ -135,7 +135,7 @@ NO_FOLDER = [
     "there.data/x",
     "pipe",
     "/proc/x",
-    *(f"a{letter}b" for letter in "'`$&#*?%{}()[]~;<>|\\!\t\n"),
+    *(f"a{letter}b" for letter in "'`$&#*?%{}()[]~;<>|\\!,\t\n"),
 ]
 
 
@@ -170,7 +170,7 @@ def wrong_values(rule: Rule) -> list[str]:
 
 def right_values(rule: Rule) -> list[str]:
     if rule.kind == "folder":
-        return ["folder", "new", "new/deeper", ".", "./a-b_c.d+e,f=g@h^i:j", "deep/"]
+        return ["folder", "new", "new/deeper", ".", "./a-b_c.d+e=f@h^i:j", "deep/"]
     if rule.kind == "words":
         return [*rule.words, *(["there.data", "./random"] if rule.file else [])]
     return list(just_inside(rule))

@@ -92,7 +92,7 @@ def counting(data: Data) -> Content:
                 "contact does. How many of them do so when a step is solved is no property of the "
                 "packing: it depends on the time step (the deck rests and counts with longer ones "
                 "than it shakes with; the paper names none), on the solver, and on where it stops "
-                "(the page of the fix has a table of that). Counted at a tight ε the same packings "
+                "(measured in docs/measured/contacts.md). Counted at a tight ε the same packings "
                 "have the coordination number of all others."
             ),
         ]
