@@ -15,11 +15,18 @@ from lammps_inelastic.workflow.study import read_study
 
 COMMANDS = [module.__name__.rpartition(".")[2] for module in SUBCOMMANDS]
 INPUTS = STUDIES_FOLDER.parent
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/start.md"])
+def test_the_shortest_deck_stands_whole_in_a_page(page: str) -> None:
+    deck = (INPUTS / "minimal.in").read_text()
+    assert f"```lammps\n{deck}```" in (ROOT / page).read_text()
 
 
 @pytest.mark.parametrize("name", ["minimal", *DECKS])
@@ -130,5 +137,6 @@ def test_each_help_names_the_page_of_the_commands(
     with pytest.raises(SystemExit, match="0"):
         main([command, "--help"])
     text = capsys.readouterr().out
+    assert (ROOT / PAGE).is_file()
     assert PAGE in text.splitlines()[-1]
     assert max(map(len, text.splitlines())) <= 100
