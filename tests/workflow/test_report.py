@@ -1081,6 +1081,14 @@ def test_own_study_alone_has_no_sections_of_the_paper() -> None:
     ]
     assert table.rows[0][1].text == "2"
 
+    def has_gaps_of_the_paper(section: Section) -> bool:
+        captions = [block.caption for block in section.blocks if isinstance(block, Table)]
+        return "What the paper does not state: our values" in captions
+
+    assert not has_gaps_of_the_paper(sections["provenance"])
+    both = sections_of(own_study(), study("table-1", [measured()]))
+    assert has_gaps_of_the_paper(both["provenance"])
+
 
 def test_parts_of_a_study_in_several_files(tmp_path: Path) -> None:
     one = write(tmp_path / "1.h5", study("own", [measured(seed=1), measured(seed=2)]))

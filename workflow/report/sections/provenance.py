@@ -12,6 +12,7 @@ from ...decks import gravity_of
 from ...finished import MEASURED_BY
 from ...provenance import version_in
 from ...shipped import QUICK_FOLDER, STUDIES_FOLDER
+from ...shipped import STUDIES as OF_THE_PAPER
 from ...store import Result, StoredStudy
 from ..blocks import Block, Listing, Section, Table, Text, nothing_run
 from ..columns import Column, table
@@ -84,7 +85,7 @@ def codes_line(results: Sequence[Result]) -> str:
 
 
 def provenance_section(data: Data, files: Sequence[str]) -> Section:
-    """Return the section on what was run when, with what, and what the paper does not state.
+    """Return the section on what was run when and with what; for studies of the paper, its gaps.
 
     Parameters
     ----------
@@ -104,7 +105,9 @@ def provenance_section(data: Data, files: Sequence[str]) -> Section:
         Text(f"Everything in this report is drawn from these files alone: {', '.join(files)}.")
     )
     if results:
-        blocks += [_not_stated_table(results), _versions_table(results), *_decks(results)]
+        if any(name in data.studies for name in OF_THE_PAPER):
+            blocks.append(_not_stated_table(results))
+        blocks += [_versions_table(results), *_decks(results)]
     blocks += [
         Listing(study.text.strip(), f"Study {study.name}") for study in data.studies.values()
     ]
