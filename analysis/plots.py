@@ -339,6 +339,9 @@ def plot_reference(ax: Axes, value: float, *, label: str | None = None, number: 
 
 def plot_moment(ax: Axes, x: float, label: str) -> Axes:
     """Draw a vertical line at an x, and write beside it, at its foot, what happens there."""
+    # This takes a while to import, and those who only compute need not wait for it.
+    from matplotlib.patheffects import withStroke
+
     ax.axvline(x, color=GREY, linewidth=0.9, linestyle=":")
     ax.annotate(
         label,
@@ -351,5 +354,8 @@ def plot_moment(ax: Axes, x: float, label: str) -> Axes:
         va="bottom",
         fontsize="x-small",
         color="#505050",
+        # It is readable where it crosses a curve.
+        path_effects=[withStroke(linewidth=2, foreground="white")],
+        zorder=5,
     )
     return ax

@@ -55,7 +55,10 @@ RC: Any = {
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "legend.frameon": False,
+    # A line that marks a place does not strike out the words of a legend.
+    "legend.frameon": True,
+    "legend.edgecolor": "none",
+    "legend.fancybox": False,
     "legend.fontsize": "small",
     "xtick.direction": "out",
     "ytick.direction": "out",
