@@ -35,6 +35,10 @@ COLUMNS: Sequence[Column[LabelledRuns]] = (
     NEIGHBOURS.column(),
     RATTLERS.column(),
     EXCESS_CONTACTS.column(),
+)
+EXPONENTS: Sequence[Column[LabelledRuns]] = (
+    Column("packing", lambda case: case.label),
+    RUNS,
     GAP_EXPONENT.column(),
     WEAK_FORCE_EXPONENT.column(),
 )
@@ -95,10 +99,17 @@ def reference(data: Data) -> Content:
                 "Mean ± standard deviation (standard error) over the runs. φ, z, neighbours and "
                 "rattlers are those in the box. Excess: contacts, walls included, less degrees of "
                 "freedom, per 1,000 degrees, of all particles that are held: 0 is isostatic.",
-                "Exponents are those of maximum likelihood, of gaps from 0.001 to 0.1 diameters "
-                "and of forces from 0.001 to 0.3 of the mean at their height, of particles that "
-                "are held in any direction and touch no wall. Gaps of dimers that are almost "
-                "spheres follow no power: the second contact of a pair has the size of the arm.",
+            ),
+        ),
+        table(
+            "Exponents of small gaps and weak forces",
+            EXPONENTS,
+            cases,
+            (
+                "By maximum likelihood, of gaps from 0.001 to 0.1 diameters and of forces from "
+                "0.001 to 0.3 of the mean at their height, of particles that are held in any "
+                "direction and touch no wall. Gaps of dimers that are almost spheres follow no "
+                "power: the second contact of a pair has the size of the arm.",
             ),
         ),
         table(
