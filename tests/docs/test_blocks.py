@@ -23,7 +23,11 @@ PAGES = [
     and page.relative_to(ROOT).as_posix() not in ("docs/trouble.md", "docs/how-to/clusters.md")
 ]
 # Pages that take more than some seconds, and run what other pages run, too.
-SLOW = {f"docs/tutorials/{name}.md" for name in ("pictures", "python", "study")}
+SLOW = {
+    "docs/start.md",
+    "docs/how-to/change-a-deck.md",
+    *(f"docs/tutorials/{name}.md" for name in ("first-hour", "pictures", "python", "study")),
+}
 
 
 def name_of(page: Path) -> str:

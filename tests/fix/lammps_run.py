@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import importlib.metadata
 import importlib.util
 import os
@@ -9,7 +10,9 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
@@ -56,6 +59,18 @@ class Run:
 Runner = Callable[..., Run]
 
 
+@contextmanager
+def cores_for(ranks: int) -> Iterator[None]:
+    """Wait for the cores that a run needs: several ranks have the machine for themselves.
+
+    Tests run beside one another. A rank that waits for a core which another run has keeps all other
+    ranks waiting, some milliseconds in each of 100,000 iterations.
+    """
+    with (Path(tempfile.gettempdir()) / f"lammps_inelastic_tests_{os.getuid()}").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX if ranks > 1 else fcntl.LOCK_SH)
+        yield
+
+
 def run_lmp(
     folder: Path,
     deck: str,
@@ -84,22 +99,23 @@ def run_lmp(
     variables = {
         name: value for name, value in os.environ.items() if not name.startswith(OF_A_LAUNCHER)
     } | {"OMP_NUM_THREADS": "1", **(environment or {})}
-    process = subprocess.Popen(
-        command,
-        cwd=folder,
-        env=variables,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        stdin=subprocess.DEVNULL,
-        start_new_session=True,
-        text=True,
-    )
-    try:
-        screen, _ = process.communicate(timeout=timeout)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        screen, _ = process.communicate()
-        pytest.fail(f"still running after {timeout} s:\n{deck}\n{screen[-2000:]}")
+    with cores_for(ranks):
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=variables,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+            text=True,
+        )
+        try:
+            screen, _ = process.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            screen, _ = process.communicate()
+            pytest.fail(f"still running after {timeout} s:\n{deck}\n{screen[-2000:]}")
     lines = screen.splitlines()
     result = Run(
         status=process.returncode,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.fix.lammps_run import BIN, OF_A_LAUNCHER
+from tests.fix.lammps_run import BIN, OF_A_LAUNCHER, cores_for
 
 TIMEOUT = 60.0
 
@@ -54,28 +54,30 @@ def answer(
     around = {
         name: value for name, value in os.environ.items() if not name.startswith(OF_A_LAUNCHER)
     }
-    start = time.monotonic()
-    process = subprocess.Popen(
-        command,
-        cwd=folder,
-        env=around | {"OMP_NUM_THREADS": "1"} | dict(environment),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        stdin=subprocess.DEVNULL,
-        start_new_session=True,
-        text=True,
-        errors="replace",
-    )
     status: int | None
-    try:
-        screen, _ = process.communicate(timeout=timeout)
-        status = process.returncode
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        screen, _ = process.communicate()
-        status = None
+    with cores_for(ranks):
+        start = time.monotonic()
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=around | {"OMP_NUM_THREADS": "1"} | dict(environment),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+            text=True,
+            errors="replace",
+        )
+        try:
+            screen, _ = process.communicate(timeout=timeout)
+            status = process.returncode
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            screen, _ = process.communicate()
+            status = None
+        seconds = time.monotonic() - start
     (folder / "screen.txt").write_text(screen)
-    return Answer(status, screen, time.monotonic() - start)
+    return Answer(status, screen, seconds)
 
 
 Facts = dict[str, Any]

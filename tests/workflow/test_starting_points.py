@@ -23,12 +23,6 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/start.md"])
-def test_the_shortest_deck_stands_whole_in_a_page(page: str) -> None:
-    deck = (INPUTS / "minimal.in").read_text()
-    assert f"```lammps\n{deck}```" in (ROOT / page).read_text()
-
-
 @pytest.mark.parametrize("name", ["minimal", *DECKS])
 def test_a_deck_is_printed_to_the_byte(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     for given in (name, f"{name}.in"):
