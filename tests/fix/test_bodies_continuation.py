@@ -150,6 +150,7 @@ def test_the_order_of_fixes(
     assert_same(last_positions(tmp_path), undisturbed[inertia])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "ranks"), [("restart", 1), ("data", 2)])
 @pytest.mark.parametrize("inertia", INERTIAS)
 def test_from_a_file(

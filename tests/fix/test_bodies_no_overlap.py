@@ -332,6 +332,7 @@ def test_dimers_of_discs(inertia: str, tmp_path: Path, lmp: Runner) -> None:
     assert result.thermo["f_contact[5]"][-1] > 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("inertia", INERTIAS)
 def test_between_runs(inertia: str, ranks: int, tmp_path: Path, lmp: Runner) -> None:

@@ -71,6 +71,7 @@ def test_parallel_walls_leave_no_room(
     assert fastest(result) <= SPEED * (1 + 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("bodies", [False, True], ids=["spheres", "dimers"])
 def test_a_wedge_squeezes_grains_out(bodies: bool, ranks: int, tmp_path: Path, lmp: Runner) -> None:

@@ -121,6 +121,7 @@ def test_what_a_column_gives_back_of_an_impact(
 BED_BOX = ((0, 0.7), (0, 2), (0, 0.7))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_bed_is_quiet_and_cheap(ranks: int, tmp_path: Path, lmp: Runner) -> None:
     inside = tuple((low + RADIUS, high - RADIUS) for low, high in BED_BOX)

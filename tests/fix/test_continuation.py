@@ -87,6 +87,7 @@ def test_two_runs(runs: str, undisturbed: FloatArray, tmp_path: Path, lmp: Runne
     assert_same(last_positions(tmp_path), undisturbed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["restart", "data"])
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_from_a_file(

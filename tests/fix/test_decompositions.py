@@ -43,6 +43,7 @@ def bed(seed: int = 1, count: int = 40) -> np.ndarray:
 BOX = ((0.0, 0.57), (0.0, 1.0), (0.0, 0.57))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("newton", ["on", "off"])
 def test_periodic_sides_and_a_floor(ranks: int, newton: str, tmp_path: Path, lmp: Runner) -> None:

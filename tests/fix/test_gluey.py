@@ -331,6 +331,7 @@ def test_two_that_collide_stay_together(tmp_path: Path, lmp: Runner) -> None:
     assert last.velocities.mean(axis=0) == pytest.approx([0.25, 0.0, 0.0], abs=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("across", [0.1, 0.4])
 def test_two_that_turn_about_one_another(across: float, tmp_path: Path, lmp: Runner) -> None:
     """They part when the centripetal force has used up what the impact has stored.
@@ -391,6 +392,7 @@ def test_a_pair_that_turns_is_pushed_back(tmp_path: Path, lmp: Runner) -> None:
     assert gaps[:, 0].min() >= -(1 + 1e-6) * EPS  # round-off
 
 
+@pytest.mark.slow
 def test_a_bed_that_is_turned_over(tmp_path: Path, lmp: Runner) -> None:
     """Spheres hang under the floor, and touch what they touched, while what pressed them lasts."""
     step, eps = 0.005, 1e-3 * RADIUS
@@ -422,6 +424,7 @@ def test_a_bed_that_is_turned_over(tmp_path: Path, lmp: Runner) -> None:
     assert lost > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("division", DIVISIONS)
 def test_stores_on_ranks(division: str, tmp_path: Path, lmp: Runner) -> None:
     """A large sphere with more neighbours than a message holds, however ranks share them.

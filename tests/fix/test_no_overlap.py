@@ -601,6 +601,7 @@ def test_a_rotating_container(shape: str, tmp_path: Path, lmp: Runner) -> None:
     assert result.thermo["f_contact[6]"][-1] > 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("term", ["c_top", "bound(all,ymax)", "ke", "f_contact[5]"])
 def test_a_wall_moved_by_a_variable_that_communicates(

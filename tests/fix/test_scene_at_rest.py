@@ -76,6 +76,7 @@ def drift(steps: int) -> float:
     return UNNOTICED * GRAVITY * STEP**2 * steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_bed_at_rest_costs_nothing(ranks: int, tmp_path: Path, lmp: Runner) -> None:
     result = lmp(
@@ -101,6 +102,7 @@ def test_a_bed_at_rest_costs_nothing(ranks: int, tmp_path: Path, lmp: Runner) ->
     assert "the scene was at rest, and nothing moved" in result.screen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", INERTIAS)
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_bed_of_dimers(inertia: str, ranks: int, tmp_path: Path, lmp: Runner) -> None:

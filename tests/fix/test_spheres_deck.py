@@ -26,7 +26,7 @@ VARIABLES = {
 }
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
     """1,000 spheres fall and settle; the dumps hold every sphere and only forces that push.
 

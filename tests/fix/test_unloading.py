@@ -26,6 +26,7 @@ def test_a_column_that_was_pressed(
     assert_nothing_leaps(thermo["v_load"], speed, weights)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("kind", ["spheres", "dimers"])
 def test_a_bed_at_rest_rests_on(kind: str, ranks: int, tmp_path: Path) -> None:

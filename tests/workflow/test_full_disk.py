@@ -180,6 +180,7 @@ def test_a_disk_that_fills_up(done: Path, small_disk: Path) -> None:
         read_studies(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left", [0, 8192], ids=["no room for a word", "room for the reason"])
 def test_a_disk_that_is_full_when_a_run_is_measured(left: int, study: Path, tmp_path: Path) -> None:
     """The message names the disk; the finished run is kept, and nobody is told to delete it."""

@@ -56,6 +56,7 @@ def test_they_are_of_fixes_with_the_same_runs_which_the_page_names(
     assert taken == len(study.cases) or "an earlier fix" in page
 
 
+@pytest.mark.slow
 def test_the_tables_are_drawn_from_the_results(studies: list[StoredStudy], tmp_path: Path) -> None:
     """As `inelastic report paper/paper.h5 --markdown results/report.md` writes them."""
     store = tmp_path / "paper.h5"

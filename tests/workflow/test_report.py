@@ -969,6 +969,7 @@ def test_results_of_an_older_deck_group_with_newer_ones(tmp_path: Path) -> None:
     assert first | {"seed": 2} == second
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [None, "word"])
 def test_other_decks_under_the_names_of_the_paper(value: str | None) -> None:
     """Their parameters are not ours, or words: no number stands for them."""
@@ -1277,6 +1278,7 @@ def test_dimer_is_as_long_as_it_is_said_to_be() -> None:
         draw_dimer(axis(), 2.1)
 
 
+@pytest.mark.slow
 def test_the_tables_as_text(tmp_path: Path) -> None:
     """They hold the page's tables, and depend on the results alone."""
     file = write(tmp_path / "all.h5", *whole_paper())

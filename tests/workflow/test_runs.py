@@ -52,6 +52,7 @@ def one_case(folder: Path, seed: int = 1) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--mpi"]])
 def test_what_cannot_be_measured_is_said(options: list[str], tmp_path: Path) -> None:
     path = one_case(tmp_path)
@@ -342,6 +343,7 @@ def test_starts_from_a_data_file(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert numbers["few/summary/start"].tolist() == [b"inputs/my.data"]
 
 
+@pytest.mark.slow
 def test_groups_of_one_rank_give_the_same_numbers(undisturbed: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = inelastic("run", undisturbed / "few.toml", "--out", out, "--mpi", ranks=2)
@@ -412,6 +414,7 @@ def test_a_look_does_not_keep_a_run_from_its_case(tmp_path: Path) -> None:
     looker.join()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--mpi"]])
 def test_a_start_that_is_missing_fails_its_case_alone(
     options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

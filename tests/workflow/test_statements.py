@@ -13,6 +13,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import pytest
 from scipy.stats import ttest_1samp
 
 from tests.workflow.test_links import ROOT, documents
@@ -342,6 +343,7 @@ def shaken_by(force: float) -> list[dict[str, Any]]:
     return [r for r in read("dimers") if r["deck"] == "dimers" and r["random_force"] == force]
 
 
+@pytest.mark.slow
 def test_where_dimers_are_densest() -> None:
     raw = [densest(shaken_by(force), "packing_fraction") for force in (FORCE, 200)]
     necks = [densest(shaken_by(force), "packing_fraction_with_necks") for force in (FORCE, 200)]

@@ -404,6 +404,7 @@ def rows_of(out: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_what_a_comparison_writes(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     assert {path.name for path in out.iterdir()} == {
@@ -433,6 +434,7 @@ def test_what_a_comparison_writes(finished: tuple[list[str], Path]) -> None:
     assert "Soft spheres" in page
 
 
+@pytest.mark.slow
 def test_numbers_of_a_comparison(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     for row in rows_of(out):
@@ -458,6 +460,7 @@ def test_numbers_of_a_comparison(finished: tuple[list[str], Path]) -> None:
         assert (row["network_error"] != "") == compared
 
 
+@pytest.mark.slow
 def test_recorded_states_show_the_accuracy(finished: tuple[list[str], Path]) -> None:
     """Tighter is more accurate, in velocities, forces and contacts, and takes more iterations."""
     _, out = finished
@@ -482,6 +485,7 @@ def test_recorded_states_show_the_accuracy(finished: tuple[list[str], Path]) -> 
     assert "| apgd from the last forces | 0.0005 |" in (out / "tradeoff.md").read_text()
 
 
+@pytest.mark.slow
 def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str], Path]) -> None:
     """Clarabel, an interior-point method, solves the recorded problems of free spheres."""
     _, out = finished
@@ -524,6 +528,7 @@ def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str],
     assert unique > 0
 
 
+@pytest.mark.slow
 def test_damaged_records_are_named(
     finished: tuple[list[str], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -546,6 +551,7 @@ def test_damaged_records_are_named(
     assert main(arguments) == 0
 
 
+@pytest.mark.slow
 def test_a_cut_off_log_of_a_recorded_run(
     finished: tuple[list[str], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -613,6 +619,7 @@ def test_what_some_state_has_not_reached_is_left_out() -> None:
     assert curve.medians["seconds"].tolist() == [2.0]
 
 
+@pytest.mark.slow
 def test_all_runs_of_a_seed_have_the_same_start(finished: tuple[list[str], Path]) -> None:
     _, out = finished
     (study,) = read_studies(out / "tradeoff.h5")
@@ -624,6 +631,7 @@ def test_all_runs_of_a_seed_have_the_same_start(finished: tuple[list[str], Path]
     assert heights[1] != heights[2]
 
 
+@pytest.mark.slow
 def test_nothing_is_left_to_do(
     finished: tuple[list[str], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -638,6 +646,7 @@ def test_nothing_is_left_to_do(
     assert before[1] == (out / "tradeoff.csv").read_text()
 
 
+@pytest.mark.slow
 def test_two_comparisons_in_a_folder_follow_one_another(
     finished: tuple[list[str], Path],
 ) -> None:
