@@ -252,6 +252,7 @@ def test_ids_that_are_rounded(identity: str, kind: str, tmp_path: Path) -> None:
     assert line_named(refused(kind, tmp_path / "a.dump", b"\n".join(lines) + b"\n")) == 11
 
 
+@pytest.mark.slow
 @FUZZED
 @given(data=st.data())
 def test_the_command_line_says_one_line(data: st.DataObject, tmp_path: Path) -> None:

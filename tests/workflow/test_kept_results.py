@@ -32,11 +32,13 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> list[StoredStudy]:
     return found
 
 
+@pytest.mark.slow
 def test_every_stored_result_is_of_a_study_of_today(studies: list[StoredStudy]) -> None:
     taken = {f"{study.name}/{result.case}.h5" for study in studies for result in study.results}
     assert taken == {str(path.relative_to(KEPT)) for path in KEPT.rglob("*.h5")}
 
 
+@pytest.mark.slow
 def test_they_are_of_fixes_with_the_same_runs_which_the_page_names(
     studies: list[StoredStudy], tmp_path: Path
 ) -> None:

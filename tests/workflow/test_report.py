@@ -1301,6 +1301,7 @@ def test_the_tables_as_text(tmp_path: Path) -> None:
             assert len(re.findall(r"(?<!\\)\|", above)) == len(re.findall(r"(?<!\\)\|", line))
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_tables_are_those_of_the_page() -> None:
     """Of the paper's studies, of their quick versions, of a study of one's own, of a tradeoff."""
 
