@@ -85,7 +85,7 @@ def codes_line(results: Sequence[Result]) -> str:
 
 
 def provenance_section(data: Data, files: Sequence[str]) -> Section:
-    """Return the section on what was run when and with what; for studies of the paper, its gaps.
+    """Return the section on what was run when, with what; of the paper also what it leaves open.
 
     Parameters
     ----------
