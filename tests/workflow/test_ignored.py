@@ -30,6 +30,7 @@ def test_the_commands_leave_something() -> None:
 @pytest.mark.parametrize("name", left_by_commands())
 def test_git_ignores_what_a_command_leaves(name: str) -> None:
     if not (ROOT / ".git").exists():
+        # An unpacked archive is no repository, and git knows nothing of it.
         pytest.skip("no clone: nothing is ignored")
     found = subprocess.run(["git", "check-ignore", "--quiet", name], cwd=ROOT)
     assert found.returncode == 0
