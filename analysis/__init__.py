@@ -2,6 +2,8 @@
 
 from .bed import BoxInBed, box_in_bed
 from .bodies import Particles, group_spheres
+from .cell import Cell
+from .contact_lines import ContactLines, contact_lines
 from .contacts import ContactFrame, iterate_contact_frames
 from .coordination import (
     ContactCounts,
@@ -32,7 +34,6 @@ from .export import (
 )
 from .fabric import fabric_tensor
 from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
-from .geometry import particles_inside
 from .measurement import PackingMeasurement, measure_packing
 from .necks import dimer_volume, neck_volume, packing_fraction_with_necks
 from .neighbours import DistanceContacts, contacts_by_distance
@@ -48,7 +49,7 @@ from .packing import (
     measure_packing_fraction,
     packing_fraction,
 )
-from .particles import ParticleDump, ParticleFrame, check_not_periodic, read_particle_frame
+from .particles import ParticleDump, ParticleFrame, read_particle_frame
 from .pictures import draw_packing
 from .profile import (
     WallProfile,
@@ -67,6 +68,7 @@ from .scaling import (
     power_law,
     small_gaps,
 )
+from .spheres import Images, Spheres
 from .structure import (
     BondOrder,
     RadialDistribution,
@@ -81,8 +83,10 @@ __all__ = [
     "Backbone",
     "BondOrder",
     "BoxInBed",
+    "Cell",
     "ContactCounts",
     "ContactFrame",
+    "ContactLines",
     "CoordinationNumber",
     "DistanceContacts",
     "DumpError",
@@ -90,6 +94,7 @@ __all__ = [
     "ExactPackingFraction",
     "ExportError",
     "ForceDistribution",
+    "Images",
     "InputError",
     "LogError",
     "MeasuredPackingFraction",
@@ -109,6 +114,7 @@ __all__ = [
     "RunFiles",
     "RunFilesError",
     "RunLog",
+    "Spheres",
     "UnfinishedRunError",
     "VoxelImage",
     "WallOverlap",
@@ -120,9 +126,9 @@ __all__ = [
     "bond_order",
     "box_in_bed",
     "check_contacts",
-    "check_not_periodic",
     "contact_counts",
     "contact_graph",
+    "contact_lines",
     "contacts_by_distance",
     "contacts_of",
     "contacts_to_hold",
@@ -151,7 +157,6 @@ __all__ = [
     "packing_fraction",
     "packing_fraction_with_necks",
     "particle_volumes_in_box",
-    "particles_inside",
     "plateau",
     "plot_evolution",
     "plot_force_distribution",

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import InputError
-from .geometry import FloatArray, as_box, as_floats, as_spheres
+from .geometry import FloatArray, as_box, as_walls
+from .spheres import Spheres
 
 # Width of a column [largest diameters]. In narrower ones the gap between two spheres of a dense bed
 # would be its end; wider ones hide a pit of the surface.
@@ -62,36 +62,43 @@ class BoxInBed:
         return ", ".join(found) or "a gap in the box"
 
 
-def box_in_bed(
-    positions: ArrayLike, radii: ArrayLike, box: ArrayLike, walls: ArrayLike | None = None
-) -> BoxInBed:
+def box_in_bed(spheres: Spheres, box: ArrayLike, walls: ArrayLike | None = None) -> BoxInBed:
     """Find how much of a box lies inside a bed of spheres, and where the bed ends.
 
     The bed ends at the outermost centres of each column, 1.5 to 3 largest diameters wide; at a wall
     if no sphere of the largest diameter fits between the two. A sphere that has left the bed does
-    not move its end, unless it is alone in a column. Nothing is periodic.
+    not move its end, unless it is alone in a column. A bed has no end along an edge of its cell
+    that is periodic, nor across the plane of discs: it is infinite there.
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
+    spheres : the spheres, and their cell
     box : (3, 2), lower and upper bound per axis, length
     walls : (3, 2), place of the flat wall below and above per axis, infinite where there is none,
         length; None for no walls
 
-    Raises InputError for arrays of other shapes, and for walls that are NaN.
+    Raises InputError for a box or walls of another shape, for walls that are NaN, and for too many
+    images.
     """
-    centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
-    faces = _as_walls(walls)
-    diameter = 2 * float(radius.max())
+    faces = as_walls(walls)
+    diameter = 2 * float(spheres.radii.max())
+    # A narrow column reaches out of the box by less than its own width.
+    centres = spheres.around(bounds, 2 * COLUMN * diameter).spheres.positions
+    endless = spheres.endless
+    if len(centres) == 0:
+        nothing = np.array([[math.inf, -math.inf]] * 3)
+        nothing[endless] = -math.inf, math.inf
+        return BoxInBed(bounds, nothing, None)
     whole = _to_walls(np.column_stack([centres.min(axis=0), centres.max(axis=0)]), faces, diameter)
+    whole[endless] = -math.inf, math.inf
     # A column outside of the whole bed is empty: most of a box that is far too large goes at once.
     part = _cut(bounds, whole, diameter)
     for _ in range(MOST_CUTS):
         if (part[:, 0] >= part[:, 1]).any():
             break
         bed = np.array([_ends(centres, part, axis, faces, diameter) for axis in range(3)])
+        bed[endless] = -math.inf, math.inf
         widths = np.minimum(part[:, 1], bed[:, 1]) - np.maximum(part[:, 0], bed[:, 0])
         kept = widths / np.diff(part, axis=1)[:, 0]
         if (kept == 1).all():
@@ -101,17 +108,6 @@ def box_in_bed(
         axis = int(np.argmax(np.where(kept < 1, kept, -math.inf)))
         part[axis] = _cut(part, bed, diameter)[axis]
     return BoxInBed(bounds, whole, None)
-
-
-def _as_walls(walls: ArrayLike | None) -> FloatArray:
-    if walls is None:
-        return np.array([[-math.inf, math.inf]] * 3)
-    faces = as_floats(walls, "walls")
-    if faces.shape != (3, 2):
-        raise InputError(f"walls must have shape (3, 2), not {faces.shape}")
-    if np.isnan(faces).any():
-        raise InputError("walls must not be NaN")
-    return faces
 
 
 def _cut(box: FloatArray, bed: FloatArray, diameter: float) -> FloatArray:

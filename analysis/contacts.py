@@ -113,26 +113,37 @@ def _check(data: FloatArray, names: Sequence[str], header: FrameHeader, path: Pa
             | (np.abs(ids) >= LARGEST_ID).any(axis=1),
             "id1 must be a sphere's id and id2 a sphere's id or minus a wall's number",
         ),
-        (ids[:, 0] == ids[:, 1], "a sphere is in contact with itself"),
+        (
+            (ids[:, 0] == ids[:, 1]) & (not header.cell.has_images),
+            "a sphere is in contact with itself",
+        ),
         (
             np.full(len(data), len(names) == len(COLUMNS)) & (data[:, 9] <= 0),
             "the force of a contact must be positive",
         ),
         (data[:, len(COLUMNS) :].max(axis=1, initial=0.0) > 0, "stored must not be positive"),
-        (_repeated(ids), "this pair of spheres is listed twice"),
+        (_repeated(data, header), "this pair of spheres is listed twice"),
     ):
         if wrong.any():
             raise DumpError(path, message, header.first_row_line + int(np.argmax(wrong)))
 
 
-def _repeated(ids: FloatArray) -> BoolArray:
+def _repeated(data: FloatArray, header: FrameHeader) -> BoolArray:
     """Say which rows repeat an earlier pair of spheres, in either order.
 
     A pair counted once by each of two ranks would double the coordination number unseen. Walls are
-    left out: a sphere may touch one curved wall at several points.
+    left out: a sphere may touch one curved wall at several points. In a periodic box two spheres
+    may touch by several images, along different normals.
     """
-    between_spheres = np.flatnonzero(ids[:, 1] > 0)
-    _, first = np.unique(np.sort(ids[between_spheres], axis=1), axis=0, return_index=True)
-    repeated = np.zeros(len(ids), dtype=bool)
+    between_spheres = np.flatnonzero(data[:, 1] > 0)
+    pairs = np.sort(data[between_spheres, :2], axis=1)
+    if header.cell.has_images:
+        turned = data[between_spheres, 0] > data[between_spheres, 1]
+        normals = np.where(turned[:, None], -1, 1) * data[between_spheres, 5:8]
+        # Images that touch at all are much farther apart than this share of a radius; a normal of
+        # a contact that two ranks have seen differs by round-off.
+        pairs = np.column_stack([pairs, np.round(normals, 3)])
+    _, first = np.unique(pairs, axis=0, return_index=True)
+    repeated = np.zeros(len(data), dtype=bool)
     repeated[np.delete(between_spheres, first)] = True
     return repeated

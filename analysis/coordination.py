@@ -63,29 +63,34 @@ class CoordinationNumber:
 
 
 def contact_counts(
-    contact_ids: ArrayLike, sphere_ids: ArrayLike, particles: Particles | None = None
+    contact_ids: ArrayLike,
+    sphere_ids: ArrayLike,
+    particles: Particles | None = None,
+    *,
+    images: bool = False,
 ) -> ContactCounts:
     """Count every particle's contacts; a contact between two particles counts for both.
 
     Parameters
     ----------
-    contact_ids : (m, 2), spheres on both sides; the second is -k for wall k. Every pair of spheres
-        is there once at most, as in a `ContactFrame`
+    contact_ids : (m, 2), spheres on both sides; the second is -k for wall k. Every contact is there
+        once, as in a `ContactFrame`
     sphere_ids : (n,), ids of the spheres, in any order
     particles : which spheres make up which particle, in the order of `sphere_ids`; the result has
         the order of the particles. None: all spheres are free, and in the order of the result
+    images : whether the cell is periodic: then a particle may touch its own image, which counts
+        twice as both are the same particle, but makes no neighbour
 
     Raises InputError as `contact_sides` does.
     """
-    sides = contact_sides(contact_ids, sphere_ids, particles)
+    sides = contact_sides(contact_ids, sphere_ids, particles, images=images)
     count = number_of_particles(sphere_ids, particles)
     with_wall = sides[:, 1] < 0
     walls = np.bincount(sides[with_wall, 0], minlength=count)
     pairs = np.sort(sides[~with_wall], axis=1)
     between = np.bincount(pairs.ravel(), minlength=count)
-    if particles is None or not particles.composite:
-        return ContactCounts(between, between, walls)
-    touching = np.concatenate(np.divmod(np.unique(pairs @ [count, 1]), count))
+    others = pairs[pairs[:, 0] != pairs[:, 1]]
+    touching = np.concatenate(np.divmod(np.unique(others @ [count, 1]), count))
     return ContactCounts(between, np.bincount(touching, minlength=count), walls)
 
 
@@ -95,14 +100,18 @@ def number_of_particles(sphere_ids: ArrayLike, particles: Particles | None) -> i
 
 
 def contact_sides(
-    contact_ids: ArrayLike, sphere_ids: ArrayLike, particles: Particles | None = None
+    contact_ids: ArrayLike,
+    sphere_ids: ArrayLike,
+    particles: Particles | None = None,
+    *,
+    images: bool = False,
 ) -> IntArray:
     """Return the particles on both sides of every contact, (m, 2); -k stays for wall k.
 
     The parameters are those of `contact_counts`. Particles are indices, 0 to p - 1. Raises
     InputError for arrays of other shapes or numbers that are not whole, for ids that are there
-    twice, for a contact of an unknown sphere or of a sphere with itself, and for a contact within a
-    body.
+    twice, for a contact of an unknown sphere, and, where there are no images, for one of a sphere
+    with itself or within a body.
     """
     contacts = as_integers(contact_ids, "contact ids")
     ids = as_integers(sphere_ids, "sphere ids")
@@ -119,14 +128,14 @@ def contact_sides(
     sides = contacts.copy()
     sides[of_spheres] = _index_of(contacts[of_spheres], ids)
     alone = sides[:, 0] == sides[:, 1]
-    if alone.any():
+    if alone.any() and not images:
         raise InputError(f"sphere {contacts[alone][0, 0]} is in contact with itself")
     if particles is None or not particles.composite:
         return sides
     spheres = sides.copy()
     sides[of_spheres] = particles.index[sides[of_spheres]]
     within = sides[:, 0] == sides[:, 1]
-    if within.any():
+    if within.any() and not images:
         one, other = ids[spheres[within][0]]
         body = particles.bodies[sides[within][0, 0]]
         raise InputError(
@@ -144,7 +153,7 @@ def coordination_number(counts: Iterable[ArrayLike], chosen: ArrayLike) -> Coord
     Parameters
     ----------
     counts : one array (p,) per frame, such as `ContactCounts.particles`
-    chosen : (p,) of bool, such as the result of `particles_inside`
+    chosen : (p,) of bool, such as the result of `Spheres.particles_in`
 
     Raises InputError where no particle is chosen, no frame is there, or shapes differ.
     """

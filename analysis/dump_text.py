@@ -16,8 +16,8 @@ A frame is a header and then one line per row::
 
 LABEL is ATOMS in a dump custom and ENTRIES in a dump local, where `dump_modify label` may
 change it. Before 2011 LAMMPS wrote no flags. A box that may be tilted has `xy xz yz` before the
-flags and lines `<lower> <upper> <tilt>`, or `abc origin` and lines of an edge's three components
-and a component of the origin; it is read where it is not tilted.
+flags and lines `<lower> <upper> <tilt>`, whose bounds enclose the tilted box, or `abc origin` and
+lines of an edge's three components and a component of the origin.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .cell import Cell
 from .errors import CutOffError, DumpError, printable, shortened
 from .files import reason_of, regular
 from .geometry import FloatArray
@@ -58,7 +59,8 @@ class FrameHeader:
     step : time step
     label : what a row is: ATOMS in a dump custom
     rows : number of rows announced
-    box : (3, 2), lower and upper bound per axis, length
+    cell : the simulation box, in three dimensions; nothing is periodic where the header does not
+        say it
     boundaries : two letters per axis (f fixed, p periodic, s or m shrink-wrapped), lower then
         upper; None where the header does not say
     columns : names of the columns
@@ -68,7 +70,7 @@ class FrameHeader:
     step: int
     label: str
     rows: int
-    box: FloatArray
+    cell: Cell
     boundaries: tuple[str, str, str] | None
     columns: tuple[str, ...]
     first_row_line: int
@@ -131,7 +133,7 @@ def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | N
     if rows < 0:
         raise DumpError(path, f"{rows} rows announced", lines.number)
     lines.advance()
-    box, boundaries = _parsed_box(lines)
+    cell, boundaries = _parsed_box(lines)
     lines.advance()
     if lines.text.split()[:2] != ["ITEM:", label]:
         raise lines.expected(f"'ITEM: {shortened(label)}'")
@@ -139,7 +141,7 @@ def read_header(dump: Iterator[bytes], path: Path, line: int) -> FrameHeader | N
         step=step,
         label=label,
         rows=rows,
-        box=box,
+        cell=cell,
         boundaries=boundaries,
         columns=tuple(lines.text.split()[2:]),
         first_row_line=lines.number + 1,
@@ -215,8 +217,8 @@ class _Lines:
         return CutOffError(self.path, "the file ends inside this frame's header", self.number)
 
 
-def _parsed_box(lines: _Lines) -> tuple[FloatArray, tuple[str, str, str] | None]:
-    """Read the box, (3, 2), and its boundaries, from the line of its item to its last line."""
+def _parsed_box(lines: _Lines) -> tuple[Cell, tuple[str, str, str] | None]:
+    """Read the box and its boundaries from the line of its item to its last line."""
     item, number = lines.text, lines.number
     if not item.startswith("ITEM: BOX BOUNDS"):
         raise lines.expected("'ITEM: BOX BOUNDS'")
@@ -226,28 +228,46 @@ def _parsed_box(lines: _Lines) -> tuple[FloatArray, tuple[str, str, str] | None]
     flags = [word for word in words[2 if general else 0 :] if word not in ("xy", "xz", "yz")]
     if len(flags) not in (0, 3):
         raise lines.expected("two letters for each axis of the box, or none")
-    box, off = np.empty((3, 2)), 0.0
+    origin, vectors = np.zeros(3), np.zeros((3, 3))
+    bounds, tilts = np.zeros((3, 2)), np.zeros(3)
     for axis in range(3):
         lines.advance()
         if general:
-            *edge, origin = lines.numbers(4, "an edge of the box and a component of its origin")
-            box[axis] = origin, origin + edge[axis]
-            off = max(off, *(abs(edge[other]) for other in range(3) if other != axis))
+            *vectors[axis], origin[axis] = lines.numbers(
+                4, "an edge of the box and a component of its origin"
+            )
         elif tilted:
-            *box[axis], tilt = lines.numbers(3, "two bounds and a tilt")
-            off = max(off, abs(tilt))
+            *bounds[axis], tilts[axis] = lines.numbers(3, "two bounds and a tilt")
         else:
-            box[axis] = lines.numbers(2, "two bounds")
-        lower, upper = box[axis].tolist()
-        if not lower < upper and not off:
+            bounds[axis] = lines.numbers(2, "two bounds")
+        lower, upper = bounds[axis].tolist()
+        if not general and not lower < upper:
             raise DumpError(
                 lines.path, f"box bounds {lower:g} {upper:g} are not in order", lines.number
             )
-    if off:
-        raise DumpError(
-            lines.path, "the box is tilted or turned: it must be orthogonal, along the axes", number
-        )
-    return box, (flags[0], flags[1], flags[2]) if flags else None
+    boundaries = (flags[0], flags[1], flags[2]) if flags else None
+    periodic = ["p" in letters for letters in boundaries or ("", "", "")]
+    if not general and not tilts.any():
+        return Cell.of_box(bounds, periodic), boundaries
+    if not general:
+        origin, vectors = _tilted_box(bounds, *tilts.tolist())
+    if not np.linalg.det(vectors) > 0:
+        raise DumpError(lines.path, "the box has no volume, or its edges are left-handed", number)
+    return Cell(origin, vectors, periodic), boundaries
+
+
+def _tilted_box(
+    bounds: FloatArray, xy: float, xz: float, yz: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return origin and edges of a box whose tilts its bounds, (3, 2), enclose.
+
+    The formula is that of LAMMPS's manual, section Triclinic boxes.
+    """
+    (xlo, xhi), (ylo, yhi), (zlo, zhi) = bounds.tolist()
+    xlo, xhi = xlo - min(0.0, xy, xz, xy + xz), xhi - max(0.0, xy, xz, xy + xz)
+    ylo, yhi = ylo - min(0.0, yz), yhi - max(0.0, yz)
+    vectors = np.array([[xhi - xlo, 0, 0], [xy, yhi - ylo, 0], [xz, yz, zhi - zlo]])
+    return np.array([xlo, ylo, zlo]), vectors
 
 
 def read_rows(dump: Iterator[bytes], path: Path, header: FrameHeader) -> list[bytes]:

@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike
 from .contacts import ContactFrame
 from .coordination import contact_counts
 from .errors import InputError
-from .geometry import FloatArray, IntArray, as_box, as_floats, as_integers, particles_inside
+from .geometry import FloatArray, IntArray, as_box, as_floats, as_integers
 from .packing import packing_fraction
-from .particles import ParticleFrame, check_not_periodic
+from .particles import ParticleFrame
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Such a function measures the packing fraction of a frame in a box (3, 2).
-PackingFractionOf = Callable[[ParticleFrame, FloatArray], float]
+# Such a function measures the packing fraction of a frame in a box (3, 2), or in the whole cell.
+PackingFractionOf = Callable[[ParticleFrame, FloatArray | None], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,8 @@ class Evolution:
     packing_fraction : (k,), in the box
     coordination : (k,), mean number of contacts with other particles of those whose centres are in
         the box; NaN where no centre is, or where neither dump has contacts
-    height : (k,), of the centre of mass of all spheres along the axis up, length
+    height : (k,), of the centre of mass of all spheres along the axis up, length; NaN where the
+        cell is periodic along it
     kinetic_energy : (k,), of all spheres, over their mass, velocity^2; NaN without velocities
     """
 
@@ -69,20 +70,19 @@ def monte_carlo(points: int = 100_000, seed: int = 0) -> PackingFractionOf:
     points : number of random points, at least 1
     seed : of numpy's default generator, not negative; every call draws the same points
 
-    The function takes a frame and a box (3, 2), length, and raises InputError as
-    `packing_fraction` does.
+    The function takes a frame and a box (3, 2), length, None for the whole cell, and raises
+    InputError as `packing_fraction` does.
     """
 
-    def measure(frame: ParticleFrame, box: FloatArray) -> float:
-        found = packing_fraction(frame.positions, frame.radii, box, points=points, seed=seed)
-        return found.value
+    def measure(frame: ParticleFrame, box: FloatArray | None) -> float:
+        return packing_fraction(frame.spheres, box, points=points, seed=seed).value
 
     return measure
 
 
 def measure_evolution(
     frames: Iterable[ParticleFrame],
-    box: ArrayLike,
+    box: ArrayLike | None = None,
     *,
     contacts: Iterable[ContactFrame] = (),
     packing: PackingFractionOf | None = None,
@@ -97,15 +97,15 @@ def measure_evolution(
     Parameters
     ----------
     frames : such as a `ParticleDump`, in the order of their steps if there are contact frames
-    box : (3, 2), where the packing fraction and the coordination number are measured, length
+    box : (3, 2), where the packing fraction and the coordination number are measured, length;
+        None: the whole cell
     contacts : such as `iterate_contact_frames(path)`, in the order of their steps
     packing : measures the packing fraction; None: `monte_carlo()`
     up : axis against gravity, 0 to 2 for x to z
 
-    Raises InputError without any frame, for one whose box is periodic, for another axis, and for a
-    box of another shape.
+    Raises InputError without any frame, for another axis, and for a box of another shape.
     """
-    bounds = as_box(box)
+    bounds = None if box is None else as_box(box)
     if up not in (0, 1, 2):
         raise InputError(f"up must be the axis 0, 1 or 2, not {up}")
     measure = monte_carlo() if packing is None else packing
@@ -114,10 +114,11 @@ def measure_evolution(
     known = iter(contacts)
     current = next(known, None)
     for frame in frames:
-        check_not_periodic(frame)
         current = _not_before(frame.step, current, known)
+        # Discs are balls to LAMMPS, with masses as their volumes.
         mass = frame.radii**3
         mass /= mass.sum()
+        ends = not frame.spheres.endless[up]
         energy = math.nan
         if frame.velocities is not None:
             energy = float(mass @ (frame.velocities**2).sum(axis=1)) / 2
@@ -126,7 +127,7 @@ def measure_evolution(
             (
                 measure(frame, bounds),
                 _coordination(frame, current, bounds),
-                float(mass @ frame.positions[:, up]),
+                float(mass @ frame.positions[:, up]) if ends else math.nan,
                 energy,
             )
         )
@@ -212,14 +213,18 @@ def _not_before(
     return current
 
 
-def _coordination(frame: ParticleFrame, contacts: ContactFrame | None, box: FloatArray) -> float:
+def _coordination(
+    frame: ParticleFrame, contacts: ContactFrame | None, box: FloatArray | None
+) -> float:
     """Return the mean number of contacts of the particles in the box."""
     particles = frame.particles
     if contacts is not None and contacts.step == frame.step:
-        numbers = contact_counts(contacts.ids, frame.ids, particles).particles
+        numbers = contact_counts(
+            contacts.ids, frame.ids, particles, images=frame.cell.has_images
+        ).particles
     elif frame.contacts is not None:
         numbers = np.bincount(particles.index, weights=frame.contacts).astype(np.int64)
     else:
         return math.nan
-    inside = particles_inside(particles.centres(frame.positions), box)
+    inside = frame.spheres.particles_in(box)
     return float(numbers[inside].mean()) if inside.any() else math.nan

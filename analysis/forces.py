@@ -50,20 +50,22 @@ def contacts_of(
     particles: Particles | None = None,
     *,
     walls: bool = False,
+    images: bool = False,
 ) -> BoolArray:
     """Say which contacts have a chosen particle on at least one side, (m,).
 
     Parameters
     ----------
-    chosen : (p,) of bool, such as the result of `particles_inside`
+    chosen : (p,) of bool, such as the result of `Spheres.particles_in`
     contact_ids : (m, 2), as for `contact_counts`
     sphere_ids : (n,), ids of the spheres, in any order
     particles : which spheres make up which particle; None: all are free
     walls : whether contacts with walls are among them
+    images : whether the cell is periodic: then a particle may touch its own image
 
     Raises InputError as `contact_sides` does, and for a choice of another shape.
     """
-    sides = contact_sides(contact_ids, sphere_ids, particles)
+    sides = contact_sides(contact_ids, sphere_ids, particles, images=images)
     mask = np.asarray(chosen, dtype=np.bool_)
     count = number_of_particles(sphere_ids, particles)
     if mask.shape != (count,):

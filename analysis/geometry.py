@@ -85,23 +85,30 @@ def as_box(box: ArrayLike) -> FloatArray:
     return array
 
 
-def particles_inside(positions: ArrayLike, box: ArrayLike) -> BoolArray:
-    """Say which centres lie in a box, its faces included.
+def as_walls(walls: ArrayLike | None) -> FloatArray:
+    """Return the places of flat walls as a (3, 2) array, lower and upper per axis, length.
 
-    Parameters
-    ----------
-    positions : (n, 3), such as `Particles.centres`, length
-    box : (3, 2), length
-
-    Returns
-    -------
-    (n,) of bool
-
-    Raises InputError for arrays of other shapes.
+    A wall is infinite where there is none; None is no wall at all. Raises InputError for an array
+    of another shape, and for a lower wall that is not below the upper one, or NaN.
     """
-    centres, bounds = as_positions(positions), as_box(box)
-    inside: BoolArray = np.all((centres >= bounds[:, 0]) & (centres <= bounds[:, 1]), axis=1)
-    return inside
+    if walls is None:
+        return np.array([[-np.inf, np.inf]] * 3)
+    faces = as_floats(walls, "walls")
+    if faces.shape != (3, 2):
+        raise InputError(f"walls must have shape (3, 2), not {faces.shape}")
+    for axis, (lower, upper) in zip("xyz", faces, strict=True):
+        if not lower < upper:
+            raise InputError(f"walls: {axis}lo = {lower:g} must be less than {axis}hi = {upper:g}")
+    return faces
+
+
+def inside_of(positions: FloatArray, box: FloatArray, *, flat: bool = False) -> BoolArray:
+    """Say which positions, (n, 3), lie in a box, (3, 2), its faces included; flat ones at any z."""
+    inside = (positions >= box[:, 0]) & (positions <= box[:, 1])
+    if flat:
+        inside[:, 2] = True
+    found: BoolArray = np.all(inside, axis=1)
+    return found
 
 
 def spheres_reaching(positions: FloatArray, radii: FloatArray, box: FloatArray) -> BoolArray:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from .bed import BoxInBed, box_in_bed
-from .bodies import Particles
 from .coordination import ContactCounts, CoordinationNumber, coordination_number
-from .geometry import BoolArray, FloatArray, as_box, particles_inside
+from .geometry import BoolArray, as_box
 from .orientation import Orientation, dimer_orientation
 from .overlaps import PairOverlap, WallOverlap, largest_pair_overlap, largest_wall_overlap
 from .packing import MeasuredPackingFraction, measure_packing_fraction
-from .particles import ParticleFrame, check_not_periodic
+from .particles import ParticleFrame
+from .spheres import Spheres
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +51,7 @@ class PackingMeasurement:
 def measure_packing(
     frame: ParticleFrame,
     counts: Sequence[ContactCounts],
-    box: ArrayLike,
+    box: ArrayLike | None = None,
     *,
     points: int = 1_000_000,
     seed: int = 0,
@@ -64,18 +63,19 @@ def measure_packing(
     ----------
     frame : particles of the packing
     counts : contacts of each particle in every contact frame; empty where contacts are not counted
-    box : (3, 2), lower and upper bound per axis, length
+    box : (3, 2), lower and upper bound per axis, length; None: the whole simulation cell
     points : number of random points for the packing fraction, at least 1
     seed : seed of these points, not negative
-    walls : (3, 2), box whose faces are walls, length; None where the walls are not known
+    walls : (3, 2), box whose faces are walls, infinite where there is none, length; None where the
+        walls are not known
 
-    Raises InputError for a frame whose box is periodic, for boxes or counts of other shapes, and
-    for points or a seed that are no whole numbers or too small.
+    Raises InputError for boxes or counts of other shapes, and for points or a seed that are no
+    whole numbers or too small.
     """
-    check_not_periodic(frame)
-    bounds, particles = as_box(box), frame.particles
-    in_box = particles_inside(particles.centres(frame.positions), bounds)
-    spheres = frame.positions, frame.radii
+    bounds = None if box is None else as_box(box)
+    spheres = frame.spheres
+    in_box = spheres.particles_in(bounds)
+    faces = frame.walls if walls is None else walls
     counted = bool(len(counts)) and bool(in_box.any())
 
     def mean_of(numbers: Sequence[ArrayLike]) -> CoordinationNumber | None:
@@ -83,34 +83,20 @@ def measure_packing(
 
     return PackingMeasurement(
         in_box=in_box,
-        bed=box_in_bed(*spheres, bounds, _faces(frame) if walls is None else walls),
-        packing_fraction=measure_packing_fraction(
-            *spheres, bounds, particles, points=points, seed=seed
-        ),
+        bed=box_in_bed(spheres, frame.box if bounds is None else bounds, faces),
+        packing_fraction=measure_packing_fraction(spheres, bounds, points=points, seed=seed),
         coordination=mean_of([count.particles for count in counts]),
         neighbours=mean_of([count.neighbours for count in counts]),
         wall_contacts=mean_of([count.walls for count in counts]),
-        orientation=_orientation(frame, particles, in_box, bounds),
-        pair_overlap=largest_pair_overlap(*spheres, frame.bodies),
-        wall_overlap=None if walls is None else largest_wall_overlap(*spheres, walls),
+        orientation=_orientation(spheres, in_box, box),
+        pair_overlap=largest_pair_overlap(spheres),
+        wall_overlap=None if walls is None else largest_wall_overlap(spheres, walls),
     )
 
 
-def _faces(frame: ParticleFrame) -> FloatArray:
-    """Return the faces of a frame's box that are fixed, (3, 2), length; infinite for the others.
-
-    Where a dump does not tell its boundaries none is known to be a wall.
-    """
-    if frame.boundaries is None:
-        return np.array([[-np.inf, np.inf]] * 3)
-    fixed = np.array([[flag == "f" for flag in flags] for flags in frame.boundaries])
-    return np.where(fixed, frame.box, [-np.inf, np.inf])
-
-
-def _orientation(
-    frame: ParticleFrame, particles: Particles, in_box: BoolArray, box: FloatArray
-) -> Orientation | None:
+def _orientation(spheres: Spheres, in_box: BoolArray, box: ArrayLike | None) -> Orientation | None:
+    particles = spheres.particles
     is_body = particles.bodies > 0
     if not (particles.sizes[is_body] == 2).all() or not (is_body & in_box).any():
         return None
-    return dimer_orientation(frame.positions, particles, box)
+    return dimer_orientation(spheres, box)

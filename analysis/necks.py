@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 from scipy.special import spherical_jn
 
-from .bodies import Particles, dimer_spheres
+from .bodies import dimer_spheres
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray
-from .packing import Cover, PackingFraction, as_measurable_by_points, share_of_points
-from .volumes import require_dimers
+from .packing import Cover, PackingFraction, Region, as_points
+from .spheres import Spheres
+from .volumes import require_balls, require_dimers
 
 # Positions in a dump are rounded: two spheres that touch may seem apart by this share of a radius,
 # and two equal radii may differ by it.
@@ -64,10 +65,8 @@ def neck_volume(radius: float, distance: float) -> float:
 
 
 def packing_fraction_with_necks(
-    positions: ArrayLike,
-    radii: ArrayLike,
-    box: ArrayLike,
-    particles: Particles,
+    spheres: Spheres,
+    box: ArrayLike | None = None,
     *,
     points: int = 1_000_000,
     seed: int = 0,
@@ -76,24 +75,28 @@ def packing_fraction_with_necks(
 
     Overlaps, also of necks, count once. Free spheres have no neck; bodies of three or more spheres
     and dimers of unequal spheres are refused. With the same seed, the points are those of
-    `packing_fraction`. Nothing is periodic.
+    `packing_fraction`.
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
-    box : (3, 2), lower and upper bound per axis, length
-    particles : which spheres make up which particle
+    spheres : the spheres, the particles that they make up, and their cell
+    box : (3, 2), lower and upper bound per axis, length; None: the whole cell
     points : number of random points, at least 1
     seed : of numpy's default generator, not negative
 
-    Raises InputError for arrays of other shapes, for points or a seed that are not such whole
-    numbers, and for bodies without a neck.
+    Raises InputError for a box of another shape, for points or a seed that are not such whole
+    numbers, for bodies without a neck, for discs, and for too many images.
     """
-    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points, seed)
-    one, other = _dimers_with_necks(centres, radius, particles)
-    cover = Cover(centres, radius)
-    necks = _Necks(centres, radius, one, other)
+    as_points(points, seed)
+    require_balls(spheres)
+    region = Region(spheres, box)
+    _dimers_with_necks(spheres)
+    # A neck lies within a radius of the middle of its dimer, so within the dimer's own extent.
+    copies = region.around(0.0)
+    if len(copies) == 0:
+        return PackingFraction(0.0, 0.0, points)
+    cover = Cover(copies.positions, copies.radii)
+    necks = _Necks(copies.positions, copies.radii, *_dimers_with_necks(copies))
 
     def holds(drawn: FloatArray) -> BoolArray:
         inside = cover.holds(drawn)
@@ -101,17 +104,15 @@ def packing_fraction_with_necks(
         inside[left] = necks.hold(drawn[left])
         return inside
 
-    return share_of_points(holds, bounds, points, seed)
+    return region.share_of_points(holds, points, seed)
 
 
-def _dimers_with_necks(
-    centres: FloatArray, radii: FloatArray, particles: Particles
-) -> tuple[IntArray, IntArray]:
+def _dimers_with_necks(spheres: Spheres) -> tuple[IntArray, IntArray]:
     """Return the indices of the first and of the second sphere of each dimer, both (k,).
 
     Raises InputError where a body has no neck that is known.
     """
-    particles.checked(centres)
+    centres, radii, particles = spheres.positions, spheres.radii, spheres.particles
     require_dimers(particles)
     one, other = dimer_spheres(particles)
     unequal = np.flatnonzero(abs(radii[one] - radii[other]) > TOLERANCE * radii[one])

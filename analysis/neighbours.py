@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
-from .bodies import Particles
 from .errors import InputError
-from .geometry import FloatArray, IntArray, as_box, as_integers, as_spheres
+from .geometry import BoolArray, FloatArray, IntArray, as_integers, as_walls
+from .spheres import Spheres
 
 # One reach for all spheres is the fastest up to this ratio of the largest to the smallest radius.
 SIMILAR_RADII = 1.5
@@ -30,6 +30,7 @@ class DistanceContacts:
     ----------
     sides : (m, 2), indices of the spheres on both sides; the second is -k for wall k, k >= 1.
         These are contact ids if the spheres' ids are 0 to n - 1
+    images : (m, 3), by how many periods of the cell the second sphere is moved; 0 for a wall
     points : (m, 3), in the middle of the gap between two spheres, on the wall for a wall, length
     normals : (m, 3), unit vector from side 2 to side 1
     gaps : (m,), negative where the two overlap, length
@@ -37,6 +38,7 @@ class DistanceContacts:
     """
 
     sides: IntArray
+    images: IntArray
     points: FloatArray
     normals: FloatArray
     gaps: FloatArray
@@ -63,59 +65,137 @@ class DistanceContacts:
 
 
 def contacts_by_distance(
-    positions: ArrayLike,
-    radii: ArrayLike,
-    criterion: float,
-    particles: Particles | None = None,
-    walls: ArrayLike | None = None,
+    spheres: Spheres, criterion: float, walls: ArrayLike | None = None
 ) -> DistanceContacts:
-    """Find the contacts of spheres whose gaps are below a criterion. Nothing is periodic.
+    """Find the contacts of spheres whose gaps are below a criterion, across periodic faces too.
 
-    Spheres of one body never touch each other. Contacts between spheres come first, ordered by
-    their sides.
+    Spheres of one body never touch each other, but may touch an image of their body; a sphere may
+    touch several images of another. Contacts between spheres come first, ordered by their sides.
 
     Parameters
     ----------
-    positions : (n, 3), length
-    radii : (n,), length; they may differ
+    spheres : the spheres, the particles that they make up, and their cell
     criterion : two touch where |x_i - x_j| - r_i - r_j is below this, and a sphere and a wall
         likewise, length; 0: only what overlaps touches
-    particles : which spheres make up which particle; None: all spheres are free
     walls : (3, 2), a box around the spheres: its faces xlo, xhi, ylo, ... are the walls 1 to 6,
-        length; None: no walls
+        infinite where there is none, length; None: no walls
 
-    Raises InputError for arrays of other shapes, for a criterion that is negative or not finite,
+    Raises InputError for a criterion that is negative or not finite, for walls of another shape,
     and for two centres in one place.
     """
-    centres, radius = as_spheres(positions, radii)
     if not (criterion >= 0 and math.isfinite(criterion)):
         raise InputError(f"the gap of a contact must not be negative, and finite: {criterion:g}")
-    pairs = near_pairs(centres, radius, criterion)
-    if particles is not None:
-        particles.checked(centres)
-        owner = particles.index
-        pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
-    apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]
+    centres, radius = spheres.positions, spheres.radii
+    near = near_pairs(spheres, criterion)
+    apart = near.apart(spheres)
     distance = np.linalg.norm(apart, axis=1)
-    gaps = distance - radius[pairs].sum(axis=1)
-    touch = gaps < criterion
-    pairs, apart, distance, gaps = pairs[touch], apart[touch], distance[touch], gaps[touch]
+    gaps = distance - (radius[near.first] + radius[near.second])
+    touch = (gaps < criterion) & near.between_particles(spheres)
+    near, apart, distance, gaps = near[touch], apart[touch], distance[touch], gaps[touch]
     if (distance == 0).any():
-        one, other = pairs[int(np.argmin(distance))]
-        raise InputError(f"the centres {one} and {other} are the same: there is no normal")
-    normals = apart / distance[:, None]
-    points = centres[pairs[:, 1]] + (radius[pairs[:, 1]] + gaps / 2)[:, None] * normals
-    if walls is not None:
-        at_walls = _wall_contacts(centres, radius, criterion, as_box(walls))
-        pairs, points, normals, gaps = (
-            np.concatenate(both)
-            for both in zip((pairs, points, normals, gaps), at_walls, strict=True)
+        closest = int(np.argmin(distance))
+        raise InputError(
+            f"the centres {near.first[closest]} and {near.second[closest]} are the same: there is "
+            "no normal"
         )
-    return DistanceContacts(pairs, points, normals, gaps, float(criterion))
+    normals = apart / distance[:, None]
+    other = near.places(spheres)
+    points = other + (radius[near.second] + gaps / 2)[:, None] * normals
+    sides, images = np.column_stack([near.first, near.second]), near.images
+    if walls is not None:
+        at_walls = _wall_contacts(centres, radius, criterion, as_walls(walls))
+        images = np.concatenate([images, np.zeros((len(at_walls[0]), 3), dtype=np.int64)])
+        sides, points, normals, gaps = (
+            np.concatenate(both)
+            for both in zip((sides, points, normals, gaps), at_walls, strict=True)
+        )
+    return DistanceContacts(sides, images, points, normals, gaps, float(criterion))
 
 
-def near_pairs(centres: FloatArray, radii: FloatArray, gap: float) -> IntArray:
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs of spheres that are near each other, each once, in ascending order.
+
+    Attributes
+    ----------
+    first, second : (m,), indices of both spheres, first <= second; the same for a sphere and its
+        own image
+    images : (m, 3), by how many periods of the cell the second sphere is moved
+    """
+
+    first: IntArray
+    second: IntArray
+    images: IntArray
+
+    def __len__(self) -> int:
+        """Return the number of pairs."""
+        return len(self.first)
+
+    def __getitem__(self, rows: IntArray | BoolArray) -> Pairs:
+        """Return some of the pairs."""
+        return Pairs(self.first[rows], self.second[rows], self.images[rows])
+
+    def places(self, spheres: Spheres) -> FloatArray:
+        """Return where the second sphere of each pair is, (m, 3), length."""
+        places = spheres.positions[self.second]
+        if spheres.cell is None or not spheres.has_images:
+            return places
+        moved: FloatArray = places + self.images @ spheres.cell.vectors
+        return moved
+
+    def apart(self, spheres: Spheres) -> FloatArray:
+        """Return the first centre less the second one of each pair, (m, 3), length."""
+        difference: FloatArray = spheres.positions[self.first] - self.places(spheres)
+        return difference
+
+    def between_particles(self, spheres: Spheres) -> BoolArray:
+        """Say which pairs are of two particles, or of a particle and its own image, (m,)."""
+        owner = spheres.particles.index
+        apart: BoolArray = (owner[self.first] != owner[self.second]) | self.images.any(axis=1)
+        return apart
+
+
+def near_pairs(spheres: Spheres, gap: float) -> Pairs:
+    """Return all pairs of spheres whose gap is at most `gap` >= 0, and some others.
+
+    Two spheres may be a pair by several images of the second; each is there once.
+
+    Parameters
+    ----------
+    spheres : the spheres; those of one particle make pairs, too
+    gap : length
+
+    Raises InputError for too many images.
+    """
+    cell, centres, radii = spheres.cell, spheres.positions, spheres.radii
+    count = len(centres)
+    if cell is None or not cell.has_images:
+        one, other = pairs_among(centres, radii, gap).T
+        return Pairs(one, other, np.zeros((len(one), 3), dtype=np.int64))
+    inside = cell.wrapped(centres)
+    # By how many periods each sphere was moved into the cell.
+    home = np.rint((inside - centres) @ np.linalg.inv(cell.vectors)).astype(np.int64)
+    owner, moves = cell.images_near_cell(inside, radii + float(radii.max()) + gap)
+    everywhere = np.concatenate([inside, inside[owner] + moves @ cell.vectors])
+    owner = np.concatenate([np.arange(count), owner])
+    moves = np.concatenate([np.zeros((count, 3), dtype=np.int64), moves])
+    near = pairs_among(everywhere, radii[owner], gap)
+    # The first is in its own place now: images among themselves are pairs a period away.
+    near = near[near[:, 0] < count]
+    one, other, images = near[:, 0], owner[near[:, 1]], moves[near[:, 1]]
+    # A pair across a face is found from both sides, a sphere and its own image twice as well.
+    sign = np.sign(images[np.arange(len(images)), np.argmax(images != 0, axis=1)])
+    once = (one < other) | ((one == other) & (sign > 0))
+    one, other, images = one[once], other[once], images[once]
+    images = images + home[other] - home[one]
+    order = np.lexsort((images[:, 2], images[:, 1], images[:, 0], other, one))
+    return Pairs(one[order], other[order], images[order])
+
+
+def pairs_among(centres: FloatArray, radii: FloatArray, gap: float) -> IntArray:
     """Return all pairs of spheres whose gap is at most `gap` >= 0, and some others, (m, 2).
+
+    Nothing is periodic.
 
     A pair is a row of indices (i, j) with i < j; each is there once, in ascending order.
     """

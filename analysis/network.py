@@ -9,10 +9,11 @@ import networkx
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .bodies import Particles, group_spheres
+from .contact_lines import ContactLines, contact_lines
 from .coordination import contact_sides
 from .errors import InputError
-from .geometry import FloatArray, as_floats, as_integers, as_positions
+from .geometry import FloatArray, IntArray, as_floats, as_integers, as_positions
+from .spheres import Spheres
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,10 +90,10 @@ def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], 
 def contact_graph(
     contact_ids: ArrayLike,
     sphere_ids: ArrayLike,
-    positions: ArrayLike,
+    spheres: Spheres,
     forces: ArrayLike | None = None,
-    particles: Particles | None = None,
     *,
+    points: ArrayLike | None = None,
     walls: bool = False,
 ) -> networkx.Graph:
     """Make the graph whose nodes are particles and whose edges join neighbours.
@@ -102,21 +103,25 @@ def contact_graph(
     contacts between the two, and `force`, the sum of their strengths. networkx does the rest:
     `networkx.connected_components(graph)`, `networkx.has_path(graph, -3, i)`.
 
+    In a periodic cell two particles may touch by several images of the second, or one its own
+    image. With the contact points the graph is a `networkx.MultiGraph`: it has an edge for each
+    image, and an edge's `vector` leads from the particle of the lower number to that image of the
+    other (three floats). A path that comes back to a particle may have gone around the cell.
+
     Parameters
     ----------
     contact_ids : (m, 2), as for `contact_counts`
-    sphere_ids : (n,), ids of the spheres, in any order
-    positions : (n, 3), of the spheres, in the order of `sphere_ids`, length
+    sphere_ids : (n,), ids of the spheres, in their order
+    spheres : the spheres, the particles that they make up, and their cell
     forces : (m,), strength of each contact, force; None: unknown, edges have no `force`
-    particles : which spheres make up which particle; None: all are free
+    points : (m, 3), contact points, length; they matter in a periodic cell only, and only for where
+        edges are drawn
     walls : whether walls are nodes too; else contacts with walls are left out
 
     Raises InputError as `contact_sides` does, and for forces of another shape or not finite.
     """
-    sides = contact_sides(contact_ids, sphere_ids, particles)
-    if particles is None:
-        particles = group_spheres(np.zeros(len(np.asarray(sphere_ids)), dtype=np.int64))
-    centres = particles.centres(positions)
+    sides = contact_sides(contact_ids, sphere_ids, spheres.particles, images=spheres.has_images)
+    centres = spheres.centres
     strength = None if forces is None else as_floats(forces, "forces")
     if strength is not None and strength.shape != (len(sides),):
         raise InputError(f"forces must have shape ({len(sides)},), not {strength.shape}")
@@ -124,22 +129,54 @@ def contact_graph(
         raise InputError("forces hold NaN or infinity")
     wanted = np.full(len(sides), True) if walls else sides[:, 1] >= 0
 
-    graph = networkx.Graph()
+    graph: networkx.Graph = networkx.Graph()
+    lines = None
+    if points is not None and spheres.has_images:
+        graph = networkx.MultiGraph()
+        lines = contact_lines(contact_ids, sphere_ids, spheres, points)
     graph.add_nodes_from(
         (index, {"position": (x, y, z)}) for index, (x, y, z) in enumerate(centres.tolist())
     )
-    pairs, edge = np.unique(np.sort(sides[wanted], axis=1), axis=0, return_inverse=True)
-    data: dict[str, list[Any]] = {"contacts": np.bincount(edge, minlength=len(pairs)).tolist()}
+    # An edge is named by its two particles and, where there are several, by the image.
+    ends = np.sort(sides[wanted], axis=1)
+    names = ends if lines is None else np.column_stack([ends, _upwards(sides, lines)[wanted]])
+    edges, edge = np.unique(names, axis=0, return_inverse=True)
+    edge = edge.ravel()
+    data: dict[str, list[Any]] = {"contacts": np.bincount(edge, minlength=len(edges)).tolist()}
     if strength is not None:
-        sums = np.bincount(edge, weights=strength[wanted], minlength=len(pairs))
+        sums = np.bincount(edge, weights=strength[wanted], minlength=len(edges))
         data["force"] = sums.tolist()
+    if lines is not None:
+        assert spheres.cell is not None
+        # A wall has no place: the line to it is that of no edge that is drawn.
+        low = np.maximum(edges[:, 0], 0)
+        along = centres[edges[:, 1]] - centres[low] + edges[:, 2:] @ spheres.cell.vectors
+        data["vector"] = [(x, y, z) for x, y, z in along.tolist()]
     graph.add_edges_from(
         (one, other, dict(zip(data, values, strict=True)))
         for (one, other), values in zip(
-            pairs.tolist(), zip(*data.values(), strict=True), strict=True
+            edges[:, :2].tolist(), zip(*data.values(), strict=True), strict=True
         )
     )
     return graph
+
+
+def _upwards(sides: IntArray, lines: ContactLines) -> IntArray:
+    """Return by how many periods the particle of the higher number is moved, (m, 3).
+
+    For a particle and its own image it is the one of the two moves whose first period is positive.
+
+    Parameters
+    ----------
+    sides : (m, 2), particles on both sides of the contacts
+    lines : the lines of the contacts
+    """
+    first = np.take_along_axis(lines.images, np.argmax(lines.images != 0, axis=1)[:, None], axis=1)[
+        :, 0
+    ]
+    turned = (sides[:, 0] > sides[:, 1]) | ((sides[:, 0] == sides[:, 1]) & (first < 0))
+    moves: IntArray = np.where(turned[:, None], -lines.images, lines.images)
+    return moves
 
 
 def draw_network(
@@ -154,7 +191,8 @@ def draw_network(
 ) -> Axes:
     """Draw the edges between particles as lines between their centres; walls are not drawn.
 
-    Thickness and colour grow with the force, up to four times the mean strength of a force.
+    An edge across a periodic face is drawn twice, from each of its particles to the image of the
+    other. Thickness and colour grow with the force, up to four times the mean strength of a force.
     Contacts that pull are dashed. Without forces all lines look alike.
 
     Parameters
@@ -165,7 +203,7 @@ def draw_network(
     across : axis that runs to the right on flat axes, other than `up`
     lower_half : only edges whose particles are both in the lower half of the packing's height, as
         in the paper
-    slab : only edges whose particles both have their centres between these two places along the
+    slab : only lines whose ends both have their places between these two places along the
         third axis, so that one can look into the packing
     palette : name of a colour map of matplotlib
 
@@ -229,16 +267,25 @@ def _edges(graph: networkx.Graph, lower_half: int | None) -> tuple[FloatArray, F
         (one, other, data) for one, other, data in graph.edges(data=True) if min(one, other) >= 0
     ]
     pairs = np.array([(place[one], place[other]) for one, other, _ in edges], dtype=np.int64)
-    pairs = pairs.reshape(-1, 2)
+    pairs = np.sort(pairs.reshape(-1, 2), axis=1)
+    lines = centres[pairs]
     force: FloatArray | None = None
     if edges and all("force" in data for *_, data in edges):
         force = np.array([data["force"] for *_, data in edges], dtype=np.float64)
+    if edges and all("vector" in data for *_, data in edges):
+        along = np.array([data["vector"] for *_, data in edges], dtype=np.float64)
+        from_other = lines[:, 1] - along
+        # Both lines of an edge are one unless it crosses a face.
+        crosses = np.abs(from_other - lines[:, 0]).max(axis=1) > 1e-6 * np.abs(along).max(axis=1)
+        second = np.stack([from_other, lines[:, 1]], axis=1)[crosses]
+        lines = np.concatenate([np.stack([lines[:, 0], lines[:, 0] + along], axis=1), second])
+        force = None if force is None else np.concatenate([force, force[crosses]])
     if lower_half is not None:
         height = centres[:, lower_half]
-        below = height <= (height.min() + height.max()) / 2
-        shown = below[pairs].all(axis=1)
-        pairs, force = pairs[shown], None if force is None else force[shown]
-    return centres[pairs], force
+        middle = (height.min() + height.max()) / 2
+        shown = (lines[..., lower_half] <= middle).all(axis=1)
+        lines, force = lines[shown], None if force is None else force[shown]
+    return lines, force
 
 
 def _add_lines(ax: Axes, lines: FloatArray, share: FloatArray, **style: Any) -> None:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .bodies import Particles, dimer_spheres
+from .bodies import dimer_spheres
 from .errors import InputError
-from .geometry import FloatArray, particles_inside
+from .geometry import FloatArray
+from .spheres import Spheres
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class Orientation:
         return math.sqrt(float((self.components**2).mean()))
 
 
-def dimer_orientation(positions: ArrayLike, particles: Particles, box: ArrayLike) -> Orientation:
+def dimer_orientation(spheres: Spheres, box: ArrayLike | None = None) -> Orientation:
     """Measure the orientation of the dimers whose centres lie in a box.
 
     A component is a = sqrt(<d^2>): d is the difference of the coordinates of a dimer's two spheres,
@@ -52,13 +53,12 @@ def dimer_orientation(positions: ArrayLike, particles: Particles, box: ArrayLike
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    particles : which spheres make up which particle
-    box : (3, 2), lower and upper bound per axis, length
+    spheres : the spheres, the particles that they make up, and their cell
+    box : (3, 2), lower and upper bound per axis, length; None: all dimers
 
     Raises InputError for a body that is no dimer, and for a box without a dimer's centre.
     """
-    spheres = particles.checked(positions)
+    particles = spheres.particles
     is_body = particles.bodies > 0
     wrong = np.flatnonzero(is_body & (particles.sizes != 2))
     if len(wrong):
@@ -66,14 +66,14 @@ def dimer_orientation(positions: ArrayLike, particles: Particles, box: ArrayLike
             "only dimers have an orientation: the number of spheres in body "
             f"{particles.bodies[wrong[0]]} is {particles.sizes[wrong[0]]}, not 2"
         )
-    chosen = is_body & particles_inside(particles.centres(spheres), box)
+    chosen = is_body & spheres.particles_in(box)
     dimers = int(chosen.sum())
     if dimers == 0:
         raise InputError("no dimer's centre lies in the box: the mean over none does not exist")
 
     one, other = dimer_spheres(particles)
     inside = chosen[particles.index[one]]
-    squares = (spheres[one[inside]] - spheres[other[inside]]) ** 2
+    squares = (spheres.positions[one[inside]] - spheres.positions[other[inside]]) ** 2
     components = np.sqrt(squares.mean(axis=0))
     errors: FloatArray | None = None
     if dimers > 1:

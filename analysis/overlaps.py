@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import InputError
-from .geometry import as_box, as_integers, as_spheres
+from .geometry import as_walls
 from .neighbours import near_pairs
+from .spheres import Spheres
 
 FACES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
@@ -24,7 +24,7 @@ class PairOverlap:
     Attributes
     ----------
     depth : r_i + r_j - |x_i - x_j| > 0, length; 0 if no two spheres overlap
-    pair : indices (i, j) with i < j, or None
+    pair : indices (i, j) with i < j, or None; i = j for a sphere and its own image
     """
 
     depth: float
@@ -47,52 +47,39 @@ class WallOverlap:
     face: str | None
 
 
-def largest_pair_overlap(
-    positions: ArrayLike, radii: ArrayLike, bodies: ArrayLike | None = None
-) -> PairOverlap:
-    """Find the two spheres that overlap most. Nothing is periodic.
+def largest_pair_overlap(spheres: Spheres) -> PairOverlap:
+    """Find the two spheres of different particles that overlap most, across periodic faces too.
 
     Parameters
     ----------
-    positions : (n, 3), length
-    radii : (n,), length
-    bodies : (n,), body of each sphere, 0 for none; spheres of one body may overlap freely
+    spheres : the spheres, the particles that they make up, and their cell: spheres of one body may
+        overlap freely, but not with an image of their body
 
-    Raises InputError for arrays of other shapes.
+    Raises InputError for too many images.
     """
-    centres, radius = as_spheres(positions, radii)
-    count = len(radius)
-    first, second = near_pairs(centres, radius, 0.0).T
-    if bodies is not None:
-        body = as_integers(bodies, "bodies")
-        if body.shape != (count,):
-            raise InputError(f"bodies must have shape ({count},), not {body.shape}")
-        free = (body[first] != body[second]) | (body[first] == 0)
-        first, second = first[free], second[free]
-    distance = np.linalg.norm(centres[first] - centres[second], axis=1)
-    depth = radius[first] + radius[second] - distance
+    near = near_pairs(spheres, 0.0)
+    near = near[near.between_particles(spheres)]
+    distance = np.linalg.norm(near.apart(spheres), axis=1)
+    depth = spheres.radii[near.first] + spheres.radii[near.second] - distance
     if len(depth) == 0 or depth.max() <= 0:
         return PairOverlap(0.0, None)
     deepest = np.argmax(depth)
-    return PairOverlap(float(depth[deepest]), (int(first[deepest]), int(second[deepest])))
+    return PairOverlap(float(depth[deepest]), (int(near.first[deepest]), int(near.second[deepest])))
 
 
-def largest_wall_overlap(
-    positions: ArrayLike, radii: ArrayLike, container: ArrayLike
-) -> WallOverlap:
-    """Find the sphere that overlaps most with one of the six planes that bound a container.
+def largest_wall_overlap(spheres: Spheres, container: ArrayLike) -> WallOverlap:
+    """Find the sphere that overlaps most with one of the planes that bound a container.
 
     Parameters
     ----------
-    positions : (n, 3), length
-    radii : (n,), length
-    container : (3, 2), lower and upper plane per axis, length; the spheres belong between them
+    spheres : the spheres
+    container : (3, 2), lower and upper plane per axis, infinite where there is none, length; the
+        spheres belong between them
 
-    Raises InputError for arrays of other shapes.
+    Raises InputError for an array of another shape.
     """
-    centres, radius = as_spheres(positions, radii)
-    planes = as_box(container)
-    size = radius[:, None]
+    planes = as_walls(container)
+    centres, size = spheres.positions, spheres.radii[:, None]
     # The depths have the shape (n, 3, 2); the last two axes run in the order of FACES.
     depth = np.stack([size - (centres - planes[:, 0]), size - (planes[:, 1] - centres)], axis=2)
     particle, face = divmod(int(np.argmax(depth)), len(FACES))

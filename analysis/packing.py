@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
-from .bodies import Particles
-from .geometry import BoolArray, FloatArray, as_box, as_count, as_spheres, spheres_reaching
-from .neighbours import near_pairs
+from .areas import areas_in
+from .errors import InputError
+from .geometry import BoolArray, FloatArray, as_box, as_count, spheres_reaching
+from .neighbours import near_pairs, pairs_among
+from .spheres import Spheres
 from .volumes import Pieces, pieces_of, split
 
 # Points are drawn in batches: the memory stays small, however many are asked for.
@@ -70,42 +72,28 @@ class MeasuredPackingFraction:
 
 
 def measure_packing_fraction(
-    positions: ArrayLike,
-    radii: ArrayLike,
-    box: ArrayLike,
-    particles: Particles,
-    *,
-    points: int = 1_000_000,
-    seed: int = 0,
+    spheres: Spheres, box: ArrayLike | None = None, *, points: int = 1_000_000, seed: int = 0
 ) -> MeasuredPackingFraction:
     """Measure the packing fraction in a box, exactly where that is possible, and by random points.
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
-    box : (3, 2), lower and upper bound per axis, length
-    particles : which spheres make up which particle
+    spheres : the spheres, the particles that they make up, and their cell
+    box : (3, 2), lower and upper bound per axis, length; None: the whole cell
     points : number of random points, at least 1
     seed : of numpy's default generator, not negative
 
-    Raises InputError for arrays of other shapes, and as `packing_fraction` does.
+    Raises InputError as `packing_fraction` does.
     """
-    drawn = packing_fraction(positions, radii, box, points=points, seed=seed)
-    if not particles.exactly_measurable:
+    drawn = packing_fraction(spheres, box, points=points, seed=seed)
+    if not spheres.particles.exactly_measurable:
         return MeasuredPackingFraction(drawn.value, None, drawn)
-    exact = exact_packing_fraction(positions, radii, box, particles)
+    exact = exact_packing_fraction(spheres, box)
     return MeasuredPackingFraction(exact.value, exact, drawn)
 
 
 def best_packing_fraction(
-    positions: ArrayLike,
-    radii: ArrayLike,
-    box: ArrayLike,
-    particles: Particles,
-    *,
-    points: int = 1_000_000,
-    seed: int = 0,
+    spheres: Spheres, box: ArrayLike | None = None, *, points: int = 1_000_000, seed: int = 0
 ) -> float:
     """Return the packing fraction in a box: exact where that is possible, else by random points.
 
@@ -113,130 +101,179 @@ def best_packing_fraction(
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
-    box : (3, 2), lower and upper bound per axis, length
-    particles : which spheres make up which particle
+    spheres : the spheres, the particles that they make up, and their cell
+    box : (3, 2), lower and upper bound per axis, length; None: the whole cell
     points : number of random points, at least 1
     seed : of numpy's default generator, not negative
 
-    Raises InputError for arrays of other shapes, and as `packing_fraction` does.
+    Raises InputError as `packing_fraction` does.
     """
-    if particles.exactly_measurable:
-        return exact_packing_fraction(positions, radii, box, particles).value
-    return packing_fraction(positions, radii, box, points=points, seed=seed).value
+    if spheres.particles.exactly_measurable:
+        return exact_packing_fraction(spheres, box).value
+    return packing_fraction(spheres, box, points=points, seed=seed).value
 
 
 def packing_fraction(
-    positions: ArrayLike,
-    radii: ArrayLike,
-    box: ArrayLike,
-    *,
-    points: int = 1_000_000,
-    seed: int = 0,
+    spheres: Spheres, box: ArrayLike | None = None, *, points: int = 1_000_000, seed: int = 0
 ) -> PackingFraction:
     """Measure the packing fraction in a box with uniform random points.
 
-    Overlaps count once, spheres that stick out of the box with their part inside. Nothing is
-    periodic.
+    Overlaps count once, spheres and images of them that stick out of the box with their part
+    inside. In two dimensions it is the share of the area that discs cover.
 
     Parameters
     ----------
-    positions : (n, 3), length
-    radii : (n,), length
-    box : (3, 2), lower and upper bound per axis, length
+    spheres : the spheres and their cell
+    box : (3, 2), lower and upper bound per axis, length; None: the whole cell
     points : number of random points, at least 1
     seed : of numpy's default generator, not negative
 
-    Raises InputError for arrays of other shapes, and for points or a seed that are not such whole
-    numbers.
+    Raises InputError for a box of another shape, for no box where there is no cell, for points or a
+    seed that are not such whole numbers, and for too many images.
     """
-    centres, radius, bounds = as_measurable_by_points(positions, radii, box, points, seed)
-    reaching = spheres_reaching(centres, radius, bounds)
+    as_points(points, seed)
+    region = Region(spheres, box)
+    copies = region.around(0.0)
+    reaching = spheres_reaching(copies.positions, copies.radii, region.reach)
     if not reaching.any():
         return PackingFraction(0.0, 0.0, points)
-    cover = Cover(centres[reaching], radius[reaching])
-    return share_of_points(cover.holds, bounds, points, seed)
+    cover = Cover(copies.positions[reaching], copies.radii[reaching])
+    return region.share_of_points(cover.holds, points, seed)
 
 
-def exact_packing_fraction(
-    positions: ArrayLike,
-    radii: ArrayLike,
-    box: ArrayLike,
-    particles: Particles | None = None,
-) -> ExactPackingFraction:
+def exact_packing_fraction(spheres: Spheres, box: ArrayLike | None = None) -> ExactPackingFraction:
     """Compute the packing fraction of spheres and dimers in a box without random points.
 
     Within a dimer, what both spheres cover counts once; between different particles it counts
-    twice, see `ExactPackingFraction.overlap`. Spheres that stick out of the box count with their
-    part inside. Bodies of three or more spheres are refused. Nothing is periodic.
+    twice, see `ExactPackingFraction.overlap`. Spheres and images of them that stick out of the box
+    count with their part inside. In two dimensions areas take the place of volumes. Bodies of three
+    or more spheres are refused.
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
-    box : (3, 2), lower and upper bound per axis, length
-    particles : which spheres make up which particle; without, every sphere is one
+    spheres : the spheres, the particles that they make up, and their cell
+    box : (3, 2), lower and upper bound per axis, length; None: the whole cell
 
-    Raises InputError for arrays of other shapes, and for a body of three or more spheres.
+    Raises InputError for a box of another shape, for no box where there is no cell, or one with an
+    oblique face that is not periodic, for a body of three or more spheres, and for too many images.
     """
-    centres, radius = as_spheres(positions, radii)
-    bounds = as_box(box)
-    lower, upper = bounds.T
-    pieces = pieces_of(centres, radius, particles)
-    volume = float(pieces.volumes_in(lower, upper).sum())
-
+    region = Region(spheres, box)
+    if box is None:
+        # Each particle counts once and whole, but for what is beyond a face that is not periodic.
+        lower, upper = region.faces.T
+        pieces = pieces_of(spheres)
+        near = near_pairs(spheres, 0.0)
+        near = near[near.between_particles(spheres)]
+        ends = np.concatenate([spheres.positions[near.first], near.places(spheres)])
+        radii = np.concatenate([spheres.radii[near.first], spheres.radii[near.second]])
+        one, other = np.arange(len(near)), np.arange(len(near)) + len(near)
+    else:
+        lower, upper = as_box(box).T
+        copies = region.around(0.0)
+        pieces = pieces_of(copies)
+        chosen = np.flatnonzero(spheres_reaching(copies.positions, copies.radii, region.reach))
+        ends, radii = copies.positions, copies.radii
+        pairs = np.zeros((0, 2), dtype=np.int64)
+        if len(chosen):
+            pairs = chosen[pairs_among(ends[chosen], radii[chosen], 0.0)]
+        owners = copies.particles.index[pairs]
+        one, other = pairs[owners[:, 0] != owners[:, 1]].T
+    sizes_in = areas_in if spheres.flat else Pieces.volumes_in
+    filled = float(sizes_in(pieces, lower, upper).sum())
     common = 0.0
-    near = np.flatnonzero(spheres_reaching(centres, radius, bounds))
-    if len(near):
-        one, other = near[near_pairs(centres[near], radius[near], 0.0)].T
-        if particles is not None:
-            apart = particles.index[one] != particles.index[other]
-            one, other = one[apart], other[apart]
-        for part in split(centres, radius, one, other):
-            # The common part of two balls is made of what the parts of the union leave out of each.
-            rest = Pieces(part.centres, part.radii, -part.normals, -part.offsets, part.particles)
-            rest = rest[rest.offsets > -np.inf]
-            common += float(rest.volumes_in(lower, upper).sum())
-    size_of_box = float(np.prod(upper - lower))
-    return ExactPackingFraction(volume / size_of_box, common / size_of_box)
+    for part in split(ends, radii, one, other):
+        # The common part of two balls is made of what the parts of the union leave out of each.
+        rest = Pieces(part.centres, part.radii, -part.normals, -part.offsets, part.particles)
+        rest = rest[rest.offsets > -np.inf]
+        common += float(sizes_in(rest, lower, upper).sum())
+    return ExactPackingFraction(filled / region.size, common / region.size)
 
 
-def as_measurable_by_points(
-    positions: ArrayLike, radii: ArrayLike, box: ArrayLike, points: int, seed: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return positions (n, 3), radii (n,) and a box (3, 2), checked for a count of random points.
-
-    Raises InputError where these have other shapes or values, for fewer points than one, and for a
-    negative seed.
-    """
-    centres, radius = as_spheres(positions, radii)
-    bounds = as_box(box)
+def as_points(points: int, seed: int) -> None:
+    """Raise InputError for fewer random points than one, and for a negative seed."""
     as_count(points, "the number of points")
     as_count(seed, "the seed", 0)
-    return centres, radius, bounds
 
 
-def share_of_points(
-    holds: Callable[[FloatArray], BoolArray], bounds: FloatArray, points: int, seed: int
-) -> PackingFraction:
-    """Return the share of uniform random points in a box that lie in some volume.
+class Region:
+    """Where a packing fraction is measured: a box, or the whole cell.
 
-    Parameters
+    Attributes
     ----------
-    holds : says of points, (k, 3), which ones lie in the volume, (k,)
-    bounds : (3, 2), the box, length
-    points : number of points
-    seed : of numpy's default generator
+    size : volume, length^3; of a region in two dimensions area, length^2
+    reach : (3, 2), box along the axes that encloses the region, length; infinite along z in two
+        dimensions
     """
-    generator = np.random.default_rng(seed)
-    inside = 0
-    for start in range(0, points, BATCH):
-        batch = min(BATCH, points - start)
-        drawn = generator.uniform(bounds[:, 0], bounds[:, 1], (batch, 3))
-        inside += int(np.count_nonzero(holds(drawn)))
-    value = inside / points
-    return PackingFraction(value, math.sqrt(value * (1 - value) / points), points)
+
+    def __init__(self, spheres: Spheres, box: ArrayLike | None) -> None:
+        """Raise InputError for a box of another shape, and for no box where there is no cell."""
+        self._spheres = spheres
+        if box is not None:
+            self._bounds = as_box(box)
+            sides = self._bounds[:, 1] - self._bounds[:, 0]
+            self.size = float(np.prod(sides[:2] if spheres.flat else sides))
+        elif spheres.cell is not None:
+            self._bounds = spheres.cell.bounds
+            self.size = spheres.cell.volume
+        else:
+            raise InputError("there is no cell to measure as a whole: a box is needed")
+        self._cell = spheres.cell if box is None else None
+        self.reach = self._bounds.copy()
+        if spheres.flat:
+            self.reach[2] = -np.inf, np.inf
+
+    @property
+    def faces(self) -> FloatArray:
+        """Faces of the cell that are not periodic, (3, 2), infinite where there is none, length.
+
+        Raises InputError where such a face is oblique.
+        """
+        cell = self._spheres.cell
+        assert cell is not None
+        faces = cell.flat_faces
+        oblique = ~np.array(cell.periodic) & np.isinf(faces[:, 0])
+        if cell.flat:
+            faces[2], oblique[2] = (-np.inf, np.inf), False
+        if oblique.any():
+            raise InputError(
+                f"the face of the cell across {'abc'[int(np.argmax(oblique))]} is oblique and not "
+                "periodic: give a box inside the cell"
+            )
+        return faces
+
+    def around(self, margin: float) -> Spheres:
+        """Return all that may reach into the region, or within a margin [length], as copies."""
+        if self._cell is not None:
+            return self._spheres.around_cell(margin).spheres
+        return self._spheres.around(self._bounds, margin).spheres
+
+    def share_of_points(
+        self, holds: Callable[[FloatArray], BoolArray], points: int, seed: int
+    ) -> PackingFraction:
+        """Return the share of uniform random points in the region that lie in some volume.
+
+        Parameters
+        ----------
+        holds : says of points, (k, 3), which ones lie in the volume, (k,)
+        points : number of points
+        seed : of numpy's default generator
+        """
+        generator = np.random.default_rng(seed)
+        inside = 0
+        for start in range(0, points, BATCH):
+            drawn = self._draw(generator, min(BATCH, points - start))
+            inside += int(np.count_nonzero(holds(drawn)))
+        value = inside / points
+        return PackingFraction(value, math.sqrt(value * (1 - value) / points), points)
+
+    def _draw(self, generator: np.random.Generator, count: int) -> FloatArray:
+        if self._cell is not None:
+            drawn = self._cell.origin + generator.uniform(size=(count, 3)) @ self._cell.vectors
+        else:
+            drawn = generator.uniform(self._bounds[:, 0], self._bounds[:, 1], (count, 3))
+        if self._spheres.flat:
+            drawn[:, 2] = self._spheres.positions[0, 2]
+        return drawn
 
 
 class Cover:

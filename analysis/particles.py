@@ -20,6 +20,7 @@ import numpy as np
 from MDAnalysis.coordinates.LAMMPS import DumpReader
 
 from .bodies import Particles, group_spheres
+from .cell import Cell
 from .dump_text import (
     LARGEST_ID,
     PARTICLES,
@@ -33,6 +34,7 @@ from .dump_text import (
 )
 from .errors import CutOffError, DumpError, InputError, shortened
 from .geometry import BoolArray, FloatArray, IntArray
+from .spheres import Spheres
 
 # The first three of these columns that a dump has are read: positions in the box come before those
 # that left it through a periodic face, lengths before shares of the box, which have lost digits.
@@ -55,9 +57,9 @@ class ParticleFrame:
     velocities : (n, 3), length / time; None where the dump has not all of `vx`, `vy`, `vz`
     radii : (n,), positive, length
     bodies : (n,), the dump's `mol`, 0 for a free sphere; None where the dump has no `mol`
-    box : (3, 2), lower and upper bound per axis, length
-    boundaries : two letters per axis (f fixed, p periodic, s or m shrink-wrapped), lower then
-        upper; None where the dump does not say
+    cell : the simulation box. Nothing is periodic where the dump does not say it
+    boundaries : for each edge two letters (f fixed, p periodic, s or m shrink-wrapped), lower then
+        upper face; None where the dump does not say
     contacts : (n,), each sphere's contacts with spheres of other particles; None where the dump has
         no `contacts`
     """
@@ -68,7 +70,7 @@ class ParticleFrame:
     velocities: FloatArray | None
     radii: FloatArray
     bodies: IntArray | None
-    box: FloatArray
+    cell: Cell
     boundaries: tuple[str, str, str] | None
     contacts: IntArray | None = None
 
@@ -76,6 +78,26 @@ class ParticleFrame:
     def particles(self) -> Particles:
         """The particles that the spheres make up; all are free if the dump has no `mol`."""
         return group_spheres(np.zeros_like(self.ids) if self.bodies is None else self.bodies)
+
+    @cached_property
+    def spheres(self) -> Spheres:
+        """The spheres as every measure takes them, with their particles and their cell."""
+        return Spheres(self.positions, self.radii, self.particles, self.cell)
+
+    @property
+    def box(self) -> FloatArray:
+        """The smallest box along the axes that encloses the simulation box, (3, 2), length."""
+        return self.cell.bounds
+
+    @property
+    def walls(self) -> FloatArray:
+        """Faces of the simulation box that are fixed, (3, 2), infinite for the others, length.
+
+        Where a dump does not tell its boundaries, none is known to be a wall.
+        """
+        told = self.boundaries or ("ss", "ss", "ss")
+        fixed = np.array([[flag == "f" for flag in flags] for flags in told])
+        return np.where(fixed, self.cell.flat_faces, [-np.inf, np.inf])
 
 
 @dataclass(frozen=True)
@@ -231,8 +253,7 @@ class ParticleDump:
         data = dict(zip(layout.columns, table.T, strict=True))
         positions = _side_by_side(data, layout.positions)
         if layout.positions in SCALED:
-            lower, upper = header.box.T
-            positions = lower + positions * (upper - lower)
+            positions = header.cell.origin + positions @ header.cell.vectors
         if layout.size is None:
             radii = np.full(len(positions), self._radius)
         else:
@@ -244,7 +265,7 @@ class ParticleDump:
             velocities=_side_by_side(data, layout.velocities) if layout.velocities else None,
             radii=radii,
             bodies=data["mol"].astype(np.int64) if "mol" in data else None,
-            box=header.box,
+            cell=_flat_if_two_dimensional(header.cell, positions),
             boundaries=header.boundaries,
             contacts=data["contacts"].astype(np.int64) if "contacts" in data else None,
         )
@@ -315,32 +336,14 @@ def read_particle_frame(
     return ParticleDump(path, radius=radius)[index]
 
 
-def check_not_periodic(
-    frame: ParticleFrame,
-    path: str | PathLike[str] | None = None,
-    lacking: str = "contacts and overlaps across its faces are not looked for yet",
-) -> None:
-    """See that the box of a frame has no periodic face: nothing here looks across one.
+def _flat_if_two_dimensional(cell: Cell, positions: FloatArray) -> Cell:
+    """Return a cell as two-dimensional if it is periodic along z and all centres have one z.
 
-    A dump that does not say which faces are periodic is taken for one without.
-
-    Parameters
-    ----------
-    frame : frame of a particle dump
-    path : of the dump, for the error; None where it is not known
-    lacking : what would be wrong, for the error
-
-    Raises DumpError for a box that is periodic along any axis, InputError without a path.
+    LAMMPS has it so with `dimension 2`, which dumps do not tell. A lone sphere is in space.
     """
-    if not frame.boundaries or not any("p" in flags for flags in frame.boundaries):
-        return
-    said = (
-        f"the box is periodic ({' '.join(frame.boundaries)}), and {lacking}: "
-        "all boundaries must be f, s or m"
-    )
-    if path is None:
-        raise InputError(f"frame of step {frame.step}: {said}")
-    raise DumpError(path, said)
+    z = positions[:, 2]
+    one_plane = len(z) > 1 and bool((z == z[0]).all())
+    return cell.flattened() if one_plane and cell.can_be_flat else cell
 
 
 def _side_by_side(data: dict[str, FloatArray], names: Sequence[str]) -> FloatArray:

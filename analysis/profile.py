@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import j0
 
-from .bodies import Particles
+from .areas import areas_in
 from .errors import InputError
 from .geometry import (
     FloatArray,
@@ -21,12 +21,12 @@ from .geometry import (
     as_box,
     as_count,
     as_floats,
-    as_spheres,
     spheres_reaching,
 )
 from .overlaps import FACES
 from .packing import packing_fraction
-from .volumes import pieces_of
+from .spheres import Spheres
+from .volumes import Pieces, pieces_of
 
 # Pairs of a sphere and a slab are worked off in groups of about this many, to bound the memory.
 PAIRS = 200_000
@@ -54,64 +54,59 @@ class WallProfile:
 
 
 def wall_profile(
-    positions: ArrayLike,
-    radii: ArrayLike,
+    spheres: Spheres,
     box: ArrayLike,
     *,
     wall: str,
     thickness: float,
-    particles: Particles | None = None,
     diameter: float | None = None,
 ) -> WallProfile:
     """Compute the packing fraction of spheres and dimers in slabs parallel to a wall.
 
     The volumes are exact, as those of `exact_packing_fraction`: the volume that both spheres of a
     dimer cover counts once, that of different particles twice. Bodies of three or more spheres are
-    refused.
+    refused. In two dimensions areas take the place of volumes.
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
+    spheres : the spheres, the particles that they make up, and their cell
     box : (3, 2), what is cut into slabs: one of its faces lies on the wall, length
     wall : which face: xlo, xhi, ylo, yhi, zlo or zhi
     thickness : of the slabs, length; what is left of the box after the last whole slab is not used
-    particles : which spheres make up which particle; without, every sphere is one
     diameter : to scale the distances with, length; by default that of the spheres, if all are equal
 
-    Raises InputError for arrays of other shapes, for a body of three or more spheres, for a face
-    that does not exist, for slabs that do not fit into the box or are more than a million, and for
-    spheres of several sizes without a diameter.
+    Raises InputError for a box of another shape, for a body of three or more spheres, for a face
+    that does not exist or is periodic, for slabs that do not fit into the box or are more than a
+    million, for spheres of several sizes without a diameter, and for too many images.
     """
-    centres, radius = as_spheres(positions, radii)
-    slabs = _Slabs(box, wall, thickness)
-    scale = _diameter(radius, diameter)
-    pieces = pieces_of(centres, radius, particles)
+    slabs = _Slabs(spheres, box, wall, thickness)
+    scale = _diameter(spheres.radii, diameter)
+    pieces = pieces_of(spheres.around(slabs.box).spheres)
+    sizes_in = areas_in if spheres.flat else Pieces.volumes_in
 
     # Each piece may reach the slabs from `first` up to, but not with, `last`.
     inwards = slabs.distance_from_wall(pieces.centres)
     first = np.floor((inwards - pieces.radii) / thickness).clip(0, slabs.count).astype(np.int64)
     last = np.ceil((inwards + pieces.radii) / thickness).clip(0, slabs.count).astype(np.int64)
-    reaching = spheres_reaching(pieces.centres, pieces.radii, slabs.box)
+    reaching = spheres_reaching(pieces.centres, pieces.radii, slabs.reach)
     numbers = np.where(reaching, last - first, 0)
 
     volumes = np.zeros(slabs.count)
     used = np.flatnonzero(numbers > 0)
-    group = max(1, PAIRS // max(1, int(numbers.max())))
+    group = max(1, PAIRS // max(1, int(numbers.max(initial=0))))
     for start in range(0, len(used), group):
         chosen = used[start : start + group]
         row = np.repeat(chosen, numbers[chosen])
         begins = np.cumsum(numbers[chosen]) - numbers[chosen]
         slab = np.arange(len(row)) - np.repeat(begins - first[chosen], numbers[chosen])
-        parts = pieces[row].volumes_in(*slabs.bounds(slab))
+        parts = sizes_in(pieces[row], *slabs.bounds(slab))
         volumes += np.bincount(slab, weights=parts, minlength=slabs.count)
-    values = volumes / slabs.volume
+    values = volumes / slabs.size
     return WallProfile(slabs.middles, slabs.middles / scale, values, None)
 
 
 def wall_profile_monte_carlo(
-    positions: ArrayLike,
-    radii: ArrayLike,
+    spheres: Spheres,
     box: ArrayLike,
     *,
     wall: str,
@@ -127,8 +122,7 @@ def wall_profile_monte_carlo(
 
     Parameters
     ----------
-    positions : (n, 3), length
-    radii : (n,), length
+    spheres : the spheres and their cell
     box : (3, 2), what is cut into slabs: one of its faces lies on the wall, length
     wall : which face: xlo, xhi, ylo, yhi, zlo or zhi
     thickness : of the slabs, length; what is left of the box after the last whole slab is not used
@@ -138,16 +132,15 @@ def wall_profile_monte_carlo(
 
     Raises InputError as `wall_profile` and `packing_fraction` do.
     """
-    centres, radius = as_spheres(positions, radii)
-    slabs = _Slabs(box, wall, thickness)
-    scale = _diameter(radius, diameter)
+    slabs = _Slabs(spheres, box, wall, thickness)
+    scale = _diameter(spheres.radii, diameter)
     as_count(seed, "the seed", 0)
     seeds = np.random.SeedSequence(seed).generate_state(slabs.count)
     measured = []
     for number, own_seed in enumerate(seeds):
         lower, upper = slabs.bounds(np.array([number]))
         slab = np.column_stack([lower[0], upper[0]])
-        measured.append(packing_fraction(centres, radius, slab, points=points, seed=int(own_seed)))
+        measured.append(packing_fraction(spheres, slab, points=points, seed=int(own_seed)))
     return WallProfile(
         slabs.middles,
         slabs.middles / scale,
@@ -196,13 +189,29 @@ def mueller_packing_fraction(scaled_distances: ArrayLike, width: float | None = 
 
 
 class _Slabs:
-    """A box cut into slabs of one thickness, numbered from the wall on one of its faces."""
+    """A box cut into slabs of one thickness, numbered from the wall on one of its faces.
 
-    def __init__(self, box: ArrayLike, wall: str, thickness: float) -> None:
+    Attributes
+    ----------
+    box : (3, 2), the box, length
+    reach : (3, 2), the same; infinite along z in two dimensions, length
+    count : number of slabs
+    middles : (count,), distance of each slab's middle from the wall, length
+    size : volume of a slab, length^3; in two dimensions its area, length^2
+    """
+
+    def __init__(self, spheres: Spheres, box: ArrayLike, wall: str, thickness: float) -> None:
         self.box = as_box(box)
         if wall not in FACES:
             raise InputError(f"a wall must be one of {', '.join(FACES)}, not {wall}")
         self._axis, self._upper = divmod(FACES.index(wall), 2)
+        if spheres.endless[self._axis]:
+            raise InputError(
+                f"there is no wall {wall}: the packing is periodic or two-dimensional across it"
+            )
+        self.reach = self.box.copy()
+        if spheres.flat:
+            self.reach[2] = -np.inf, np.inf
         self._thickness = thickness
         extent = float(self.box[self._axis, 1] - self.box[self._axis, 0])
         # This condition is written so that NaN fails too.
@@ -216,7 +225,8 @@ class _Slabs:
         # A quotient such as 0.25 / 0.005 may be a little less than 50.
         self.count = math.floor(extent / thickness * (1 + 1e-9))
         self.middles: FloatArray = np.linspace(0.5, self.count - 0.5, self.count) * thickness
-        self.volume = float(thickness * np.prod(np.delete(np.diff(self.box), self._axis)))
+        across = [k for k in range(2 if spheres.flat else 3) if k != self._axis]
+        self.size = float(thickness * np.prod(np.diff(self.box)[across]))
 
     def distance_from_wall(self, positions: FloatArray) -> FloatArray:
         """Return the distances of positions, (m, 3), from the wall, (m,), positive inside."""

@@ -49,6 +49,7 @@ def backbone(
     particles: Particles | None = None,
     *,
     fewest: ArrayLike | None = None,
+    images: bool = False,
 ) -> Backbone:
     """Remove particles with too few contacts, again and again, until all that are left have enough.
 
@@ -66,11 +67,12 @@ def backbone(
         free
     fewest : contacts that a particle must have to stay, one number or (p,); None: the numbers of
         `contacts_to_hold`
+    images : whether the cell is periodic: then a particle may touch its own image
 
     Raises InputError as `contact_sides` does, and for `fewest` of another shape.
     """
     contacts = as_integers(contact_ids, "contact ids")
-    sides = contact_sides(contacts, sphere_ids, particles)
+    sides = contact_sides(contacts, sphere_ids, particles, images=images)
     count = number_of_particles(sphere_ids, particles)
     if fewest is None:
         fewest = 4 if particles is None else contacts_to_hold(particles)
@@ -91,4 +93,5 @@ def backbone(
         rounds += 1
         rattlers |= loose
         held &= ~rattlers[one] & ~rattlers[other]
-    return Backbone(rattlers, contact_counts(contacts[held], sphere_ids, particles), rounds)
+    counts = contact_counts(contacts[held], sphere_ids, particles, images=images)
+    return Backbone(rattlers, counts, rounds)

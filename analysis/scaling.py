@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
-from .bodies import Particles
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, as_count, as_floats
 from .neighbours import contacts_by_distance
+from .spheres import Spheres
 
 # Exponents beyond this are no power law of a packing.
 STEEPEST = 20.0
@@ -113,33 +113,24 @@ def _mean_of_logarithm(s: float, length: float) -> float:
     return (length / -math.expm1(-t) if t > -STEEPEST_TERM else 0.0) - 1 / s
 
 
-def small_gaps(
-    positions: ArrayLike,
-    radii: ArrayLike,
-    largest: float,
-    particles: Particles | None = None,
-    left_out: BoolArray | None = None,
-) -> FloatArray:
+def small_gaps(spheres: Spheres, largest: float, left_out: BoolArray | None = None) -> FloatArray:
     """Return the gaps between spheres of different particles up to a largest one, in any order.
 
-    Overlaps are among them as negative gaps. Nothing is periodic.
+    Overlaps are among them as negative gaps, and gaps across periodic faces.
 
     Parameters
     ----------
-    positions : (n, 3), length
-    radii : (n,), length
+    spheres : the spheres, the particles that they make up, and their cell
     largest : gap, length
-    particles : which spheres make up which particle; None: all spheres are free
     left_out : (p,), particles whose gaps say nothing, such as rattlers, which lie about
 
     Raises InputError as `contacts_by_distance` does, and for `left_out` of another shape.
     """
-    near = contacts_by_distance(positions, radii, largest, particles)
+    near = contacts_by_distance(spheres, largest)
     gaps: FloatArray = near.gaps
     if left_out is None:
         return gaps
-    owner = np.arange(len(as_floats(radii, "radii"))) if particles is None else particles.index
-    count = len(owner) if particles is None else len(particles)
+    owner, count = spheres.particles.index, len(spheres.particles)
     if np.shape(left_out) != (count,):
         raise InputError(f"left_out must have shape ({count},), not {np.shape(left_out)}")
     kept = ~left_out[owner[near.sides[:, 0]]] & ~left_out[owner[near.sides[:, 1]]]

@@ -1,7 +1,8 @@
 """Local order: radial distribution function and bond-orientational order, counted by freud.
 
-freud knows periodic boxes only. The packing is put into one so wide that no image is a neighbour,
-and averages are over the particles in a box away from the walls, whose neighbours may be outside.
+freud knows periodic boxes only. The packing, with the images that matter, is put into one so wide
+that none of freud's own images is a neighbour: no period is too short. Averages are over the
+particles in a box away from the walls, whose neighbours may be outside.
 freud stores positions as float32: distances are good to about 1e-7 of the packing's size.
 """
 
@@ -16,7 +17,9 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from .errors import InputError
-from .geometry import BoolArray, FloatArray, as_box, as_count, as_positions, particles_inside
+from .geometry import BoolArray, FloatArray, IntArray, as_box, as_count, inside_of
+from .packing import Region
+from .spheres import Spheres
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,38 +118,43 @@ class BondOrder:
 
 
 def radial_distribution(
-    positions: ArrayLike, box: ArrayLike, *, largest: float, bins: int = 200
+    spheres: Spheres, box: ArrayLike | None = None, *, largest: float, bins: int = 200
 ) -> RadialDistribution:
     """Measure g(r) around the particles in a box that lies well inside a packing.
 
     Centres outside the box are counted too, so no surface cuts a shell: the box must be at least
-    `largest` away from the outermost centres on every side. The mean density is that in the box.
+    `largest` away from the outermost centres on every side that is not periodic. The mean density
+    is that in the box. In two dimensions shells are rings, and densities those per area.
 
     Parameters
     ----------
-    positions : (n, 3), centres of all spheres, or of all particles, length
-    box : (3, 2), length
-    largest : upper edge of the last shell, length
+    spheres : the particles whose centres are counted, and their cell
+    box : (3, 2), length; None: the whole cell, which must be periodic on all sides
+    largest : upper edge of the last shell, length; more than half a period is allowed
     bins : number of shells of the same thickness, from 0
 
-    Raises InputError for a box that is too near to the outermost centres or holds none, for less
-    than one shell, and for a largest radius that is not positive and finite.
+    Raises InputError for a box that is too near to the outermost centres or holds none, for no box
+    where the cell is not periodic, for less than one shell, for a largest radius that is not
+    positive and finite, and for too many images.
     """
     # freud takes half a second to import, which most uses need not wait for.
     import freud
 
-    centres, bounds = as_positions(positions), as_box(box)
     bins = as_count(bins, "the number of shells")
     if not (largest > 0 and math.isfinite(largest)):
         raise InputError(f"the largest radius must be positive and finite, not {largest:g}")
-    chosen = _chosen(centres, bounds)
-    reach = np.column_stack([bounds[:, 0] - largest, bounds[:, 1] + largest])
-    outside = (reach[:, 0] < centres.min(axis=0)) | (reach[:, 1] > centres.max(axis=0))
-    if outside.any():
-        axis = "xyz"[int(np.argmax(outside))]
-        raise InputError(
-            f"along {axis} the box must be {largest:g} or more away from the outermost centres"
-        )
+    region = Region(spheres, box)
+    centres, chosen = _centres(spheres, box, largest)
+    if box is not None:
+        bounds = as_box(box)
+        reach = np.column_stack([bounds[:, 0] - largest, bounds[:, 1] + largest])
+        reach[spheres.endless] = np.inf, -np.inf
+        outside = (reach[:, 0] < centres.min(axis=0)) | (reach[:, 1] > centres.max(axis=0))
+        if outside.any():
+            axis = "xyz"[int(np.argmax(outside))]
+            raise InputError(
+                f"along {axis} the box must be {largest:g} or more away from the outermost centres"
+            )
     system, points = _system(centres, largest)
     counter: Any = freud.density.RDF(bins=bins, r_max=largest)
     # This distance is above 0, so that no particle counts itself.
@@ -154,9 +162,9 @@ def radial_distribution(
     query = {"mode": "ball", "r_max": largest, "r_min": smallest, "exclude_ii": False}
     counter.compute((system, points), query_points=points[chosen], neighbors=query)
     edges = np.linspace(0.0, largest, bins + 1)
-    shells = 4 / 3 * math.pi * np.diff(edges**3)
+    shells = math.pi * np.diff(edges**2) if spheres.flat else 4 / 3 * math.pi * np.diff(edges**3)
     particles = int(chosen.sum())
-    density = particles / float(np.prod(np.diff(bounds, axis=1)))
+    density = particles / region.size
     numbers = np.asarray(counter.bin_counts, dtype=np.float64)
     return RadialDistribution(
         edges=edges,
@@ -166,32 +174,30 @@ def radial_distribution(
     )
 
 
-def bond_order(positions: ArrayLike, box: ArrayLike, *, w6: bool = False) -> BondOrder:
+def bond_order(spheres: Spheres, box: ArrayLike | None = None, *, w6: bool = False) -> BondOrder:
     """Measure the bond-orientational order of the particles in a box away from the walls.
 
     The neighbours are the twelve nearest, which needs no cutoff. The box should be two diameters
-    away from the outermost centres: bonds are compared with those of the neighbours.
+    away from the outermost centres on sides that are not periodic: bonds are compared with those of
+    the neighbours.
 
     Parameters
     ----------
-    positions : (n, 3), centres of all spheres, n >= 13, length
-    box : (3, 2), length
+    spheres : the particles whose centres are neighbours, 13 or more if none has images, and their
+        cell
+    box : (3, 2), length; None: the whole cell, which must be periodic on all sides
     w6 : whether to measure w6 as well, which takes a third longer
 
-    Raises InputError for arrays of other shapes, for too few particles, and for a box without a
-    centre.
+    Raises InputError for a box of another shape, for no box where the cell is not periodic, for too
+    few particles, for a box without a centre, for discs, and for too many images.
     """
     import freud
 
-    centres, bounds = as_positions(positions), as_box(box)
-    if len(centres) <= NEIGHBOURS:
-        raise InputError(f"more than {NEIGHBOURS} particles are needed, not {len(centres)}")
-    chosen = _chosen(centres, bounds)
+    if spheres.flat:
+        raise InputError("q4, q6 and w6 are those of spheres in space, not of discs in a plane")
+    centres, chosen, neighbours = _nearest_twelve(spheres, box)
     # The box is wider than the packing, so that images are far away.
     system, points = _system(centres, float(np.ptp(centres, axis=0).max()))
-    # freud's own search took eight times as long. The nearest one of each particle is itself.
-    _, nearest = KDTree(centres).query(centres, k=NEIGHBOURS + 1)
-    neighbours = nearest[:, 1:]
     # The order of the others is not asked for.
     needed = chosen.copy()
     needed[neighbours[chosen]] = True
@@ -241,11 +247,56 @@ def plot_radial_distribution(
     return ax
 
 
-def _chosen(centres: FloatArray, box: FloatArray) -> BoolArray:
-    chosen = particles_inside(centres, box)
+def _nearest_twelve(
+    spheres: Spheres, box: ArrayLike | None
+) -> tuple[FloatArray, BoolArray, IntArray]:
+    """Return the twelve nearest centres of each particle in a box, and of these twelve.
+
+    Returns
+    -------
+    (q, 3), (q,) and (q, 12): all centres, images among them, which of them lie in the box, and the
+    neighbours of each, which are right for those in the box and for their neighbours
+    """
+    # This reach is doubled until no image that is farther away can be nearer than a neighbour.
+    reach = 4 * float(spheres.extents.max())
+    while True:
+        centres, chosen = _centres(spheres, box, reach)
+        enough = len(centres) > NEIGHBOURS
+        if not enough and not spheres.has_images:
+            raise InputError(f"more than {NEIGHBOURS} particles are needed, not {len(centres)}")
+        if enough:
+            # freud's own search took eight times as long. The nearest one of each is itself.
+            distance, nearest = KDTree(centres).query(centres, k=NEIGHBOURS + 1)
+            neighbours = nearest[:, 1:]
+            bond = distance[chosen].max()
+            next_bond = distance[neighbours[chosen]].max()
+            if not spheres.has_images or bond + next_bond <= reach:
+                return centres, chosen, neighbours
+        reach *= 2
+
+
+def _centres(spheres: Spheres, box: ArrayLike | None, reach: float) -> tuple[FloatArray, BoolArray]:
+    """Return the particles' centres within a reach of a box, images too, and which are in the box.
+
+    Without periodic faces these are all centres. Raises InputError for a box without a centre, and
+    for no box where the cell is not periodic on all sides.
+    """
+    centres, cell = spheres.centres, spheres.cell
+    if box is None:
+        if cell is None or not all(cell.periodic[: 2 if cell.flat else 3]):
+            raise InputError("the cell is not periodic on all sides: a box inside it is needed")
+        owner, moves = cell.images_near_cell(cell.wrapped(centres), np.full(len(centres), reach))
+        images = cell.wrapped(centres)[owner] + moves @ cell.vectors
+        own = np.arange(len(centres) + len(owner)) < len(centres)
+        return np.concatenate([cell.wrapped(centres), images]), own
+    bounds = as_box(box)
+    if cell is not None and cell.has_images:
+        owner, moves = cell.images_in_box(centres, np.full(len(centres), reach), bounds)
+        centres = centres[owner] + moves @ cell.vectors
+    chosen = inside_of(centres, bounds, flat=spheres.flat)
     if not chosen.any():
         raise InputError("no particle's centre lies in the box: the mean over none does not exist")
-    return chosen
+    return centres, chosen
 
 
 def _system(centres: FloatArray, margin: float) -> tuple[Any, FloatArray]:

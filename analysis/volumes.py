@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike
 
 from .bodies import Particles, dimer_spheres
 from .errors import InputError
-from .geometry import BoolArray, FloatArray, IntArray, as_box, as_spheres
+from .geometry import BoolArray, FloatArray, IntArray, as_box
+from .spheres import Spheres
 
 # Rows are worked off in blocks: the temporary arrays of one fit into a processor's cache.
 BLOCK = 2048
@@ -110,49 +111,51 @@ class Pieces:
         return clipped
 
 
-def sphere_volumes_in_box(positions: ArrayLike, radii: ArrayLike, box: ArrayLike) -> FloatArray:
+def sphere_volumes_in_box(spheres: Spheres, box: ArrayLike) -> FloatArray:
     """Return the volume of each sphere's part in a box, (n,), length^3.
 
-    The volumes are exact up to rounding, about 1e-15 r^3, however the box cuts the spheres. Nothing
-    is periodic.
+    The volumes are exact up to rounding, about 1e-15 r^3, however the box cuts the spheres. The
+    parts of a sphere's images in the box count as its own.
 
     Parameters
     ----------
-    positions : (n, 3), length
-    radii : (n,), length
+    spheres : the spheres, whatever particles they make up, and their cell
     box : (3, 2), lower and upper bound per axis, length
 
-    Raises InputError for arrays of other shapes.
+    Raises InputError for a box of another shape, for discs, and for too many images.
     """
-    centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
-    return balls(centres, radius).volumes_in(bounds[:, 0], bounds[:, 1])
+    require_balls(spheres)
+    images = spheres.around(bounds)
+    copies = images.spheres
+    volumes = balls(copies.positions, copies.radii).volumes_in(bounds[:, 0], bounds[:, 1])
+    sums: FloatArray = np.zeros(len(spheres))
+    np.add.at(sums, images.sphere, volumes)
+    return sums
 
 
-def particle_volumes_in_box(
-    positions: ArrayLike, radii: ArrayLike, box: ArrayLike, particles: Particles
-) -> FloatArray:
+def particle_volumes_in_box(spheres: Spheres, box: ArrayLike) -> FloatArray:
     """Return the volume of each particle's part in a box, (p,), length^3.
 
     The volume that both spheres of a dimer cover counts once. The volumes are exact up to rounding,
     about 1e-15 r^3. Bodies of three or more spheres are refused: `packing_fraction` measures these.
-    Nothing is periodic.
+    The parts of a particle's images in the box count as its own.
 
     Parameters
     ----------
-    positions : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
+    spheres : the spheres, the particles that they make up, and their cell
     box : (3, 2), lower and upper bound per axis, length
-    particles : which spheres make up which particle
 
-    Raises InputError for arrays of other shapes, and for a body of three or more spheres.
+    Raises InputError for a box of another shape, for a body of three or more spheres, for discs,
+    and for too many images.
     """
-    centres, radius = as_spheres(positions, radii)
     bounds = as_box(box)
-    pieces = pieces_of(centres, radius, particles)
+    require_balls(spheres)
+    images = spheres.around(bounds)
+    pieces = pieces_of(images.spheres)
     volumes = pieces.volumes_in(bounds[:, 0], bounds[:, 1])
-    sums: FloatArray = np.zeros(len(particles))
-    np.add.at(sums, pieces.particles, volumes)
+    sums: FloatArray = np.zeros(len(spheres.particles))
+    np.add.at(sums, images.particle[pieces.particles], volumes)
     return sums
 
 
@@ -167,19 +170,10 @@ def balls(centres: FloatArray, radii: FloatArray) -> Pieces:
     )
 
 
-def pieces_of(centres: FloatArray, radii: FloatArray, particles: Particles | None) -> Pieces:
-    """Return the pieces of free spheres and dimers; all spheres are free without `particles`.
-
-    Parameters
-    ----------
-    centres : (n, 3), of the spheres, length
-    radii : (n,), of the spheres, length
-    particles : which spheres make up which particle
-    """
+def pieces_of(spheres: Spheres) -> Pieces:
+    """Return the pieces of free spheres and dimers; raise InputError for other bodies."""
+    centres, radii, particles = spheres.positions, spheres.radii, spheres.particles
     whole = balls(centres, radii)
-    if particles is None:
-        return whole
-    particles.checked(centres)
     require_dimers(particles)
     one, other = dimer_spheres(particles)
     inner, outer = split(centres, radii, one, other)
@@ -189,6 +183,12 @@ def pieces_of(centres: FloatArray, radii: FloatArray, particles: Particles | Non
     # A ball that lies in its partner is covered by it.
     keep = offsets > -np.inf
     return Pieces(centres, radii, normals, offsets, particles.index)[keep]
+
+
+def require_balls(spheres: Spheres) -> None:
+    """Raise InputError for discs of a two-dimensional packing: these have no volume."""
+    if spheres.flat:
+        raise InputError("the discs of a two-dimensional packing have areas, not volumes")
 
 
 def require_dimers(particles: Particles) -> None:

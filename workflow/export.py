@@ -20,10 +20,8 @@ from lammps_inelastic.analysis import (
     RunFilesError,
     UnfinishedRunError,
     check_contacts,
-    check_not_periodic,
     contact_counts,
     iterate_contact_frames,
-    particles_inside,
     voxel_shape,
     write_raw,
     write_stl,
@@ -32,7 +30,13 @@ from lammps_inelastic.analysis import (
     write_xyz,
 )
 from lammps_inelastic.analysis.export import Progress
-from lammps_inelastic.analysis.geometry import BoolArray, FloatArray, IntArray, spheres_reaching
+from lammps_inelastic.analysis.geometry import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    inside_of,
+    spheres_reaching,
+)
 
 from .finished import CONTACTS as CONTACT_DUMP
 from .finished import open_in_folder
@@ -111,13 +115,13 @@ def write_spheres(
     """
     chosen = np.ones(len(frame.ids), dtype=np.bool_)
     if box is not None:
-        chosen = particles_inside(frame.positions, box)
+        chosen = inside_of(frame.positions, box)
         if not chosen.any():
             raise AnalysisError(f"{path}: no sphere's centre lies in the box at step {frame.step}")
     positions, radii = frame.positions[chosen], frame.radii[chosen]
     rows = [("spheres", f"{len(radii)} of {len(chosen)}, step {frame.step}")]
     if form == "stl":
-        check_not_periodic(frame, path, NOT_ACROSS)
+        _check_not_periodic(frame, path)
         divided = SUBDIVISIONS if subdivisions is None else subdivisions
         faces = write_stl(out, positions, radii, subdivisions=divided)
         return [*rows, ("faces", f"{faces}"), _as_file("file", out)]
@@ -137,6 +141,15 @@ def write_spheres(
     else:
         write_vtk(out, positions, radii, **columns.arrays)
     return [*rows, ("columns", columns.names), _as_file("file", out)]
+
+
+def _check_not_periodic(frame: ParticleFrame, path: Path) -> None:
+    if frame.cell.has_images:
+        told = " ".join(frame.boundaries or ())
+        raise AnalysisError(
+            f"{path}: the box is periodic ({told}), and {NOT_ACROSS}: all boundaries must be "
+            "f, s or m"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +225,7 @@ def write_image(
     box : (3, 2), box of the image, length; None for the dump's
     voxel : edge of a voxel, length; None for a tenth of the smallest radius
     """
-    check_not_periodic(frame, path, NOT_ACROSS)
+    _check_not_periodic(frame, path)
     bounds = frame.box if box is None else box
     if not spheres_reaching(frame.positions, frame.radii, bounds).any():
         raise AnalysisError(f"{path}: no sphere reaches into the box at step {frame.step}")

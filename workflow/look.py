@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,16 +19,15 @@ from lammps_inelastic.analysis import (
     PictureError,
     RunFiles,
     UnfinishedRunError,
-    check_not_periodic,
     contact_counts,
     contacts_by_distance,
     measure_packing,
-    particles_inside,
 )
 
 from .finished import open_in_folder
 from .frames import choose_index, notes_of
 from .pictures import draw_frame
+from .study import PAPER_BOX
 
 PICTURE = "packing.png"
 
@@ -45,7 +45,8 @@ class Look:
     contact_gap : gap below which two spheres are in contact, length; None where contacts are those
         of the contact dump, which carry a force
     frame : particle frame on which everything but the contacts is measured
-    box : (3, 2), where the packing fraction and the coordination number are measured, length
+    box : (3, 2), where the packing fraction and the coordination number are measured, length;
+        None for the whole simulation box
     seed : seed of the random points
     packing : numbers of the packing, as studies measure them
     coordination : coordination number of the particles in the box, over all contact frames
@@ -61,7 +62,7 @@ class Look:
     contact_dump: Path | None
     contact_gap: float | None
     frame: ParticleFrame
-    box: FloatArray
+    box: FloatArray | None
     seed: int
     packing: PackingMeasurement
     coordination: CoordinationNumber
@@ -81,8 +82,9 @@ class Look:
 def look_at(
     dump: Path,
     contact_dump: Path,
-    box: FloatArray,
+    box: FloatArray | None,
     *,
+    whole_cell: bool,
     contact_gap: float | None,
     radius: float | None,
     number: int | None,
@@ -101,7 +103,9 @@ def look_at(
     ----------
     dump : path of the particle dump
     contact_dump : path of the contact dump
-    box : (3, 2), where the packing fraction and the coordination number are measured, length
+    box : (3, 2), where the packing fraction and the coordination number are measured, length; None
+        for the whole simulation box if it is periodic on all sides, and else for the paper's box
+    whole_cell : whether it is the whole simulation box, periodic or not
     contact_gap : gap below which two spheres are in contact, smallest radii; None to read the
         contact dump
     radius : radius of all spheres, for a dump without radii, length
@@ -121,10 +125,12 @@ def look_at(
     chosen = number is not None or step is not None
     files = _files(particle_dump, contact_dump if contact_gap is None else None, chosen, step)
     frame = particle_dump[choose_index(particle_dump, number=number, step=step)]
+    if box is None and not whole_cell and not frame.spheres.endless.all():
+        box = np.reshape(np.asarray(PAPER_BOX, dtype=np.float64), (3, 2))
     _check_frame(dump, frame, box)
     walls = container
-    if walls is None and (box_is_container or frame.boundaries == ("ff", "ff", "ff")):
-        walls = frame.box
+    if walls is None and (box_is_container or _ends_are_fixed(frame)):
+        walls = frame.cell.flat_faces
     gap = None if contact_gap is None else contact_gap * float(frame.radii.min())
     steps, counts = _count_contacts(files, frame, gap, walls, frame.step if chosen else None)
     failure = None if picture is None else _draw(picture, frame, walls, counts[-1])
@@ -153,7 +159,7 @@ def _draw(
     path: Path, frame: ParticleFrame, walls: FloatArray | None, contacts: ContactCounts
 ) -> PictureError | None:
     """Draw the packing, coloured by contacts; return why that is not possible, None if it is."""
-    container = frame.box if walls is None else walls
+    container = np.where(np.isfinite(walls), walls, frame.box) if walls is not None else frame.box
     try:
         draw_frame(path, frame, container, contacts.particles[frame.particles.index])
     except PictureError as error:
@@ -193,13 +199,18 @@ def _files(
         ) from None
 
 
-def _check_frame(dump: Path, frame: ParticleFrame, box: FloatArray) -> None:
-    """Raise AnalysisError for a periodic box, and where no particle is in the measuring box."""
-    check_not_periodic(frame, dump)
-    if not particles_inside(frame.particles.centres(frame.positions), box).any():
+def _ends_are_fixed(frame: ParticleFrame) -> bool:
+    """Whether each face of the simulation box is fixed or periodic, so that all walls are known."""
+    told = frame.boundaries or ("ss", "ss", "ss")
+    return all(flags in ("ff", "pp") for flags in told)
+
+
+def _check_frame(dump: Path, frame: ParticleFrame, box: FloatArray | None) -> None:
+    """Raise AnalysisError where no particle is in the measuring box."""
+    if box is not None and not frame.spheres.particles_in(box).any():
         raise AnalysisError(
             f"{dump}: no particle's centre lies in the box {as_ranges(box)} "
-            f"at step {frame.step}; choose another with --box"
+            f"at step {frame.step}; choose another with --box, or all with --cell"
         )
 
 
@@ -214,14 +225,15 @@ def _count_contacts(
 
     The frames' steps are returned, too.
     """
-    particles = frame.particles
+    particles, images = frame.particles, frame.cell.has_images
     if gap is not None:
-        near = contacts_by_distance(frame.positions, frame.radii, gap, particles, walls)
-        return [frame.step], [contact_counts(near.ids(frame.ids), frame.ids, particles)]
+        near = contacts_by_distance(frame.spheres, gap, walls)
+        ids = near.ids(frame.ids)
+        return [frame.step], [contact_counts(ids, frame.ids, particles, images=images)]
     steps, counts = [], []
     for contacts in files.contact_frames(frame, step):
         steps.append(contacts.step)
-        counts.append(contact_counts(contacts.ids, frame.ids, particles))
+        counts.append(contact_counts(contacts.ids, frame.ids, particles, images=images))
     if not steps:
         raise AnalysisError(
             f"{files.contacts}: no contacts of step {frame.step}; --contact-gap GAP counts them "
@@ -231,7 +243,10 @@ def _count_contacts(
 
 
 def as_ranges(box: FloatArray) -> str:
-    """Write a box, (3, 2), as the range of each axis."""
-    return ", ".join(
-        f"{axis} {low:g} to {high:g}" for axis, (low, high) in zip("xyz", box.tolist(), strict=True)
-    )
+    """Write a box, (3, 2), as the range of each axis; an axis of no end is left out."""
+    ranges = [
+        f"{axis} {low:g} to {high:g}"
+        for axis, (low, high) in zip("xyz", box.tolist(), strict=True)
+        if math.isfinite(low) or math.isfinite(high)
+    ]
+    return ", ".join(ranges) or "none: it has no end"

@@ -6,7 +6,15 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from lammps_inelastic.analysis import BoxInBed, CoordinationNumber, Orientation, ParticleFrame
+import numpy as np
+
+from lammps_inelastic.analysis import (
+    BoxInBed,
+    Cell,
+    CoordinationNumber,
+    Orientation,
+    ParticleFrame,
+)
 
 from .look import Look, as_ranges
 from .wide_table import wrapped
@@ -42,7 +50,7 @@ def as_text(found: Look) -> str:
         [
             *lines,
             "",
-            f"{'box':<{left}}  {as_ranges(found.box)}",
+            f"{'box':<{left}}  {_box(found)}",
             f"{'  ends of the bed':<{left}}  {as_ranges(found.packing.bed.bed)}",
             f"{'  in the bed':<{left}}  {_part_in_bed(found.packing.bed)}",
             f"{'r':<{left}}  {found.smallest_radius:.6g}, the smallest radius",
@@ -50,6 +58,24 @@ def as_text(found: Look) -> str:
             *(wrapped(f"{'note':<{left}}  ", note) for note in found.notes),
         ]
     )
+
+
+def _box(found: Look) -> str:
+    """Say where numbers are measured, and what kind of simulation box that is in."""
+    cell = found.frame.cell
+    periods = [name for name, flag in zip(_edges(cell), cell.periodic, strict=True) if flag]
+    return "; ".join(
+        [
+            "the whole simulation box" if found.box is None else as_ranges(found.box),
+            *(["two-dimensional"] if cell.flat else []),
+            *([f"periodic along {', '.join(periods)}"] if periods else []),
+        ]
+    )
+
+
+def _edges(cell: Cell) -> str:
+    """Return the names of a cell's edges: those of the axes, or LAMMPS's where some are oblique."""
+    return "xyz" if np.array_equal(cell.vectors, np.diag(np.diag(cell.vectors))) else "abc"
 
 
 def _part_in_bed(bed: BoxInBed) -> str:
@@ -153,7 +179,9 @@ def as_json(found: Look) -> str:
         "step": found.frame.step,
         "particles": len(found.frame.particles),
         "smallest_radius": found.smallest_radius,
-        "box": found.box.tolist(),
+        "box": None if found.box is None else found.box.tolist(),
+        "periodic": list(found.frame.cell.periodic),
+        "dimensions": 2 if found.frame.cell.flat else 3,
         "bed": _bed_report(found.packing.bed),
         "packing_fraction": _packing_report(found),
         "coordination_number": _coordination_report(found),
@@ -172,7 +200,8 @@ def as_json(found: Look) -> str:
 
 def _bed_report(bed: BoxInBed) -> dict[str, Any]:
     return {
-        "ends": bed.bed.tolist(),
+        # A bed has no end along what is periodic, and JSON no infinite numbers.
+        "ends": [[end if np.isfinite(end) else None for end in ends] for ends in bed.bed.tolist()],
         "share_of_box": bed.share,
         "box_inside": None if bed.inside is None else bed.inside.tolist(),
     }

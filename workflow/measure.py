@@ -31,7 +31,6 @@ from lammps_inelastic.analysis import (
     PackingMeasurement,
     ParticleDump,
     ParticleFrame,
-    Particles,
     PictureError,
     RunFiles,
     RunLog,
@@ -39,7 +38,6 @@ from lammps_inelastic.analysis import (
     backbone,
     best_packing_fraction,
     bond_order,
-    check_not_periodic,
     contact_counts,
     contacts_of,
     fabric_tensor,
@@ -48,7 +46,6 @@ from lammps_inelastic.analysis import (
     measure_packing,
     open_run,
     packing_fraction_with_necks,
-    particles_inside,
     radial_distribution,
     read_run_log,
     wall_profile,
@@ -86,6 +83,7 @@ FORCE_BINS, LARGEST_FORCE = 50, 5.0
 # All random points have this seed.
 SEED = 1
 
+FloatArray = NDArray[np.float64]
 Values = dict[str, NDArray[Any]]
 
 
@@ -113,13 +111,12 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
 def _open(
     folder: Path, record: Mapping[str, Any], stage: Mapping[str, Any]
 ) -> tuple[RunFiles, RunLog]:
-    """Open the files of a stage: those of this run, whole, and of a box that is not periodic."""
+    """Open the files of a stage: those of this run, and whole."""
     where = folder / stage["folder"]
     log = read_run_log(where / LOG)
     contacts = None if has_soft_contacts(stage) else where / CONTACTS
     files = open_run(ParticleDump(where / PARTICLES), contacts, log)
     check_stage(folder, record, stage, files, log)
-    check_not_periodic(files.particles[-1], files.particles.path)
     return files, log
 
 
@@ -129,10 +126,10 @@ def _measure(
     """Measure what a study asks for of a stage; return arrays by the names in the schema."""
     dump = files.particles
     frame = dump[-1]
-    box = np.reshape(np.array(outputs.box), (3, 2))
+    box = outputs.bounds
     particles = frame.particles
     smallest = float(frame.radii.min())
-    in_box = particles_inside(particles.centres(frame.positions), box)
+    in_box = frame.spheres.particles_in(box)
     frames = contact_frames(files, stage, frame) if in_box.any() else ()
     contacts = _ContactFrames.of(frames, frame, in_box)
     packing = measure_packing(frame, contacts.counts, box, points=outputs.points, seed=SEED)
@@ -166,7 +163,7 @@ def _measure(
             numbers["excess_contacts"] = float(np.mean(contacts.excess))
             numbers |= power_laws(contacts.last[0], frame, stage, values)
         if outputs.structure:
-            numbers |= _structure(frame, particles, box, values)
+            numbers |= _structure(frame, box, values)
     if outputs.evolution or is_settling(stage):
         numbers |= _evolution(dump, log, stage, box, values)
     if is_settling(stage):
@@ -174,27 +171,25 @@ def _measure(
         numbers |= settled[0]
         values |= settled[1]
     if outputs.profile is not None:
-        _profile(frame, particles, box, outputs.profile, values)
+        _profile(frame, box, outputs.profile, values)
     values |= {f"numbers/{name}": np.asarray(value, dtype=float) for name, value in numbers.items()}
     return values
 
 
 def _packing_fractions(
-    packing: PackingMeasurement, frame: ParticleFrame, box: NDArray[np.float64], points: int
+    packing: PackingMeasurement, frame: ParticleFrame, box: FloatArray | None, points: int
 ) -> dict[str, float]:
     """Return the packing fraction, of dimers also with the volume at their necks."""
-    measured, particles = packing.packing_fraction, frame.particles
+    measured = packing.packing_fraction
     drawn = measured.drawn
     numbers = {
         "packing_fraction": measured.value,
         "packing_fraction_monte_carlo": drawn.value,
         "packing_fraction_monte_carlo_error": drawn.uncertainty,
     }
-    if (particles.sizes == 2).all():
+    if (frame.particles.sizes == 2).all() and not frame.cell.flat:
         # The points are the same: what the necks add has a far smaller error than either share.
-        with_necks = packing_fraction_with_necks(
-            frame.positions, frame.radii, box, particles, points=points, seed=SEED
-        )
+        with_necks = packing_fraction_with_necks(frame.spheres, box, points=points, seed=SEED)
         added = with_necks.value - drawn.value
         numbers["packing_fraction_with_necks"] = numbers["packing_fraction"] + added
         numbers["packing_fraction_with_necks_error"] = math.sqrt(added * (1 - added) / points)
@@ -229,14 +224,15 @@ class _ContactFrames:
         cls, frames: Iterable[ContactFrame], frame: ParticleFrame, in_box: NDArray[np.bool_]
     ) -> _ContactFrames:
         """Read the contact frames one at a time."""
-        particles = frame.particles
+        particles, images = frame.particles, frame.cell.has_images
         found = cls()
         for contacts in frames:
-            found.counts.append(contact_counts(contacts.ids, frame.ids, particles))
-            inside = contacts_of(in_box, contacts.ids, frame.ids, particles)
+            counts = contact_counts(contacts.ids, frame.ids, particles, images=images)
+            found.counts.append(counts)
+            inside = contacts_of(in_box, contacts.ids, frame.ids, particles, images=images)
             found.forces.append(contacts.forces[inside])
             found.normals.append(contacts.normals[inside])
-            firm = backbone(contacts.ids, frame.ids, particles)
+            firm = backbone(contacts.ids, frame.ids, particles, images=images)
             found.rattlers.append(float(firm.rattlers[in_box].mean()))
             if not firm.rattlers[in_box].all():
                 held = firm.counts.particles[in_box & ~firm.rattlers]
@@ -301,15 +297,22 @@ def _last_contacts(
 def _layers(
     frame: ParticleFrame,
     counts: Sequence[ContactCounts],
-    box: NDArray[np.float64],
+    box: FloatArray | None,
     values: Values,
 ) -> None:
     """Add the contacts of particles in layers above the floor, a diameter thick, to values.
 
-    The particles are those between the box's sides, at any height.
+    The particles are those between the box's sides, at any height. A cell that is periodic along y
+    has no floor.
     """
-    centres = frame.particles.centres(frame.positions)
-    between = ((centres >= box[:, 0]) & (centres <= box[:, 1]))[:, [0, 2]].all(axis=1)
+    if frame.spheres.endless[1]:
+        return
+    centres = frame.spheres.centres
+    column = None
+    if box is not None:
+        column = box.copy()
+        column[1] = centres[:, 1].min(), centres[:, 1].max() + float(frame.radii.max())
+    between = frame.spheres.particles_in(column)
     if not between.any():
         return
     diameter = 2 * float(frame.radii.max())
@@ -325,30 +328,38 @@ def _layers(
     )
 
 
-def _structure(
-    frame: ParticleFrame, particles: Particles, box: NDArray[np.float64], values: Values
-) -> dict[str, float]:
+def _structure(frame: ParticleFrame, box: FloatArray | None, values: Values) -> dict[str, float]:
     """Measure the order of the particles' centres, as far as the box leaves the room."""
-    centres = particles.centres(frame.positions)
+    spheres = frame.spheres
+    ends = ~spheres.endless
+    if box is None and ends.any():
+        _say_not_measured(
+            "radial distribution, q4, q6, crystalline",
+            "the whole simulation box has walls: give a box away from them",
+        )
+        return {}
     diameter = 2 * float(frame.radii.max())
-    room = float(
-        min((box[:, 0] - centres.min(axis=0)).min(), (centres.max(axis=0) - box[:, 1]).min())
-    )
+    room = math.inf
+    if box is not None and ends.any():
+        out = np.stack(
+            [box[:, 0] - spheres.centres.min(axis=0), spheres.centres.max(axis=0) - box[:, 1]]
+        )
+        room = float(out[:, ends].min())
     # The room is taken as a hair less, so that no shell reaches out by round-off.
     largest = min(LARGEST_DISTANCE * diameter, room * (1 - 1e-9))
     if largest > diameter:
         bins = round(largest / diameter * BINS_PER_DIAMETER)
-        around = radial_distribution(centres, box, largest=largest, bins=bins)
+        around = radial_distribution(spheres, box, largest=largest, bins=bins)
         values["structure/distance"] = around.middles
         values["structure/radial_distribution"] = around.values
     else:
         _say_not_measured("radial distribution", "the box is too near to the outermost particles")
-    if particles.composite:
+    if frame.particles.composite:
         return {}
     try:
-        order = bond_order(centres, box)
+        order = bond_order(spheres, box)
     except AnalysisError as error:
-        # There are too few spheres for twelve neighbours.
+        # There are too few spheres for twelve neighbours, or they are discs.
         _say_not_measured("q4, q6, crystalline", str(error))
         return {}
     return {
@@ -384,14 +395,13 @@ def _evolution(
     dump: ParticleDump,
     log: RunLog,
     stage: Mapping[str, Any],
-    box: NDArray[np.float64],
+    box: FloatArray | None,
     values: Values,
 ) -> dict[str, float]:
     """Add the evolution to values; return the mean contacts while particles are agitated."""
 
-    def of_frame(frame: ParticleFrame, bounds: NDArray[np.float64]) -> float:
-        spheres = frame.positions, frame.radii, bounds, frame.particles
-        return best_packing_fraction(*spheres, points=POINTS_PER_FRAME, seed=SEED)
+    def of_frame(frame: ParticleFrame, bounds: FloatArray | None) -> float:
+        return best_packing_fraction(frame.spheres, bounds, points=POINTS_PER_FRAME, seed=SEED)
 
     seen = measure_evolution(dump, box, packing=of_frame)
     clock = read_thermo(log, "Time")
@@ -449,21 +459,20 @@ def _resolution(stage: Mapping[str, Any], radius: float) -> float | None:
 
 
 def _profile(
-    frame: ParticleFrame,
-    particles: Particles,
-    box: NDArray[np.float64],
-    wanted: ProfileOutput,
-    values: Values,
+    frame: ParticleFrame, box: FloatArray | None, wanted: ProfileOutput, values: Values
 ) -> None:
-    """Add the packing fraction in slabs parallel to a wall to values."""
+    """Add the packing fraction in slabs parallel to a wall to values, if there is a wall."""
     axis = "xyz".index(wanted.axis)
-    slabs = box.copy()
-    slabs[axis] = frame.box[axis, 0], frame.box[axis, 0] + wanted.reach
     wall = f"{wanted.axis}lo"
-    spheres = frame.positions, frame.radii, slabs
+    if frame.spheres.endless[axis]:
+        _say_not_measured("profile", f"there is no wall {wall}: the box is periodic across it")
+        return
+    slabs = frame.box if box is None else box.copy()
+    slabs[axis] = frame.box[axis, 0], frame.box[axis, 0] + wanted.reach
     diameter = 2 * float(frame.radii.max())
     drawn = wall_profile_monte_carlo(
-        *spheres,
+        frame.spheres,
+        slabs,
         wall=wall,
         thickness=wanted.thickness * diameter,
         diameter=diameter,
@@ -475,12 +484,12 @@ def _profile(
     values["profile/monte_carlo"] = drawn.values
     if drawn.uncertainties is not None:
         values["profile/monte_carlo_error"] = drawn.uncertainties
-    if particles.exactly_measurable:
+    if frame.particles.exactly_measurable:
         exact = wall_profile(
-            *spheres,
+            frame.spheres,
+            slabs,
             wall=wall,
             thickness=wanted.thickness * diameter,
-            particles=particles,
             diameter=diameter,
         )
         values["profile/packing_fraction"] = exact.values

@@ -114,7 +114,7 @@ def _middle(frame: ParticleFrame) -> tuple[float, float]:
 
 def _draw_contact_network(path: Path, frame: ParticleFrame, contacts: ContactFrame) -> None:
     graph = contact_graph(
-        contacts.ids, frame.ids, frame.positions, contacts.forces, frame.particles
+        contacts.ids, frame.ids, frame.spheres, contacts.forces, points=contacts.points
     )
     matplotlib.use("Agg")
     from matplotlib import pyplot

@@ -43,7 +43,7 @@ def excess_contacts(contacts: ContactFrame, frame: ParticleFrame) -> float:
     degrees of freedom: the result is 0. It is NaN where no particle is held.
     """
     particles = frame.particles
-    firm = backbone(contacts.ids, frame.ids, particles, fewest=FEWEST)
+    firm = backbone(contacts.ids, frame.ids, particles, fewest=FEWEST, images=frame.cell.has_images)
     kinds = np.minimum(particles.sizes[~firm.rattlers], len(DEGREES_OF_FREEDOM)) - 1
     degrees = int(np.choose(kinds, DEGREES_OF_FREEDOM).sum()) if len(kinds) else 0
     held = firm.counts.particles.sum() / 2 + firm.counts.walls.sum()
@@ -66,7 +66,7 @@ def power_laws(
     values : arrays by the names in the schema
     """
     particles = frame.particles
-    firm = backbone(contacts.ids, frame.ids, particles)
+    firm = backbone(contacts.ids, frame.ids, particles, images=frame.cell.has_images)
     left_out = firm.rattlers | (firm.counts.walls > 0)
     numbers: dict[str, float] = {}
     diameter = 2 * float(frame.radii.max())
@@ -74,9 +74,7 @@ def power_laws(
     tolerance = stage["variables"].get("tolerance")
     packed_tightly = not isinstance(tolerance, int | float) or tolerance / 2 < GAPS[0] / 2
     if packed_tightly:
-        gaps = small_gaps(
-            frame.positions, frame.radii, GAPS_SHOWN[1] * diameter, particles, left_out
-        )
+        gaps = small_gaps(frame.spheres, GAPS_SHOWN[1] * diameter, left_out)
         scaled = gaps / diameter
         values["gaps/size"], values["gaps/density"] = logarithmic_density(scaled, *GAPS_SHOWN)
         numbers |= _exponent("gap", scaled, GAPS)
@@ -102,7 +100,7 @@ def _between(
     left_out: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Say which contacts are between particles none of which is left out, (m,)."""
-    sides = contact_sides(contacts.ids, frame.ids, particles)
+    sides = contact_sides(contacts.ids, frame.ids, particles, images=frame.cell.has_images)
     of_particles = sides[:, 1] >= 0
     other = np.where(of_particles, sides[:, 1], sides[:, 0])
     found: NDArray[np.bool_] = of_particles & ~left_out[sides[:, 0]] & ~left_out[other]

@@ -67,9 +67,7 @@ def overlaps_as_contacts(frame: ParticleFrame) -> ContactFrame:
 
     A contact's force is the depth of the overlap, which is the force over the stiffness.
     """
-    found = contacts_by_distance(
-        frame.positions, frame.radii, 0.0, frame.particles, walls=frame.box
-    )
+    found = contacts_by_distance(frame.spheres, 0.0, frame.cell.flat_faces)
     return ContactFrame(
         step=frame.step,
         ids=found.ids(frame.ids),
@@ -172,8 +170,8 @@ def measure_settling(
 
 def _largest_overlap(frame: ParticleFrame) -> float:
     """Return the largest overlap of two particles or with a wall, length."""
-    pair = largest_pair_overlap(frame.positions, frame.radii, frame.bodies)
-    wall = largest_wall_overlap(frame.positions, frame.radii, frame.box)
+    pair = largest_pair_overlap(frame.spheres)
+    wall = largest_wall_overlap(frame.spheres, frame.cell.flat_faces)
     return max(pair.depth, wall.depth)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lammps_inelastic.analysis import BoxInBed, InputError, box_in_bed
+from lammps_inelastic.analysis import BoxInBed, InputError, Spheres, box_in_bed
 
 # Spheres of this diameter fill a container one wide, five high.
 DIAMETER = 0.1
@@ -24,7 +24,7 @@ def lattice(layers: int) -> NDArray[np.float64]:
 
 
 def found(centres: NDArray[np.float64], box: Any, walls: Any = WALLS) -> BoxInBed:
-    return box_in_bed(centres, np.full(len(centres), DIAMETER / 2), box, walls)
+    return box_in_bed(Spheres(centres, np.full(len(centres), DIAMETER / 2)), box, walls)
 
 
 def test_a_box_deep_inside() -> None:
@@ -103,5 +103,5 @@ def test_boxes_of_any_size(high: float) -> None:
 def test_wrong_walls() -> None:
     with pytest.raises(InputError, match=r"walls must have shape \(3, 2\)"):
         found(lattice(1), MIDDLE, [0, 1])
-    with pytest.raises(InputError, match="must not be NaN"):
+    with pytest.raises(InputError, match="walls: xlo = 0 must be less than xhi = nan"):
         found(lattice(1), MIDDLE, [[0, np.nan]] * 3)

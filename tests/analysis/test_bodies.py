@@ -9,10 +9,10 @@ import pytest
 
 from lammps_inelastic.analysis import (
     InputError,
+    Spheres,
     contact_counts,
     coordination_number,
     group_spheres,
-    particles_inside,
 )
 
 # A dimer (body 7), a free sphere, a trimer (body 3), a body of one sphere (body 9).
@@ -51,8 +51,8 @@ def test_centres() -> None:
 def test_a_particle_is_inside_by_its_centre() -> None:
     # Both spheres of body 1 lie outside, both of body 2 inside; of body 3 one lies inside.
     positions = np.outer([-1, 2, 0.2, 0.8, 0.9, 2], [1, 0, 0])
-    centres = group_spheres([1, 1, 2, 2, 3, 3]).centres(positions)
-    assert particles_inside(centres, [[0, 1]] * 3).tolist() == [True, True, False]
+    spheres = Spheres(positions, np.ones(6), group_spheres([1, 1, 2, 2, 3, 3]))
+    assert spheres.particles_in([[0, 1]] * 3).tolist() == [True, True, False]
 
 
 def test_several_contacts_with_one_neighbour() -> None:

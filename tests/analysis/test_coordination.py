@@ -9,9 +9,9 @@ import pytest
 
 from lammps_inelastic.analysis import (
     InputError,
+    Spheres,
     contact_counts,
     coordination_number,
-    particles_inside,
 )
 
 # A chain 10 - 20 - 30 with 10 and 40 on the floor (wall 3), 40 in a corner (walls 1 and 3).
@@ -38,18 +38,15 @@ def test_no_contacts() -> None:
 
 def test_contacts_with_particles_outside_the_box_count() -> None:
     positions = [[0.1, 0, 0], [0.5, 0, 0], [0.9, 0, 0], [5, 0, 0]]
-    inside = particles_inside(positions, [[0.3, 0.7], [-1, 1], [-1, 1]])
+    inside = Spheres(positions, np.ones(4)).particles_in([[0.3, 0.7], [-1, 1], [-1, 1]])
     assert inside.tolist() == [False, True, False, False]
     number = coordination_number([contact_counts(CONTACTS, IDS).particles], inside)
     assert (number.mean, number.particles) == (2.0, 1)
 
 
 def test_faces_belong_to_the_box() -> None:
-    assert particles_inside([[0, 0, 0], [1, 1, 1], [1, 1, 1.001]], [[0, 1]] * 3).tolist() == [
-        True,
-        True,
-        False,
-    ]
+    spheres = Spheres([[0, 0, 0], [1, 1, 1], [1, 1, 1.001]], np.ones(3))
+    assert spheres.particles_in([[0, 1]] * 3).tolist() == [True, True, False]
 
 
 def test_mean_and_scatter_over_frames() -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import ConvexHull
 
+from lammps_inelastic import analysis
 from lammps_inelastic.analysis import (
     ExportError,
     InputError,
@@ -166,7 +167,7 @@ def test_spheres_smaller_than_a_voxel_may_be_missed() -> None:
 def test_solid_share_is_the_packing_fraction(tmp_path: Path, spheres: Spheres) -> None:
     cells = 120
     image = write_tiff(tmp_path / "packing.tif", *spheres, UNIT, 1 / cells)
-    measured = packing_fraction(*spheres, UNIT)
+    measured = packing_fraction(analysis.Spheres(*spheres), UNIT)
     solid = stack(tmp_path / "packing.tif") == 255
     assert image == VoxelImage((cells,) * 3, 1 / cells, np.count_nonzero(solid))
     # The voxels at the surface are right or wrong by chance, half a voxel each; to both this and

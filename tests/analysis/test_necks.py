@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from lammps_inelastic.analysis import (
     InputError,
     Particles,
+    Spheres,
     dimer_volume,
     group_spheres,
     neck_volume,
@@ -80,7 +81,9 @@ def test_no_sphere_reaches_the_neck(distance: float) -> None:
     in_neck = np.array(
         [
             packing_fraction_with_necks(
-                centres, [radius] * 2, np.column_stack([p - 1e-9, p + 1e-9]), dimer, points=1
+                Spheres(centres, [radius] * 2, dimer),
+                np.column_stack([p - 1e-9, p + 1e-9]),
+                points=1,
             ).value
             for p in points
         ]
@@ -105,13 +108,13 @@ def grid_of_dimers(
 @pytest.mark.parametrize(("distance", "radius"), [(0.1, 0.1), (0.16, 0.08)])
 def test_random_points_find_the_necks(distance: float, radius: float) -> None:
     positions, radii, dimers = grid_of_dimers(distance, radius, cells=3)
-    measured = packing_fraction_with_necks(positions, radii, UNIT, dimers, points=300_000)
+    measured = packing_fraction_with_necks(Spheres(positions, radii, dimers), UNIT, points=300_000)
     expected = len(dimers) * (dimer_volume(radius, distance) + neck_volume(radius, distance))
     # The seed is fixed; four standard deviations are passed by chance once in 16,000 seeds.
     assert abs(measured.value - expected) < 4 * measured.uncertainty
     # The points are those of the packing fraction without necks: the difference is the number of
     # points in the necks, with its own uncertainty. As above.
-    without = packing_fraction(positions, radii, UNIT, points=300_000)
+    without = packing_fraction(Spheres(positions, radii), UNIT, points=300_000)
     necks = measured.value - without.value
     expected_necks = len(dimers) * neck_volume(radius, distance)
     assert abs(necks - expected_necks) < 4 * np.sqrt(expected_necks / measured.points)
@@ -121,22 +124,22 @@ def test_necks_are_cut_by_the_box_and_spheres_have_none() -> None:
     # The face at x = 0 halves the dimer; a free sphere lies beside it.
     positions = [[0, 0.4, 0.5], [0, 0.6, 0.5], [0.7, 0.5, 0.5]]
     particles = group_spheres([7, 7, 0])
-    measured = packing_fraction_with_necks(positions, [0.1] * 3, UNIT, particles, points=300_000)
+    measured = packing_fraction_with_necks(
+        Spheres(positions, [0.1] * 3, particles), UNIT, points=300_000
+    )
     expected = (dimer_volume(0.1, 0.2) + neck_volume(0.1, 0.2)) / 2 + 4 / 3 * np.pi * 0.1**3
     assert abs(measured.value - expected) < 4 * measured.uncertainty
     free = group_spheres([0] * 3)
-    alone = packing_fraction_with_necks(positions, [0.1] * 3, UNIT, free, points=1000)
-    assert alone == packing_fraction(positions, [0.1] * 3, UNIT, points=1000)
+    alone = packing_fraction_with_necks(Spheres(positions, [0.1] * 3, free), UNIT, points=1000)
+    assert alone == packing_fraction(Spheres(positions, [0.1] * 3), UNIT, points=1000)
 
 
 def test_overlapping_necks_count_once() -> None:
     positions = np.array([[0.5, 0.4, 0.5], [0.5, 0.6, 0.5]] * 2)
     once, twice = (
         packing_fraction_with_necks(
-            positions[: len(bodies)],
-            [0.1] * len(bodies),
+            Spheres(positions[: len(bodies)], [0.1] * len(bodies), group_spheres(bodies)),
             UNIT,
-            group_spheres(bodies),
             points=50_000,
         )
         for bodies in ([1, 1], [1, 1, 2, 2])
@@ -175,4 +178,6 @@ def test_wrong_sizes(radius: float, distance: float, message: str) -> None:
 )
 def test_wrong_dimers(bodies: list[int], radii: Any, points: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        packing_fraction_with_necks(np.eye(3), radii, UNIT, group_spheres(bodies), points=points)
+        packing_fraction_with_necks(
+            Spheres(np.eye(3), radii, group_spheres(bodies)), UNIT, points=points
+        )

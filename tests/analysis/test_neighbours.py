@@ -10,6 +10,7 @@ import pytest
 
 from lammps_inelastic.analysis import (
     InputError,
+    Spheres,
     contact_counts,
     contacts_by_distance,
     group_spheres,
@@ -20,7 +21,7 @@ ROUNDING = 1e-15
 
 
 def test_two_spheres_of_different_size() -> None:
-    found = contacts_by_distance([[0, 0, 0], [0, 1.6, 0], [9, 9, 9]], [1, 0.5, 1], 0.2)
+    found = contacts_by_distance(Spheres([[0, 0, 0], [0, 1.6, 0], [9, 9, 9]], [1, 0.5, 1]), 0.2)
     assert found.sides.tolist() == [[0, 1]]
     assert found.gaps == pytest.approx([0.1], abs=ROUNDING)
     assert found.normals == pytest.approx(np.array([[0, -1, 0]]), abs=ROUNDING)
@@ -32,15 +33,15 @@ def test_two_spheres_of_different_size() -> None:
 def test_the_gap_must_be_below_the_criterion() -> None:
     # Numbers that float64 holds exactly: gaps of 0 and of 0.125.
     centres, radii = [[0, 0, 0], [1, 0, 0], [2.125, 0, 0]], [0.5] * 3
-    assert contacts_by_distance(centres, radii, 0).sides.tolist() == []
-    assert contacts_by_distance(centres, radii, 0.125).sides.tolist() == [[0, 1]]
-    assert contacts_by_distance(centres, radii, 0.126).sides.tolist() == [[0, 1], [1, 2]]
+    assert contacts_by_distance(Spheres(centres, radii), 0).sides.tolist() == []
+    assert contacts_by_distance(Spheres(centres, radii), 0.125).sides.tolist() == [[0, 1]]
+    assert contacts_by_distance(Spheres(centres, radii), 0.126).sides.tolist() == [[0, 1], [1, 2]]
 
 
 def test_walls_have_the_numbers_of_a_block() -> None:
     # A sphere in each of two opposite corners; the first overlaps its walls by 0.01.
     centres = [[0.09, 0.09, 0.09], [0.9, 4.9, 0.9]]
-    found = contacts_by_distance(centres, [0.1, 0.1], 1e-9, walls=[[0, 1], [0, 5], [0, 1]])
+    found = contacts_by_distance(Spheres(centres, [0.1, 0.1]), 1e-9, walls=[[0, 1], [0, 5], [0, 1]])
     assert found.sides.tolist() == [[0, -1], [1, -2], [0, -3], [1, -4], [0, -5], [1, -6]]
     assert found.gaps == pytest.approx([-0.01, 0] * 3, abs=ROUNDING)
     assert found.points[:2].tolist() == [[0, 0.09, 0.09], [1, 4.9, 0.9]]
@@ -50,7 +51,7 @@ def test_walls_have_the_numbers_of_a_block() -> None:
 def test_spheres_of_a_body_do_not_touch() -> None:
     centres = [[0, 0, 0], [0.5, 0, 0], [1.4, 0, 0], [1.9, 0, 0], [2.8, 0, 0], [3.3, 0, 0]]
     particles = group_spheres([7, 7, 8, 8, 0, 0])
-    found = contacts_by_distance(centres, [0.5] * 6, 0.01, particles)
+    found = contacts_by_distance(Spheres(centres, [0.5] * 6, particles), 0.01)
     # The last two are free spheres: they touch although both have the number 0.
     assert found.sides.tolist() == [[1, 2], [3, 4], [4, 5]]
     counts = contact_counts(found.sides, range(6), particles)
@@ -58,7 +59,9 @@ def test_spheres_of_a_body_do_not_touch() -> None:
 
 
 def test_ids_of_the_sides() -> None:
-    found = contacts_by_distance([[0.5, 0, 0], [1.5, 0, 0]], [0.5, 0.5], 0.1, walls=[[0, 9]] * 3)
+    found = contacts_by_distance(
+        Spheres([[0.5, 0, 0], [1.5, 0, 0]], [0.5, 0.5]), 0.1, walls=[[0, 9]] * 3
+    )
     assert found.ids([30, 20])[:2].tolist() == [[30, 20], [30, -1]]
 
 
@@ -69,7 +72,7 @@ def test_same_contacts_as_by_looking_at_all(spread: float) -> None:
     radii = 0.05 * 10 ** generator.uniform(-spread, 0, 500)
     gaps = np.linalg.norm(centres[:, None] - centres, axis=2) - radii[:, None] - radii
     expected = np.argwhere(np.triu(gaps < 0.01, k=1))
-    found = contacts_by_distance(centres, radii, 0.01)
+    found = contacts_by_distance(Spheres(centres, radii), 0.01)
     assert len(expected) > 50
     assert found.sides.tolist() == expected.tolist()
     assert found.gaps == pytest.approx(gaps[tuple(expected.T)], abs=ROUNDING)
@@ -84,7 +87,7 @@ def test_same_contacts_as_by_looking_at_all(spread: float) -> None:
 def test_a_hundred_thousand_spheres_take_about_a_second() -> None:
     places = np.indices((47, 47, 47)).reshape(3, -1).T[:100_000]
     start = time.perf_counter()
-    found = contacts_by_distance(places, np.full(100_000, 0.5), 0.01)
+    found = contacts_by_distance(Spheres(places, np.full(100_000, 0.5)), 0.01)
     # 0.5 s where this was written; ten times that on a slow or busy machine.
     assert time.perf_counter() - start < 5
     counts = contact_counts(found.sides, np.arange(100_000)).particles
@@ -94,15 +97,19 @@ def test_a_hundred_thousand_spheres_take_about_a_second() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("places", "arguments", "message"),
     [
-        (([[0, 0, 0]], [1], -0.1), "must not be negative, and finite: -0.1"),
-        (([[0, 0, 0]], [1], np.nan), "must not be negative, and finite: nan"),
-        (([[0, 0, 0], [0, 0, 0]], [1, 1], 0), "the centres 0 and 1 are the same"),
-        (([[0, 0, 0]], [1], 0, group_spheres([1, 1])), "1 positions, but 2 spheres in particles"),
-        (([[0, 0, 0]], [1], 0, None, [[1, 0]] * 3), "xlo = 1 must be less than xhi = 0"),
+        ([[0, 0, 0]], (-0.1,), "must not be negative, and finite: -0.1"),
+        ([[0, 0, 0]], (np.nan,), "must not be negative, and finite: nan"),
+        ([[0, 0, 0], [0, 0, 0]], (0,), "the centres 0 and 1 are the same"),
+        ([[0, 0, 0]], (0, [[1, 0]] * 3), "xlo = 1 must be less than xhi = 0"),
     ],
 )
-def test_wrong_input(arguments: tuple[Any, ...], message: str) -> None:
+def test_wrong_input(places: Any, arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        contacts_by_distance(*arguments)
+        contacts_by_distance(Spheres(places, np.ones(len(places))), *arguments)
+
+
+def test_as_many_spheres_as_in_particles() -> None:
+    with pytest.raises(InputError, match="1 positions, but 2 spheres in particles"):
+        Spheres([[0, 0, 0]], [1], group_spheres([1, 1]))

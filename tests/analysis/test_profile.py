@@ -11,6 +11,7 @@ import pytest
 from lammps_inelastic.analysis import (
     InputError,
     Particles,
+    Spheres,
     exact_packing_fraction,
     group_spheres,
     mueller_packing_fraction,
@@ -37,7 +38,10 @@ def random_dimers(
 def test_one_sphere_at_the_wall() -> None:
     radius = 0.1
     found = wall_profile(
-        [[0.1, 0.5, 0.5]], [radius], [[0, 0.25], [0, 1], [0, 1]], wall="xlo", thickness=0.01
+        Spheres([[0.1, 0.5, 0.5]], [radius]),
+        [[0, 0.25], [0, 1], [0, 1]],
+        wall="xlo",
+        thickness=0.01,
     )
     assert len(found.values) == 25
     # A product of two.
@@ -56,7 +60,7 @@ def test_slabs_are_boxes(wall: str) -> None:
     positions, radii, dimers = random_dimers(60, 0.15, 0.2, seed=1)
     box = np.array([[0.1, 0.5], [0.2, 0.9], [-0.1, 0.45]])
     found = wall_profile(
-        positions, radii, box, wall=wall, thickness=0.06, particles=dimers, diameter=0.5
+        Spheres(positions, radii, dimers), box, wall=wall, thickness=0.06, diameter=0.5
     )
     axis, upper = "xyz".index(wall[0]), wall[1:] == "hi"
     assert len(found.values) == int((box[axis, 1] - box[axis, 0]) / 0.06)
@@ -66,21 +70,21 @@ def test_slabs_are_boxes(wall: str) -> None:
         middle = box[axis, 1] - distance if upper else box[axis, 0] + distance
         slab[axis] = middle - 0.03, middle + 0.03
         # The bounds of the slab, and so the volume, differ by rounding.
-        expected = exact_packing_fraction(positions, radii, slab, dimers).value
+        expected = exact_packing_fraction(Spheres(positions, radii, dimers), slab).value
         assert value == pytest.approx(expected, rel=1e-12)
 
 
 def test_slabs_add_up(monkeypatch: pytest.MonkeyPatch) -> None:
     positions, radii, dimers = random_dimers(200, 0.1, 0.15, seed=2)
     box = [[0, 0.5], [0.25, 0.75], [0.25, 0.75]]
-    whole = exact_packing_fraction(positions, radii, box, dimers).value
-    usual = wall_profile(positions, radii, box, wall="xlo", thickness=0.005, particles=dimers)
+    whole = exact_packing_fraction(Spheres(positions, radii, dimers), box).value
+    usual = wall_profile(Spheres(positions, radii, dimers), box, wall="xlo", thickness=0.005)
     assert len(usual.values) == 100
     # The volumes of 400 pieces in 100 slabs, each rounded at 1e-18.
     assert usual.values.mean() == pytest.approx(whole, rel=1e-12)
     # Small groups give the same.
     monkeypatch.setattr("lammps_inelastic.analysis.profile.PAIRS", 100)
-    grouped = wall_profile(positions, radii, box, wall="xlo", thickness=0.005, particles=dimers)
+    grouped = wall_profile(Spheres(positions, radii, dimers), box, wall="xlo", thickness=0.005)
     assert grouped.values == pytest.approx(usual.values, rel=1e-12)
 
 
@@ -93,9 +97,9 @@ def test_random_points(wall: str) -> None:
     positions, radii = np.vstack([grid - arms, grid + arms]), np.full(250, 0.06)
     dimers = group_spheres(np.tile(np.arange(1, 126), 2))
     box = [[0, 0.3], [0.1, 1], [0, 0.5]]
-    exact = wall_profile(positions, radii, box, wall=wall, thickness=0.05, particles=dimers)
+    exact = wall_profile(Spheres(positions, radii, dimers), box, wall=wall, thickness=0.05)
     measured = wall_profile_monte_carlo(
-        positions, radii, box, wall=wall, thickness=0.05, points=50_000
+        Spheres(positions, radii), box, wall=wall, thickness=0.05, points=50_000
     )
     assert (measured.distances == exact.distances).all()
     assert (measured.scaled == exact.scaled).all()
@@ -111,18 +115,18 @@ def test_thickness_of_the_paper() -> None:
     # 0.25 / 0.005 and 0.3 / 0.1 are not whole numbers in floating point.
     one = [[0.1, 0.5, 0.5]]
     box = [[0, 0.25], [0.25, 0.75], [0.25, 0.75]]
-    assert len(wall_profile(one, [0.1], box, wall="xlo", thickness=0.005).values) == 50
+    assert len(wall_profile(Spheres(one, [0.1]), box, wall="xlo", thickness=0.005).values) == 50
     box[0] = [0, 0.3]
-    assert len(wall_profile(one, [0.1], box, wall="xlo", thickness=0.1).values) == 3
+    assert len(wall_profile(Spheres(one, [0.1]), box, wall="xlo", thickness=0.1).values) == 3
     box[0] = [0, 0.39]
-    assert len(wall_profile(one, [0.1], box, wall="xlo", thickness=0.1).values) == 3
+    assert len(wall_profile(Spheres(one, [0.1]), box, wall="xlo", thickness=0.1).values) == 3
 
 
 def test_many_dimers_are_fast() -> None:
     positions, radii, dimers = random_dimers(10_000, 0.026, 0.04, seed=4)
     box = [[0, 0.25], [0.25, 0.75], [0.25, 0.75]]
     begin = time.process_time()
-    wall_profile(positions, radii, box, wall="xlo", thickness=0.005, particles=dimers)
+    wall_profile(Spheres(positions, radii, dimers), box, wall="xlo", thickness=0.005)
     # 0.1 s on one old core; a loop over the pairs of dimer and slab takes minutes.
     assert time.process_time() - begin < 5
 
@@ -134,12 +138,15 @@ def test_many_dimers_are_fast() -> None:
         ({"thickness": 0}, "thicker than 0 and fit into the box's 1 along y, not 0"),
         ({"thickness": 1.1}, "fit into the box's 1 along y, not 1.1"),
         ({"diameter": -1}, "a diameter must be positive and finite, not -1"),
-        ({"radii": [1, 2]}, "the spheres differ in size: say which diameter"),
+        (
+            {"spheres": Spheres(np.eye(2, 3), [1, 2])},
+            "the spheres differ in size: say which diameter",
+        ),
         ({"box": [[0, 1]]}, r"a box must have shape \(3, 2\)"),
     ],
 )
 def test_wrong_input(changes: dict[str, Any], message: str) -> None:
-    usual = {"positions": np.eye(2, 3), "radii": [1, 1], "box": [[0, 1]] * 3}
+    usual = {"spheres": Spheres(np.eye(2, 3), [1, 1]), "box": [[0, 1]] * 3}
     with pytest.raises(InputError, match=message):
         wall_profile(**(usual | {"wall": "ylo", "thickness": 0.1} | changes))
     with pytest.raises(InputError, match=message):

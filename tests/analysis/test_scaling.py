@@ -9,6 +9,7 @@ import pytest
 
 from lammps_inelastic.analysis import (
     InputError,
+    Spheres,
     binned_exponent,
     group_spheres,
     local_ratios,
@@ -87,14 +88,23 @@ def test_bad_input_of_a_power_law() -> None:
 def test_gaps_of_known_places() -> None:
     positions = np.array([[0.0, 0, 0], [1.1, 0, 0], [2.05, 0, 0], [5.0, 0, 0]])
     radii = np.full(4, 0.5)
-    assert sorted(small_gaps(positions, radii, 0.2)) == pytest.approx([-0.05, 0.1], abs=1e-12)
+    assert sorted(small_gaps(Spheres(positions, radii), 0.2)) == pytest.approx(
+        [-0.05, 0.1], abs=1e-12
+    )
     # The second sphere is a rattler.
-    none = small_gaps(positions, radii, 0.2, left_out=np.array([False, True, False, False]))
+    none = small_gaps(
+        Spheres(positions, radii), 0.2, left_out=np.array([False, True, False, False])
+    )
     assert len(none) == 0
     # The first two are one body.
     particles = group_spheres([1, 1, 2, 3])
-    assert small_gaps(positions, radii, 0.2, particles) == pytest.approx([-0.05], abs=1e-12)
-    assert len(small_gaps(positions, radii, 0.2, particles, np.array([True, False, False]))) == 0
+    assert small_gaps(Spheres(positions, radii, particles), 0.2) == pytest.approx(
+        [-0.05], abs=1e-12
+    )
+    assert (
+        len(small_gaps(Spheres(positions, radii, particles), 0.2, np.array([True, False, False])))
+        == 0
+    )
 
 
 def test_forces_over_the_mean_of_their_layer() -> None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from lammps_inelastic.analysis import (
     InputError,
+    Spheres,
     bond_order,
     plot_radial_distribution,
     radial_distribution,
@@ -20,6 +21,11 @@ from lammps_inelastic.analysis.geometry import FloatArray
 
 # freud computes in float32: seven digits, of which sums of spherical harmonics lose two.
 SINGLE = 1e-4
+
+
+def around(centres: ArrayLike) -> Spheres:
+    """Spheres of diameter 1 at some centres; their size is of no importance here."""
+    return Spheres(centres, np.full(len(np.asarray(centres)), 0.5))
 
 
 def lattice(cell: float, basis: ArrayLike, repeats: Sequence[int]) -> FloatArray:
@@ -55,7 +61,7 @@ INSIDE = np.array([[3, 7], [3, 7], [3, 7]])
 def test_crystals(
     centres: FloatArray, box: Any, name: str, q4: float, q6: float, w6: float
 ) -> None:
-    found = bond_order(centres, box, w6=True)
+    found = bond_order(around(centres), box, w6=True)
     # The values of Steinhardt, Nelson and Ronchetti (1983), to the digits given.
     assert found.q4 == pytest.approx(q4, abs=SINGLE)
     assert found.q6 == pytest.approx(q6, abs=SINGLE)
@@ -68,12 +74,12 @@ def test_crystals(
 
 def test_a_shaken_crystal_is_still_one() -> None:
     shaken = FCC + np.random.default_rng(2).normal(0, 0.03, FCC.shape)
-    assert bond_order(shaken, MIDDLE).crystallised
+    assert bond_order(around(shaken), MIDDLE).crystallised
 
 
 def test_points_at_random_are_no_crystal() -> None:
     points = np.random.default_rng(0).uniform(0, 1, (20_000, 3))
-    found = bond_order(points, [[0.2, 0.8]] * 3)
+    found = bond_order(around(points), [[0.2, 0.8]] * 3)
     # Twelve independent directions: the mean of q6^2 is 1 / 12. 4,300 particles scatter by 0.2 each
     # around it, neighbours not independently: 1 %, three times the error of the mean.
     assert np.sqrt((found.q6**2).mean()) == pytest.approx(1 / np.sqrt(12), rel=0.01)
@@ -86,7 +92,9 @@ def test_points_at_random_are_no_crystal() -> None:
 
 def test_radial_distribution_of_points_at_random_is_one() -> None:
     points = np.random.default_rng(5).uniform(0, [1, 5, 1], (50_000, 3))
-    found = radial_distribution(points, [[0.3, 0.7], [1, 4], [0.3, 0.7]], largest=0.25, bins=10)
+    found = radial_distribution(
+        around(points), [[0.3, 0.7], [1, 4], [0.3, 0.7]], largest=0.25, bins=10
+    )
     # 4,800 particles in the box: the mean density is known to 1.4 %. The innermost shell has 1,600
     # pairs, which are known to 2.5 %, the others seven times as many and more. Three times both.
     assert found.values[0] == pytest.approx(1, abs=0.09)
@@ -96,7 +104,7 @@ def test_radial_distribution_of_points_at_random_is_one() -> None:
 
 
 def test_shells_of_a_crystal() -> None:
-    found = radial_distribution(FCC, MIDDLE, largest=2.1, bins=210)
+    found = radial_distribution(around(FCC), MIDDLE, largest=2.1, bins=210)
     assert found.particles == 256
     # Four spheres in a cube of width sqrt(2).
     assert found.density == pytest.approx(np.sqrt(2), rel=1e-12)
@@ -114,12 +122,12 @@ def test_box_too_near_to_the_surface() -> None:
     with pytest.raises(
         InputError, match="along y the box must be 2 or more away from the outermost"
     ):
-        radial_distribution(FCC, [[3, 7], [1.5, 7], [3, 7]], largest=2)
+        radial_distribution(around(FCC), [[3, 7], [1.5, 7], [3, 7]], largest=2)
 
 
 def test_plot() -> None:
     ax = Figure().add_subplot()
-    found = radial_distribution(FCC, MIDDLE, largest=2, bins=20)
+    found = radial_distribution(around(FCC), MIDDLE, largest=2, bins=20)
     assert plot_radial_distribution(ax, found, diameter=2.0) is ax
     assert ax.lines[0].get_xdata()[-1] == pytest.approx(1.95 / 2, rel=1e-14)
 
@@ -127,14 +135,17 @@ def test_plot() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: bond_order(FCC[:12], [[0, 1]] * 3), "more than 12 particles are needed, not 12"),
-        (lambda: bond_order(FCC, [[50, 51]] * 3), "no particle's centre lies in the box"),
         (
-            lambda: radial_distribution(FCC, MIDDLE, largest=0),
+            lambda: bond_order(around(FCC[:12]), [[0, 1]] * 3),
+            "more than 12 particles are needed, not 12",
+        ),
+        (lambda: bond_order(around(FCC), [[50, 51]] * 3), "no particle's centre lies in the box"),
+        (
+            lambda: radial_distribution(around(FCC), MIDDLE, largest=0),
             "the largest radius must be positive",
         ),
         (
-            lambda: radial_distribution(FCC, MIDDLE, largest=1, bins=0),
+            lambda: radial_distribution(around(FCC), MIDDLE, largest=1, bins=0),
             "number of shells must be at least 1",
         ),
     ],

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from lammps_inelastic.analysis import (
     InputError,
     Particles,
+    Spheres,
     group_spheres,
     particle_volumes_in_box,
     sphere_volumes_in_box,
@@ -68,7 +69,7 @@ BOXES = {
 
 def in_box(centre: ArrayLike, radius: float, box: ArrayLike) -> float:
     with np.errstate(all="raise"):
-        return sphere_volumes_in_box([centre], [radius], box)[0]
+        return sphere_volumes_in_box(Spheres([centre], [radius]), box)[0]
 
 
 @pytest.mark.parametrize("name", CUTS)
@@ -217,10 +218,10 @@ def test_parts_of_a_box_add_up() -> None:
     positions, radii, dimers = random_dimers(300, [0.2, 0.15], 0.25, seed=1)
     parts = boxes_of(UNIT, [[0.3, 0.31], [0.5], [0.2, 0.7]])
     # Each of the 18 parts rounds at 1e-17.
-    total = sum(sphere_volumes_in_box(positions, radii, part) for part in parts)
-    assert total == pytest.approx(sphere_volumes_in_box(positions, radii, UNIT), abs=1e-15)
-    total = sum(particle_volumes_in_box(positions, radii, part, dimers) for part in parts)
-    whole = particle_volumes_in_box(positions, radii, UNIT, dimers)
+    total = sum(sphere_volumes_in_box(Spheres(positions, radii), part) for part in parts)
+    assert total == pytest.approx(sphere_volumes_in_box(Spheres(positions, radii), UNIT), abs=1e-15)
+    total = sum(particle_volumes_in_box(Spheres(positions, radii, dimers), part) for part in parts)
+    whole = particle_volumes_in_box(Spheres(positions, radii, dimers), UNIT)
     assert total == pytest.approx(whole, abs=1e-15)
 
 
@@ -255,7 +256,7 @@ DIMERS = {
 
 def dimer(centres: ArrayLike, radii: ArrayLike, box: ArrayLike) -> float:
     with np.errstate(all="raise"):
-        return particle_volumes_in_box(centres, radii, box, group_spheres([3, 3]))[0]
+        return particle_volumes_in_box(Spheres(centres, radii, group_spheres([3, 3])), box)[0]
 
 
 @pytest.mark.parametrize("name", DIMERS)
@@ -290,7 +291,7 @@ def test_rounding_decides_which_corner_is_behind_the_plane(shift: float) -> None
 def test_dimers_in_a_large_box() -> None:
     radius, distance = 0.2, 0.3
     positions, radii, particles = random_dimers(50, [radius, radius], distance, seed=2)
-    volumes = particle_volumes_in_box(positions, radii, [[-5, 5]] * 3, particles)
+    volumes = particle_volumes_in_box(Spheres(positions, radii, particles), [[-5, 5]] * 3)
     lens = np.pi / 12 * (4 * radius + distance) * (2 * radius - distance) ** 2
     # A few operations.
     assert volumes == pytest.approx(np.full(50, 2 * BALL * radius**3 - lens), rel=1e-13)
@@ -313,10 +314,10 @@ def test_free_spheres_and_dimers_in_any_order() -> None:
             expected[body] = dimer(positions[members], radii[members], UNIT)
         else:
             expected[body] = in_box(positions[members[0]], radii[members[0]], UNIT)
-    free = sphere_volumes_in_box(positions[bodies == 0], radii[bodies == 0], UNIT)
+    free = sphere_volumes_in_box(Spheres(positions[bodies == 0], radii[bodies == 0]), UNIT)
     order = np.random.default_rng(4).permutation(80)
     particles = group_spheres(bodies[order])
-    found = particle_volumes_in_box(positions[order], radii[order], UNIT, particles)
+    found = particle_volumes_in_box(Spheres(positions[order], radii[order], particles), UNIT)
     is_body = particles.bodies > 0
     # The order of the two spheres of a dimer changes the rounding of terms of 0.03.
     assert found[is_body] == pytest.approx(expected[particles.bodies[is_body]], abs=1e-15)
@@ -326,21 +327,21 @@ def test_free_spheres_and_dimers_in_any_order() -> None:
 def test_larger_bodies_are_refused() -> None:
     message = "the number of spheres in body 4 is 3; packing_fraction measures any body"
     with pytest.raises(InputError, match=message):
-        particle_volumes_in_box(np.eye(3), [1] * 3, UNIT, group_spheres([4, 4, 4]))
+        particle_volumes_in_box(Spheres(np.eye(3), [1] * 3, group_spheres([4, 4, 4])), UNIT)
 
 
 def test_wrong_input() -> None:
     with pytest.raises(InputError, match="radii must be positive"):
-        sphere_volumes_in_box([[0, 0, 0]], [0], UNIT)
+        sphere_volumes_in_box(Spheres([[0, 0, 0]], [0]), UNIT)
     with pytest.raises(InputError, match="ylo = 2 must be less than yhi = 2"):
-        sphere_volumes_in_box([[0, 0, 0]], [1], [[0, 1], [2, 2], [0, 1]])
+        sphere_volumes_in_box(Spheres([[0, 0, 0]], [1]), [[0, 1], [2, 2], [0, 1]])
     with pytest.raises(InputError, match="1 positions, but 2 spheres in particles"):
-        particle_volumes_in_box([[0, 0, 0]], [1], UNIT, group_spheres([1, 1]))
+        particle_volumes_in_box(Spheres([[0, 0, 0]], [1], group_spheres([1, 1])), UNIT)
 
 
 def test_many_spheres_are_fast() -> None:
     positions = np.random.default_rng(5).uniform(0, 1, (100_000, 3))
     begin = time.process_time()
-    sphere_volumes_in_box(positions, np.full(len(positions), 0.3), [[0.25, 0.75]] * 3)
+    sphere_volumes_in_box(Spheres(positions, np.full(len(positions), 0.3)), [[0.25, 0.75]] * 3)
     # All are cut: half a second on one old core; a loop over the spheres takes a minute.
     assert time.process_time() - begin < 5

@@ -15,26 +15,21 @@ from lammps_inelastic import analysis
 from lammps_inelastic.analysis import InputError
 
 BOX = [[0, 1]] * 3
-ONE = ([[0.5, 0.5, 0.5]], [0.3], BOX)
+CENTRE, RADIUS = [[0.5, 0.5, 0.5]], [0.3]
+ONE = (analysis.Spheres(CENTRE, RADIUS), BOX)
 FRAME = analysis.ParticleFrame(
-    0, np.array([1]), np.array(ONE[0]), None, np.array(ONE[1]), None, np.array(BOX, float), None
+    0,
+    np.array([1]),
+    np.array(CENTRE),
+    None,
+    np.array(RADIUS),
+    None,
+    analysis.Cell.of_box(BOX),
+    None,
 )
-FREE = analysis.group_spheres([0])
 TEN = np.full(10, 0.5)
 NOISE = analysis.RadialDistribution(np.array([0.0, 1.0]), np.array([1.0]), 1.0, 1)
 NAN = math.nan
-PERIODIC = analysis.ParticleFrame(
-    step=3,
-    ids=np.array([1]),
-    positions=np.array(ONE[0]),
-    velocities=None,
-    radii=np.array(ONE[1]),
-    bodies=None,
-    box=np.array(BOX, dtype=float),
-    boundaries=("ff", "pp", "ff"),
-)
-ACROSS = "frame of step 3: the box is periodic (ff pp ff), and contacts and overlaps across"
-
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "points": (
@@ -43,8 +38,8 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "no points": (
         lambda: (
-            analysis.best_packing_fraction(*ONE, analysis.group_spheres([0]), points=0)
-            and analysis.measure_packing_fraction(*ONE, FREE, points=0)
+            analysis.best_packing_fraction(*ONE, points=0)
+            and analysis.measure_packing_fraction(*ONE, points=0)
         ),
         "the number of points must be at least 1, not 0",
     ),
@@ -57,7 +52,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         "the seed must be at least 0",
     ),
     "seed of necks": (
-        lambda: analysis.packing_fraction_with_necks(*ONE, FREE, seed=-1),
+        lambda: analysis.packing_fraction_with_necks(*ONE, seed=-1),
         "the seed must be at least 0",
     ),
     "seed of a profile": (
@@ -68,10 +63,14 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: analysis.wall_profile(*ONE, wall="xlo", thickness=1e-300),
         "slabs of 1e-300 are more than 1000000 in the box",
     ),
-    "a packing in a periodic box": (lambda: analysis.measure_packing(PERIODIC, (), BOX), ACROSS),
-    "frames of a periodic box": (lambda: analysis.measure_evolution([PERIODIC], BOX), ACROSS),
-    "words": (lambda: analysis.packing_fraction([["a", "b", "c"]], [1], BOX), "positions must be"),
-    "rows": (lambda: analysis.packing_fraction([[1, 2, 3], [4]], [1], BOX), "an array of numbers"),
+    "words": (
+        lambda: analysis.packing_fraction(analysis.Spheres([["a", "b", "c"]], [1]), BOX),
+        "positions must be",
+    ),
+    "rows": (
+        lambda: analysis.packing_fraction(analysis.Spheres([[1, 2, 3], [4]], [1]), BOX),
+        "an array of numbers",
+    ),
     "parts of a contact": (
         lambda: analysis.contact_counts([[1, 2.5]], [1, 2]),
         "contact ids must be whole numbers",
@@ -92,16 +91,18 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "normals": (lambda: analysis.fabric_tensor([[NAN, 0, 0]]), "normals hold NaN or infinity"),
     "weights": (lambda: analysis.fabric_tensor([[1, 0, 0]], [math.inf]), "positive and finite"),
     "forces of a graph": (
-        lambda: analysis.contact_graph([[1, 2]], [1, 2], np.eye(3)[:2], [NAN]),
+        lambda: analysis.contact_graph(
+            [[1, 2]], [1, 2], analysis.Spheres(np.eye(3)[:2], [0.1, 0.1]), [NAN]
+        ),
         "forces hold NaN or infinity",
     ),
     "ids by distance": (
-        lambda: analysis.contacts_by_distance(np.eye(3), [1] * 3, 1).ids([1, 2]),
+        lambda: analysis.contacts_by_distance(analysis.Spheres(np.eye(3), [1] * 3), 1).ids([1, 2]),
         "sphere ids must be those of all spheres",
     ),
     "bins": (lambda: analysis.force_distribution([1], bins=2.5), "bins must be a whole number"),
     "shells": (
-        lambda: analysis.radial_distribution(np.eye(3), BOX, largest=0.1, bins=0),
+        lambda: analysis.radial_distribution(ONE[0], BOX, largest=0.1, bins=0),
         "the number of shells must be at least 1",
     ),
     "bounds": (lambda: analysis.logarithmic_density([1], 1, 0.5), "must be 0 < low < high, not 1"),
@@ -115,7 +116,9 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "heights": (lambda: analysis.local_ratios([1, 2], [0, NAN], 1), "heights hold NaN or infinity"),
     "layers": (lambda: analysis.local_ratios([1, 2], [0, 1], 1.5), "layers must be a whole number"),
     "left out": (
-        lambda: analysis.small_gaps(np.eye(3), [1] * 3, 1, left_out=np.array([True])),
+        lambda: analysis.small_gaps(
+            analysis.Spheres(np.eye(3), [1] * 3), 1, left_out=np.array([True])
+        ),
         "left_out must have shape (3,), not (1,)",
     ),
     "series": (
@@ -145,16 +148,16 @@ def test_wrong_input_of_files(tmp_path: Path) -> None:
             tmp_path / "a.tif", [[5e-10] * 3], [3e-10], small, 1e-10
         ),
         "subdivisions must be a whole number": lambda: analysis.write_stl(
-            tmp_path / "a.stl", *ONE[:2], subdivisions=1.5
+            tmp_path / "a.stl", CENTRE, RADIUS, subdivisions=1.5
         ),
         "more than 1e+08 faces": lambda: analysis.write_stl(
-            tmp_path / "a.stl", *ONE[:2], subdivisions=10**12
+            tmp_path / "a.stl", CENTRE, RADIUS, subdivisions=10**12
         ),
         "id must be whole numbers": lambda: analysis.write_xyz(
-            tmp_path / "a.xyz", *ONE[:2], ids=[1.5]
+            tmp_path / "a.xyz", CENTRE, RADIUS, ids=[1.5]
         ),
         "pixels must be at least 1": lambda: analysis.draw_packing(
-            tmp_path / "a.png", *ONE, pixels=0
+            tmp_path / "a.png", CENTRE, RADIUS, BOX, pixels=0
         ),
     }.items():
         with pytest.raises(InputError) as raised:

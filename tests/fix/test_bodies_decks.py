@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import (
+    Spheres,
+    group_spheres,
     iterate_contact_frames,
     largest_pair_overlap,
     read_particle_frame,
@@ -80,7 +82,9 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
     assert frame.step == last
     assert frame.bodies is not None
     assert np.array_equal(np.bincount(frame.bodies)[1:], np.full(particles, spheres))
-    overlap = largest_pair_overlap(frame.positions, frame.radii, frame.bodies).depth
+    overlap = largest_pair_overlap(
+        Spheres(frame.positions, frame.radii, group_spheres(frame.bodies))
+    ).depth
     assert overlap <= 2 * TIGHT * frame.radii[0] * (1 + 1e-6)  # round-off of the dump
     contacts = list(iterate_contact_frames(result.folder / "out" / "contacts.lammpsdump"))
     assert [frame.step for frame in contacts] == [last - 3, last - 2, last - 1, last]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lammps_inelastic.analysis import largest_pair_overlap
+from lammps_inelastic.analysis import Spheres, largest_pair_overlap
 from tests.fix.lammps_run import Run, Runner
 from tests.fix.scenes import (
     DUMP_CONTACTS,
@@ -60,7 +60,7 @@ def test_own_formula_agrees_with_the_analysis() -> None:
     points = np.random.default_rng(1).uniform(0, 1, (200, 3))
     radii = np.random.default_rng(2).uniform(0.02, 0.1, 200)
     assert deepest_pair(points, radii) == pytest.approx(
-        largest_pair_overlap(points, radii).depth,
+        largest_pair_overlap(Spheres(points, radii)).depth,
         rel=1e-12,  # round-off
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import (
+    Spheres,
     iterate_contact_frames,
     largest_pair_overlap,
     read_particle_frame,
@@ -40,7 +41,7 @@ def test_the_deck_runs(ranks: int, lmp: Runner) -> None:
     assert frame.step == 348
     assert np.array_equal(frame.ids, np.arange(1, 1001))
     # The tighter tolerance of the last phase; 1e-6 for round-off.
-    overlap = largest_pair_overlap(frame.positions, frame.radii).depth
+    overlap = largest_pair_overlap(Spheres(frame.positions, frame.radii)).depth
     assert overlap <= 0.00001 * 0.055 * (1 + 1e-6)
     contacts = list(iterate_contact_frames(result.folder / "out" / "contacts.lammpsdump"))
     assert [frame.step for frame in contacts] == [345, 346, 347, 348]
@@ -55,7 +56,7 @@ def test_ten_thousand_spheres_start(lmp: Runner) -> None:
     result = lmp(deck, variables=variables, program=LAUNCHER)
     assert not result.warnings, result.warnings
     frame = read_particle_frame(result.folder / "out" / "particles.lammpsdump")
-    overlap = largest_pair_overlap(frame.positions, frame.radii).depth
+    overlap = largest_pair_overlap(Spheres(frame.positions, frame.radii)).depth
     # The deck's tolerance; 1e-6 for round-off.
     assert overlap <= 0.0005 * 0.026 * (1 + 1e-6)
 

@@ -126,7 +126,7 @@ def test_overlap_of_every_step(name: str, tmp_path: Path) -> None:
     worst, frames = 0.0, 0
     for frame in ParticleDump(tmp_path / "particles.lammpsdump"):
         radius = float(frame.radii[0])
-        pair = largest_pair_overlap(frame.positions, frame.radii, frame.bodies).depth
+        pair = largest_pair_overlap(frame.spheres).depth
         gap = min(frame.positions.min(), (np.array([1.0, 5.0, 1.0]) - frame.positions).min())
         worst = max(worst, pair / radius, 1 - float(gap) / radius)
         frames += 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from lammps_inelastic import core
-from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
+from lammps_inelastic.analysis import ParticleDump, Spheres, largest_pair_overlap
 from lammps_inelastic.workflow.records import Recorded, read_record, records
 from tests.pouring import (
     measure,
@@ -154,7 +154,7 @@ def test_overlap_of_every_step(name: str, tmp_path: Path) -> None:
     run_deck(tmp_path, deck, {**values, **variables})
     worst, frames = 0.0, 0
     for frame in ParticleDump(tmp_path / "particles.lammpsdump"):
-        pair = largest_pair_overlap(frame.positions, frame.radii).depth
+        pair = largest_pair_overlap(Spheres(frame.positions, frame.radii)).depth
         wall = wall_overlap(name, frame.positions, frame.step, timestep)
         worst = max(worst, pair, wall)
         frames += 1

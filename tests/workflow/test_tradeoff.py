@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import (
+    Cell,
     InputError,
     ParticleFrame,
     at_steps,
@@ -150,7 +151,7 @@ def test_overlaps_are_the_contacts_of_soft_spheres() -> None:
         velocities=None,
         radii=np.full(3, 0.25),
         bodies=None,
-        box=np.array([[0, 1], [0, 5], [0, 1]]),
+        cell=Cell.of_box([[0, 1], [0, 5], [0, 1]]),
         boundaries=("ff", "ff", "ff"),
     )
     contacts = overlaps_as_contacts(frame)

@@ -14,7 +14,7 @@ from ..finished import CONTACTS as CONTACT_DUMP
 from ..finished import PARTICLES as PARTICLE_DUMP
 from ..look import PICTURE, look_at
 from ..look_output import as_json, as_text
-from ..study import MOST_POINTS, PAPER_BOX
+from ..study import MOST_POINTS
 from .arguments import add_frame
 
 
@@ -53,14 +53,18 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     )
     add_frame(look)
     bounds = ("XLO", "XHI", "YLO", "YHI", "ZLO", "ZHI")
-    look.add_argument(
+    where = look.add_mutually_exclusive_group()
+    where.add_argument(
         "--box",
         type=float,
         nargs=6,
         metavar=bounds,
-        default=PAPER_BOX,
         help="measure the packing fraction and the coordination number in this box "
-        "(default: 0.25 to 0.75 on every axis)",
+        "(default: 0.25 to 0.75 on every axis; the whole simulation box where it is periodic on "
+        "all sides)",
+    )
+    where.add_argument(
+        "--cell", action="store_true", help="measure them in the whole simulation box"
     )
     look.add_argument(
         "--points",
@@ -100,7 +104,8 @@ def run(options: argparse.Namespace) -> int:
     found = look_at(
         folder / name,
         folder / CONTACT_DUMP,
-        np.reshape(np.asarray(options.box, dtype=np.float64), (3, 2)),
+        None if options.box is None else np.reshape(np.asarray(options.box, float), (3, 2)),
+        whole_cell=options.cell,
         contact_gap=options.contact_gap,
         radius=options.radius,
         number=options.frame,

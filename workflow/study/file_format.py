@@ -6,6 +6,8 @@ import json
 import math
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
 
 # A box or a container: xlo, xhi, ylo, yhi, zlo, zhi [length].
@@ -70,7 +72,8 @@ class Outputs(_Table):
 
     Attributes
     ----------
-    box : xlo, xhi, ylo, yhi, zlo, zhi: where particles are counted, length
+    box : xlo, xhi, ylo, yhi, zlo, zhi: where particles are counted, length; `cell` for the whole
+        simulation box, such as one that is periodic on all sides
     points : number of random points for the Monte Carlo packing fraction
     evolution : whether packing fraction and contacts of every frame of the particle dump are kept
     profile : slabs for the packing fraction against the distance from a wall; None for none
@@ -80,7 +83,7 @@ class Outputs(_Table):
     keep : `everything`, or `results` to delete the dumps of a case that has been measured
     """
 
-    box: tuple[_Number, _Number, _Number, _Number, _Number, _Number] = PAPER_BOX
+    box: Literal["cell"] | tuple[_Number, _Number, _Number, _Number, _Number, _Number] = PAPER_BOX
     points: Annotated[int, _from_to(1, MOST_POINTS)] = 1_000_000
     evolution: _Boolean = True
     profile: ProfileOutput | None = None
@@ -91,7 +94,9 @@ class Outputs(_Table):
 
     @field_validator("box")
     @classmethod
-    def _ordered(cls, value: Bounds) -> Bounds:
+    def _ordered(cls, value: Bounds | Literal["cell"]) -> Bounds | Literal["cell"]:
+        if value == "cell":
+            return value
         sides = [high - low for low, high in zip(value[::2], value[1::2], strict=True)]
         # A volume that is no number of full precision gives no packing fraction.
         if not all(0 < side < math.inf for side in sides) or not 1e-300 < math.prod(sides) < 1e300:
@@ -104,6 +109,11 @@ class Outputs(_Table):
         if len(value) > MOST_PICTURES or len(set(value)) < len(value):
             raise ValueError(f"they must be at most {MOST_PICTURES} steps, each of them once")
         return value
+
+    @property
+    def bounds(self) -> NDArray[np.float64] | None:
+        """The box as an array (3, 2), length; None for the whole simulation box."""
+        return None if self.box == "cell" else np.reshape(np.array(self.box, dtype=float), (3, 2))
 
     @property
     def measured(self) -> str:

@@ -29,6 +29,8 @@ LIES_ON_FLOOR = ("spheres", "dimers", "clusters", SETTLING)
 
 def doubtful_outputs(outputs: Outputs, cases: Sequence[Case]) -> Iterator[str]:
     """Return one line for each kind of case whose box is expected to reach out of the bed."""
+    if outputs.box == "cell":
+        return
     top = outputs.box[3]
     for case in cases:
         end = expected_end(case)
@@ -81,13 +83,17 @@ def unmeasurable_outputs(outputs: Outputs, cases: Sequence[Case]) -> Iterator[st
             )
     for stage in [case.stages[-1] for case in cases]:
         container = container_of(stage)
-        if container is not None and not all(
-            low <= value <= high
-            for value, low, high in zip(
-                outputs.box,
-                [low for low in container[::2] for _ in "lh"],
-                [high for high in container[1::2] for _ in "lh"],
-                strict=True,
+        if (
+            outputs.box != "cell"
+            and container is not None
+            and not all(
+                low <= value <= high
+                for value, low, high in zip(
+                    outputs.box,
+                    [low for low in container[::2] for _ in "lh"],
+                    [high for high in container[1::2] for _ in "lh"],
+                    strict=True,
+                )
             )
         ):
             yield (
