@@ -23,19 +23,22 @@ class Orientation:
     components : (3,), root mean square of these vectors' x, y and z, length
     standard_errors : (3,), of `components`, length; None for a single dimer
     dimers : number of dimers
+    dimensions : 2 for dimers of discs in a plane, else 3
     """
 
     components: FloatArray
     standard_errors: FloatArray | None
     dimers: int
+    dimensions: int = 3
 
     @property
     def isotropic(self) -> float:
         """The value of each component if no direction was preferred, length.
 
-        It is the root mean square distance of the two centres over sqrt(3).
+        It is the root mean square distance of the two centres over sqrt(3); in a plane over
+        sqrt(2), and z has none.
         """
-        return math.sqrt(float((self.components**2).mean()))
+        return math.sqrt(float((self.components[: self.dimensions] ** 2).mean()))
 
 
 def dimer_orientation(spheres: Spheres, box: ArrayLike | None = None) -> Orientation:
@@ -80,4 +83,4 @@ def dimer_orientation(spheres: Spheres, box: ArrayLike | None = None) -> Orienta
         of_squares = squares.std(axis=0, ddof=1) / math.sqrt(dimers)
         errors = np.zeros(3)
         np.divide(of_squares, 2 * components, out=errors, where=components > 0)
-    return Orientation(components, errors, dimers)
+    return Orientation(components, errors, dimers, 2 if spheres.flat else 3)

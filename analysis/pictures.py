@@ -6,6 +6,7 @@ import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations, product
 from os import PathLike
 from pathlib import Path
 
@@ -14,14 +15,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image, ImageChops, ImageDraw, ImageFont
 
+from .cell import Cell
 from .errors import InputError, PictureError
 from .files import reason_of, unfinished
-from .geometry import FloatArray, IntArray, as_box, as_count, as_integers, as_spheres
+from .geometry import FloatArray, IntArray, as_box, as_count, as_integers
+from .spheres import Spheres
 
 # A picture is drawn so many times larger and then reduced, which smooths all edges.
 OVERSAMPLING = 2
 # LAMMPS's zoom at which a cube, seen from here, still fits into the image.
 ZOOM = 1.15
+# Angles from which LAMMPS looks: polar, and around z.
+OBLIQUE, FRONT = "70 25", "0 0"
 # The container has so many corners.
 CORNERS = 8
 CONTACT_SHADES = 11
@@ -34,6 +39,8 @@ EDGE_COLOUR = (0.45, 0.45, 0.48)
 TEXT = 32
 
 Colour = tuple[float, float, float]
+# Corners, (8, 3), and the indices of the two at the ends of each edge.
+_Edges = tuple[FloatArray, list[tuple[int, int]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +71,8 @@ class _Shading:
 
 def draw_packing(
     path: str | PathLike[str],
-    positions: ArrayLike,
-    radii: ArrayLike,
-    container: ArrayLike,
+    spheres: Spheres,
+    container: ArrayLike | None = None,
     contacts: ArrayLike | None = None,
     *,
     contacts_per_colour: int = 1,
@@ -75,14 +81,15 @@ def draw_packing(
 ) -> None:
     """Write a PNG of a packing and the edges of its container; -y, where things fall, is down.
 
-    The container is drawn open, from its floor to just above the highest sphere.
+    A container is drawn open, from its floor to just above the highest sphere. A cell with periods
+    is drawn whole; particles whose centres lie in it reach through its faces, and their images are
+    not drawn. Discs are seen from the front.
 
     Parameters
     ----------
     path : of the PNG
-    positions : (n, 3), length
-    radii : (n,), length
-    container : (3, 2), lower and upper bound per axis, length
+    spheres : the spheres and their cell
+    container : (3, 2), lower and upper bound per axis, length; None: the cell
     contacts : (n,), contacts of each sphere, or of its body, with others, for the colours; by
         radius if None
     contacts_per_colour : how many numbers of contacts share a colour: bodies have more contacts
@@ -90,11 +97,12 @@ def draw_packing(
     pixels : the larger side of the packing in the picture, about
     longest : no side of the picture, with its legend, has more pixels; None for no bound
 
-    Raises InputError for arrays of other shapes and for numbers that are not whole and positive,
-    and PictureError where LAMMPS cannot draw or the file cannot be written.
+    Raises InputError for arrays of other shapes, for no container where there is no cell, and for
+    numbers that are not whole and positive, and PictureError where LAMMPS cannot draw or the file
+    cannot be written.
     """
-    centres, radius = as_spheres(positions, radii)
-    bounds = as_box(container)
+    centres, radius = spheres.positions, spheres.radii
+    edges = _edges(spheres, container)
     as_count(pixels, "the number of pixels")
     if longest is not None:
         as_count(longest, "the number of pixels of the longest side")
@@ -104,7 +112,8 @@ def draw_packing(
         shading = _by_contacts(contacts, len(radius), contacts_per_colour)
     with tempfile.TemporaryDirectory(prefix="inelastic-picture-") as folder:
         raw = Path(folder) / "packing.ppm"
-        _render(raw, centres, radius, bounds, shading, pixels * OVERSAMPLING)
+        view = FRONT if spheres.flat else OBLIQUE
+        _render(raw, centres, radius, edges, shading, view, pixels * OVERSAMPLING)
         with Image.open(raw) as image:
             picture = _framed(image.convert("RGB"), shading, pixels)
     if longest is not None:
@@ -181,11 +190,12 @@ def _render(
     path: Path,
     centres: FloatArray,
     radii: FloatArray,
-    container: FloatArray,
+    container: _Edges,
     shading: _Shading,
+    view: str,
     pixels: int,
 ) -> None:
-    """Draw the spheres and the open container as spheres and bonds of a LAMMPS without forces."""
+    """Draw the spheres and the container as spheres and bonds of a LAMMPS without forces."""
     try:
         # These imports stand here because the numbers must be had where LAMMPS cannot be loaded.
         # mpi4py loads the MPI library that LAMMPS needs, before lammps() is called.
@@ -210,7 +220,7 @@ def _render(
             engine.numpy.extract_atom("radius")[: len(scene.points)] = scene.sizes
             for one, other in scene.edges:
                 engine.command(f"create_bonds single/bond 1 {one + 1} {other + 1} special no")
-            engine.command(_image_command(path, shading, scene.thickness, pixels))
+            engine.command(_image_command(path, shading, scene.thickness, view, pixels))
         finally:
             engine.close()
     # LAMMPS's Python module raises plain Exception.
@@ -227,7 +237,7 @@ class _Scene:
     ----------
     points : (n + 8, 3), centres of the spheres, then corners, length
     sizes : (n + 8,), radii of both, length
-    edges : indices of the two corners of each edge
+    edges : indices of the two points at the ends of each edge
     thickness : of the edges, length
     """
 
@@ -258,8 +268,8 @@ class _Scene:
         ]
 
 
-def _scene(centres: FloatArray, radii: FloatArray, container: FloatArray) -> _Scene:
-    corners, edges = _open_box(container, top=float((centres[:, 1] + radii).max()))
+def _scene(centres: FloatArray, radii: FloatArray, container: _Edges) -> _Scene:
+    corners, edges = container
     thickness = 0.005 * float(np.ptp(corners, axis=0).max())
     return _Scene(
         points=np.vstack([centres, corners]),
@@ -269,7 +279,33 @@ def _scene(centres: FloatArray, radii: FloatArray, container: FloatArray) -> _Sc
     )
 
 
-def _open_box(container: FloatArray, top: float) -> tuple[FloatArray, list[tuple[int, int]]]:
+def _edges(spheres: Spheres, container: ArrayLike | None) -> _Edges:
+    """Return the corners and edges of an open container, or of a whole cell."""
+    cell, top = spheres.cell, float((spheres.positions[:, 1] + spheres.radii).max())
+    if container is not None:
+        return _open_box(as_box(container), top)
+    if cell is None:
+        raise InputError("there is no cell to draw: a container is needed")
+    faces = cell.flat_faces[~np.array(cell.periodic)]
+    if cell.has_images or cell.flat or not np.isfinite(faces).all():
+        return _whole_cell(cell)
+    return _open_box(cell.bounds, top)
+
+
+def _whole_cell(cell: Cell) -> _Edges:
+    """Return the corners (8, 3) of a cell and its twelve edges; of a flat one its four in front."""
+    places = [*product((0, 1), repeat=3)]
+    corners = cell.origin + np.array(places) @ cell.vectors
+    pairs = [
+        (one, other)
+        for one, other in combinations(range(CORNERS), 2)
+        if sum(a != b for a, b in zip(places[one], places[other], strict=True)) == 1
+        and not (cell.flat and (places[one][2] == 0 or places[other][2] == 0))
+    ]
+    return corners, pairs
+
+
+def _open_box(container: FloatArray, top: float) -> _Edges:
     """Return the corners (8, 3) of the container and its edges without those of the lid."""
     (xlo, xhi), (ylo, yhi), (zlo, zhi) = container.tolist()
     rim = min(yhi, top + 0.06 * (top - ylo)) if ylo < top else yhi
@@ -279,7 +315,7 @@ def _open_box(container: FloatArray, top: float) -> tuple[FloatArray, list[tuple
     return corners, around + [(corner, corner + 4) for corner in range(4)]
 
 
-def _image_command(path: Path, shading: _Shading, thickness: float, pixels: int) -> str:
+def _image_command(path: Path, shading: _Shading, thickness: float, view: str, pixels: int) -> str:
     colours = [*shading.colours, EDGE_COLOUR]
     names = [f"shade{number}" for number in range(len(colours))]
     # All colours are defined before any is used: LAMMPS keeps pointers to them, and moves them
@@ -292,7 +328,7 @@ def _image_command(path: Path, shading: _Shading, thickness: float, pixels: int)
     return " ".join(
         [
             f'write_dump all image "{path}" type diameter size {pixels} {pixels}',
-            f"view 70 25 up 0 1 0 zoom {ZOOM} shiny 0.2 fsaa no box no 0.0",
+            f"view {view} up 0 1 0 zoom {ZOOM} shiny 0.2 fsaa no box no 0.0",
             f"bond type {thickness!r} modify backcolor white",
             *definitions,
             *uses,

@@ -31,15 +31,18 @@ class Backbone:
     rounds: int
 
 
-def contacts_to_hold(particles: Particles) -> IntArray:
+def contacts_to_hold(particles: Particles, *, flat: bool = False) -> IntArray:
     """Return the number of contacts that it takes to hold each particle in any direction, (p,).
 
     Contacts without friction only push. To balance at any load, the directions in which they push
     must surround the origin of the space of motions: that takes one contact more than the particle
     has degrees of freedom. These are 3 for one sphere, 5 for two (a turn about the axis moves
     nothing), and 6 for more: 4, 6 and 7 contacts. Three spheres and more in a row have 5 degrees of
-    freedom as well, which only their positions tell: pass `fewest` to `backbone` for them.
+    freedom as well, which only their positions tell: pass `fewest` to `backbone` for them. In two
+    dimensions (`flat`) these are 3 contacts for a disc, and 4 for a body.
     """
+    if flat:
+        return np.where(particles.sizes == 1, 3, 4)
     return np.choose(np.minimum(particles.sizes, 3) - 1, [4, 6, 7]).astype(np.int64)
 
 
@@ -66,7 +69,7 @@ def backbone(
     particles : which spheres make up which particle, in the order of `sphere_ids`; None: all are
         free
     fewest : contacts that a particle must have to stay, one number or (p,); None: the numbers of
-        `contacts_to_hold`
+        `contacts_to_hold` in three dimensions
     images : whether the cell is periodic: then a particle may touch its own image
 
     Raises InputError as `contact_sides` does, and for `fewest` of another shape.

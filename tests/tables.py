@@ -394,7 +394,7 @@ def draw_gluey(path: Path, folder: Path, pressed: RunOfLog, turned: RunOfLog) ->
             continue
         ax = axes[steps.index(frame.step)]
         picture = folder / f"{frame.step}.png"
-        draw_packing(picture, frame.positions, frame.radii, ((0, 1), (0, 5), (0, 1)), pixels=700)
+        draw_packing(picture, frame.spheres, pixels=700)
         ax.imshow(pyplot.imread(picture))
         ax.set_axis_off()
         ax.set_title(f"t = {0.005 * frame.step:g}")

@@ -159,7 +159,7 @@ def _draw(
     path: Path, frame: ParticleFrame, walls: FloatArray | None, contacts: ContactCounts
 ) -> PictureError | None:
     """Draw the packing, coloured by contacts; return why that is not possible, None if it is."""
-    container = np.where(np.isfinite(walls), walls, frame.box) if walls is not None else frame.box
+    container = None if walls is None or not np.isfinite(walls).all() else walls
     try:
         draw_frame(path, frame, container, contacts.particles[frame.particles.index])
     except PictureError as error:

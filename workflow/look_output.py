@@ -123,6 +123,8 @@ def _overlap_rows(found: Look) -> list[Row]:
     where_pair = f"{one}s {ids[pair.pair[0]]} and {ids[pair.pair[1]]}" if pair.pair else "none"
     if wall is None:
         with_wall = ("-", NO_WALLS)
+    elif found.frame.spheres.endless.all():
+        with_wall = ("-", "the box has no walls")
     else:
         touched = "none" if wall.particle is None else f"{one} {ids[wall.particle]}, {wall.face}"
         with_wall = (f"{wall.depth / found.smallest_radius:.3g} r", touched)

@@ -35,7 +35,6 @@ from lammps_inelastic.analysis import (
     RunFiles,
     RunLog,
     at_steps,
-    backbone,
     best_packing_fraction,
     bond_order,
     contact_counts,
@@ -68,7 +67,7 @@ from .finished import (
 )
 from .pictures import pictures_of
 from .provenance import THIS, versions
-from .reference_values import excess_contacts, power_laws
+from .reference_values import excess_contacts, firm_part, power_laws
 from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
@@ -160,7 +159,9 @@ def _measure(
         numbers |= _orientation(packing.orientation)
         _layers(frame, contacts.counts, box, values)
         if contacts.excess and not has_soft_contacts(stage):
-            numbers["excess_contacts"] = float(np.mean(contacts.excess))
+            excess = float(np.mean(contacts.excess))
+            # Without a particle that is held there are no degrees of freedom to compare with.
+            numbers |= {} if math.isnan(excess) else {"excess_contacts": excess}
             numbers |= power_laws(contacts.last[0], frame, stage, values)
         if outputs.structure:
             numbers |= _structure(frame, box, values)
@@ -232,7 +233,7 @@ class _ContactFrames:
             inside = contacts_of(in_box, contacts.ids, frame.ids, particles, images=images)
             found.forces.append(contacts.forces[inside])
             found.normals.append(contacts.normals[inside])
-            firm = backbone(contacts.ids, frame.ids, particles, images=images)
+            firm = firm_part(contacts, frame)
             found.rattlers.append(float(firm.rattlers[in_box].mean()))
             if not firm.rattlers[in_box].all():
                 held = firm.counts.particles[in_box & ~firm.rattlers]

@@ -33,7 +33,7 @@ MOST_PIXELS = 900
 def draw_frame(
     path: Path,
     frame: ParticleFrame,
-    walls: ArrayLike,
+    walls: ArrayLike | None,
     contacts: ArrayLike | None,
     longest: int | None = None,
 ) -> None:
@@ -43,7 +43,7 @@ def draw_frame(
     ----------
     path : file to write
     frame : packing that is drawn
-    walls : (3, 2), box that is drawn around it, length
+    walls : (3, 2), box that is drawn around it, length; None for the simulation box
     contacts : (n,), contacts of each sphere's particle; None where they are not known
     longest : no side of the picture has more pixels; None for no bound
     """
@@ -51,8 +51,7 @@ def draw_frame(
     per_colour = 2 if frame.particles.composite else 1
     draw_packing(
         path,
-        frame.positions,
-        frame.radii,
+        frame.spheres,
         walls,
         contacts,
         contacts_per_colour=per_colour,
@@ -77,7 +76,7 @@ def pictures_of(
         for wanted in outputs.pictures:
             # The nearest frame is drawn: a run may end at another step than was thought.
             frame = dump[int(np.argmin(np.abs(np.array(dump.steps) - wanted)))]
-            draw_frame(target, frame, frame.box, _contacts_of_particles(frame), MOST_PIXELS)
+            draw_frame(target, frame, None, _contacts_of_particles(frame), MOST_PIXELS)
             pictures[f"{frame.step:08d}"] = target.read_bytes()
         if contacts is not None:
             _draw_contact_network(target, dump[-1], contacts)

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import (
+    Backbone,
     ContactFrame,
     InputError,
     ParticleFrame,
     Particles,
     backbone,
+    contacts_to_hold,
     local_ratios,
     logarithmic_density,
     power_law,
@@ -30,8 +32,8 @@ FORCES = 1e-3, 0.3  # [mean force at the same height]
 GAPS_SHOWN, FORCES_SHOWN = (1e-5, 0.3), (1e-4, 5.0)
 # Of a particle of one, two, and more spheres; a dimer may turn about its axis as it likes.
 DEGREES_OF_FREEDOM = 3, 5, 6
-# A particle with fewer contacts does not bear a weight.
-FEWEST = 3
+# Likewise of discs in a plane.
+DEGREES_OF_DISCS = 2, 3, 3
 
 Values = dict[str, NDArray[Any]]
 
@@ -40,14 +42,29 @@ def excess_contacts(contacts: ContactFrame, frame: ParticleFrame) -> float:
     """Return contacts less degrees of freedom, per 1,000 degrees, of particles that are held.
 
     An isostatic packing has as many contacts, those with walls included, as its particles have
-    degrees of freedom: the result is 0. It is NaN where no particle is held.
+    degrees of freedom: the result is 0. A packing may move as a whole along each period: these are
+    no degrees. It is NaN where no particle is held.
     """
-    particles = frame.particles
-    firm = backbone(contacts.ids, frame.ids, particles, fewest=FEWEST, images=frame.cell.has_images)
-    kinds = np.minimum(particles.sizes[~firm.rattlers], len(DEGREES_OF_FREEDOM)) - 1
-    degrees = int(np.choose(kinds, DEGREES_OF_FREEDOM).sum()) if len(kinds) else 0
+    particles, flat = frame.particles, frame.cell.flat
+    # A particle with fewer contacts than dimensions does not bear a weight.
+    fewest = 2 if flat else 3
+    firm = backbone(contacts.ids, frame.ids, particles, fewest=fewest, images=frame.cell.has_images)
+    of_kinds = np.array(DEGREES_OF_DISCS if flat else DEGREES_OF_FREEDOM)
+    kinds = np.minimum(particles.sizes[~firm.rattlers], len(of_kinds)) - 1
+    degrees = int(of_kinds[kinds].sum()) - sum(frame.cell.periodic)
     held = firm.counts.particles.sum() / 2 + firm.counts.walls.sum()
-    return 1000 * float(held - degrees) / degrees if degrees else float("nan")
+    return 1000 * float(held - degrees) / degrees if degrees > 0 else float("nan")
+
+
+def firm_part(contacts: ContactFrame, frame: ParticleFrame) -> Backbone:
+    """Return the rattlers of a packing, and the contacts of what is held in any direction."""
+    return backbone(
+        contacts.ids,
+        frame.ids,
+        frame.particles,
+        fewest=contacts_to_hold(frame.particles, flat=frame.cell.flat),
+        images=frame.cell.has_images,
+    )
 
 
 def power_laws(
@@ -66,7 +83,7 @@ def power_laws(
     values : arrays by the names in the schema
     """
     particles = frame.particles
-    firm = backbone(contacts.ids, frame.ids, particles, images=frame.cell.has_images)
+    firm = firm_part(contacts, frame)
     left_out = firm.rattlers | (firm.counts.walls > 0)
     numbers: dict[str, float] = {}
     diameter = 2 * float(frame.radii.max())
@@ -83,7 +100,9 @@ def power_laws(
     strengths, heights = contacts.forces[between], contacts.points[between, 1]
     if len(strengths) and (strengths >= 0).all():
         try:
-            ratios = local_ratios(strengths, heights)
+            # Without an up there is no depth with which forces grow.
+            endless = frame.spheres.endless[1]
+            ratios = local_ratios(strengths, heights, *([1] if endless else []))
         except InputError:
             return numbers
         values["forces/local_ratio"], values["forces/local_density"] = logarithmic_density(

@@ -306,8 +306,7 @@ def test_colours_are_the_contacts_of_bodies(dimers: Path, monkeypatch: pytest.Mo
 
     def remember(
         path: Path,
-        positions: Any,
-        radii: Any,
+        spheres: Any,
         container: Any,
         contacts: Any,
         *,

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lammps_inelastic.analysis import InputError, PictureError, draw_packing
+from lammps_inelastic.analysis import InputError, PictureError, Spheres, draw_packing
 
 CONTAINER = [[0, 1], [0, 5], [0, 1]]
 # The upper sphere has no contact (dark violet), the lower one ten or more (yellow).
-CENTRES, RADII = [[0.5, 0.9, 0.5], [0.5, 0.2, 0.5]], [0.2, 0.2]
+CENTRES = [[0.5, 0.9, 0.5], [0.5, 0.2, 0.5]]
+TWO = Spheres(CENTRES, [0.2, 0.2])
 
 
 def pixels_of(path: Path) -> Any:
@@ -24,7 +25,7 @@ def pixels_of(path: Path) -> Any:
 
 def test_colours_and_gravity(tmp_path: Path) -> None:
     path = tmp_path / "packing.png"
-    draw_packing(path, CENTRES, RADII, CONTAINER, [0, 12], pixels=300)
+    draw_packing(path, TWO, CONTAINER, [0, 12], pixels=300)
     red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
     yellow = np.argwhere((red > 150) & (green > 150) & (blue < 100))
     violet = np.argwhere((red > green + 40) & (blue > green + 40))
@@ -39,9 +40,7 @@ def test_colours_of_bodies(tmp_path: Path) -> None:
     green_pixels = []
     path = tmp_path / "packing.png"
     for width in (1, 2):
-        draw_packing(
-            path, CENTRES, RADII, CONTAINER, [1, 13], contacts_per_colour=width, pixels=300
-        )
+        draw_packing(path, TWO, CONTAINER, [1, 13], contacts_per_colour=width, pixels=300)
         red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
         green_pixels.append(np.count_nonzero((green > red + 60) & (green > blue + 20)))
     # The sphere is about 60 pixels wide; the legend's three green discs have below 100 pixels each.
@@ -89,7 +88,7 @@ def test_each_colour_of_the_legend_can_be_told_from_the_others(
     positions, radii, numbers = bed
     shown = {"all": numbers, "few": numbers % 3, "none": 0 * numbers, "many": 0 * numbers + 6}
     path = tmp_path / "packing.png"
-    draw_packing(path, positions, radii, [[0, 1]] * 3, shown[contacts])
+    draw_packing(path, Spheres(positions, radii), [[0, 1]] * 3, shown[contacts])
     check_legend(path)
 
 
@@ -98,7 +97,7 @@ def test_a_legend_that_is_read_where_four_pictures_stand_side_by_side(
 ) -> None:
     """Letters are as high as a disc: ten pixels of 1,200 that four pictures share."""
     path = tmp_path / "packing.png"
-    draw_packing(path, bed[0], bed[1], [[0, 1]] * 3, bed[2])
+    draw_packing(path, Spheres(bed[0], bed[1]), [[0, 1]] * 3, bed[2])
     seen = pixels_of(path)
     blank = (seen > 250).all(axis=(1, 2))
     starts = np.flatnonzero(blank[:-1] & ~blank[1:])
@@ -111,7 +110,9 @@ def test_overlapping_spheres_meet_in_a_plane(tmp_path: Path) -> None:
     # Side by side, at right angles to the view: each is seen up to the plane between them.
     path = tmp_path / "packing.png"
     across = 0.1 * np.array([-0.3725, 0, 0.928])
-    draw_packing(path, [0.5 - across, 0.5 + across], [0.2, 0.2], CONTAINER, [12, 0], pixels=300)
+    draw_packing(
+        path, Spheres([0.5 - across, 0.5 + across], [0.2, 0.2]), CONTAINER, [12, 0], pixels=300
+    )
     red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
     yellow = np.count_nonzero((red > blue + 20) & (green > blue + 20))
     violet = np.count_nonzero((red > green + 20) & (blue > green + 20))
@@ -123,7 +124,7 @@ def test_overlapping_spheres_meet_in_a_plane(tmp_path: Path) -> None:
 def test_nothing_is_cut_off(tmp_path: Path, size: tuple[int, int]) -> None:
     path = tmp_path / "packing.png"
     corners = [np.full(3, 0.5), np.array(size) - 0.5]
-    draw_packing(path, corners, [0.5, 0.5], [[0, length] for length in size], pixels=300)
+    draw_packing(path, Spheres(corners, [0.5, 0.5]), [[0, length] for length in size], pixels=300)
     drawn = (pixels_of(path) < 250).any(axis=2)
     for edge in (drawn[0], drawn[-1], drawn[:, 0], drawn[:, -1]):
         assert not edge.any()
@@ -136,7 +137,7 @@ def test_nothing_is_cut_off(tmp_path: Path, size: tuple[int, int]) -> None:
 
 def test_colours_by_radius(tmp_path: Path) -> None:
     path = tmp_path / "packing.png"
-    draw_packing(path, CENTRES, [0.1, 0.2], CONTAINER, pixels=300)
+    draw_packing(path, Spheres(CENTRES, [0.1, 0.2]), CONTAINER, pixels=300)
     red, green, blue = np.moveaxis(pixels_of(path), 2, 0)
     assert np.count_nonzero((red > 150) & (green > 150) & (blue < 100)) > 1000
 
@@ -144,28 +145,26 @@ def test_colours_by_radius(tmp_path: Path) -> None:
 def test_picture_without_lammps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "lammps", None)
     with pytest.raises(PictureError, match="no picture: LAMMPS cannot be imported"):
-        draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER)
+        draw_packing(tmp_path / "packing.png", TWO, CONTAINER)
 
 
 def test_picture_into_no_folder(tmp_path: Path) -> None:
     with pytest.raises(PictureError, match="cannot be written"):
-        draw_packing(tmp_path / "no" / "packing.png", CENTRES, RADII, CONTAINER, pixels=100)
+        draw_packing(tmp_path / "no" / "packing.png", TWO, CONTAINER, pixels=100)
 
 
 def test_nothing_is_left_of_a_picture_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "packing.png").mkdir()
     with pytest.raises(PictureError, match=r"packing\.png: cannot be written: Is a directory"):
-        draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER, pixels=100)
+        draw_packing(tmp_path / "packing.png", TWO, CONTAINER, pixels=100)
     assert [path.name for path in tmp_path.iterdir()] == ["packing.png"]
 
 
 def test_wrong_number_of_contacts(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"contacts must have shape \(2,\), not \(3,\)"):
-        draw_packing(tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2, 3])
+        draw_packing(tmp_path / "packing.png", TWO, CONTAINER, [1, 2, 3])
 
 
 def test_a_colour_for_no_contacts_at_all(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="share a colour must be at least 1, not 0"):
-        draw_packing(
-            tmp_path / "packing.png", CENTRES, RADII, CONTAINER, [1, 2], contacts_per_colour=0
-        )
+        draw_packing(tmp_path / "packing.png", TWO, CONTAINER, [1, 2], contacts_per_colour=0)

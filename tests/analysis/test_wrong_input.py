@@ -157,7 +157,7 @@ def test_wrong_input_of_files(tmp_path: Path) -> None:
             tmp_path / "a.xyz", CENTRE, RADIUS, ids=[1.5]
         ),
         "pixels must be at least 1": lambda: analysis.draw_packing(
-            tmp_path / "a.png", CENTRE, RADIUS, BOX, pixels=0
+            tmp_path / "a.png", *ONE, pixels=0
         ),
     }.items():
         with pytest.raises(InputError) as raised:

@@ -67,5 +67,5 @@ def measure(folder: Path, particles: int = PARTICLES) -> None:
     for index in (0, 1, 2, len(dump) - 1):
         frame = dump[index]
         path = folder / f"step-{frame.step}.png"
-        draw_packing(path, frame.positions, frame.radii, CONTAINER)
+        draw_packing(path, frame.spheres, CONTAINER)
         print(path, flush=True)
