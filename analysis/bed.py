@@ -9,6 +9,7 @@ as dense as deep inside. No direction is up.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,8 +98,11 @@ def box_in_bed(spheres: Spheres, box: ArrayLike, walls: ArrayLike | None = None)
     for _ in range(MOST_CUTS):
         if (part[:, 0] >= part[:, 1]).any():
             break
-        bed = np.array([_ends(centres, part, axis, faces, diameter) for axis in range(3)])
-        bed[endless] = -math.inf, math.inf
+        bed = np.array([[-math.inf, math.inf]] * 3)
+        for axis in np.flatnonzero(~endless).tolist():
+            # Discs in a plane are not cut into columns across it.
+            across = [other for other in (range(2) if spheres.flat else range(3)) if other != axis]
+            bed[axis] = _ends(centres, part, axis, across, faces, diameter)
         widths = np.minimum(part[:, 1], bed[:, 1]) - np.maximum(part[:, 0], bed[:, 0])
         kept = widths / np.diff(part, axis=1)[:, 0]
         if (kept == 1).all():
@@ -122,13 +126,28 @@ def _cut(box: FloatArray, bed: FloatArray, diameter: float) -> FloatArray:
 
 
 def _ends(
-    centres: FloatArray, box: FloatArray, axis: int, faces: FloatArray, diameter: float
+    centres: FloatArray,
+    box: FloatArray,
+    axis: int,
+    across: Sequence[int],
+    faces: FloatArray,
+    diameter: float,
 ) -> tuple[float, float]:
-    """Return where the bed begins and ends along an axis in all columns through a box."""
+    """Return where the bed begins and ends along an axis in all columns through a box.
+
+    Parameters
+    ----------
+    centres : (n, 3), of the spheres, length
+    box : (3, 2), the box, length
+    axis : along which the columns are
+    across : the axes by which they are told apart
+    faces : (3, 2), places of the walls, length
+    diameter : the largest, length
+    """
     chosen = np.full(len(centres), True)
     column = np.zeros(len(centres), dtype=np.int64)
     columns = 1
-    for other in {0, 1, 2} - {axis}:
+    for other in across:
         low, high = box[other]
         if high - low < COLUMN * diameter:
             middle = (low + high) / 2

@@ -26,6 +26,7 @@ PAGES = [
 SLOW = {
     "docs/start.md",
     "docs/how-to/change-a-deck.md",
+    "docs/how-to/periodic.md",
     *(f"docs/tutorials/{name}.md" for name in ("first-hour", "pictures", "python", "study")),
 }
 
