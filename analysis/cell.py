@@ -6,7 +6,7 @@ are copied from here, or along the shortest of all lines between two points and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
 
@@ -193,8 +193,8 @@ class Cell:
 
         Returns
         -------
-        (m,) and (m, 3): whose image each is, and by how many periods it is moved. Images a little
-        farther away may be among them
+        (m,) and (m, 3): whose image each is, and by how many periods it is moved, in the order of
+        the positions and then of the periods. Images a little farther away may be among them
         """
         pad = reach[:, None] / self.widths + ROUND_OFF
         return self._images(positions, -pad, 1 + pad, own=False)
@@ -213,7 +213,7 @@ class Cell:
         Returns
         -------
         (m,) and (m, 3): whose image each is, and by how many periods it is moved, in the order of
-        the periods and then of the positions
+        the positions and then of the periods
         """
         corners = np.array([*product(*box)])
         shares = self.fractions(corners)
@@ -234,31 +234,29 @@ class Cell:
     ) -> tuple[IntArray, IntArray]:
         """Return the images whose fractions lie between bounds, (n, 3) each."""
         shares = self.fractions(positions)
-        periodic = np.array(self.periodic)
-        first = np.where(periodic, np.ceil(low - shares), 0).astype(np.int64)
-        last = np.where(periodic, np.floor(high - shares), 0).astype(np.int64)
-        numbers = np.maximum(last - first + 1, 0).prod(axis=1, dtype=np.float64)
-        if numbers.sum() > MOST_IMAGES:
+        first = np.where(self.periodic, np.ceil(low - shares), 0.0)
+        last = np.where(self.periodic, np.floor(high - shares), 0.0)
+        numbers = np.maximum(last - first + 1, 0)
+        # Whole numbers would overflow where the float that says "far too many" does no harm.
+        with np.errstate(over="ignore"):
+            needed = float(numbers.prod(axis=1).sum())
+        if needed > MOST_IMAGES:
             raise InputError(
-                f"{numbers.sum():.2g} periodic images of {len(positions)} spheres are needed, more "
+                f"{needed:.2g} periodic images of {len(positions)} spheres are needed, more "
                 f"than {MOST_IMAGES:.0e}: choose a smaller box or a shorter distance"
             )
-        owners: list[IntArray] = []
-        moves: list[IntArray] = []
-        for move in self._moves(first.min(axis=0), last.max(axis=0)):
-            if not own and not move.any():
-                continue
-            found = np.flatnonzero(((first <= move) & (move <= last)).all(axis=1))
-            owners.append(found)
-            moves.append(np.repeat(move[None], len(found), axis=0))
-        if not owners:
-            return np.zeros(0, dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
-        return np.concatenate(owners), np.concatenate(moves)
-
-    @staticmethod
-    def _moves(first: IntArray, last: IntArray) -> Iterator[IntArray]:
-        for move in product(*(range(low, high + 1) for low, high in zip(first, last, strict=True))):
-            yield np.array(move, dtype=np.int64)
+        counts = numbers.astype(np.int64)
+        each = counts.prod(axis=1)
+        owner = np.repeat(np.arange(len(positions)), each)
+        place = np.arange(len(owner)) - np.repeat(np.cumsum(each) - each, each)
+        of_owner = counts[owner]
+        place, along_c = np.divmod(place, of_owner[:, 2])
+        along_a, along_b = np.divmod(place, of_owner[:, 1])
+        moves = first.astype(np.int64)[owner] + np.column_stack([along_a, along_b, along_c])
+        if not own:
+            away = moves.any(axis=1)
+            owner, moves = owner[away], moves[away]
+        return owner, moves
 
     @cached_property
     def _inverse(self) -> FloatArray:
@@ -268,20 +266,24 @@ class Cell:
     def _short_steps(self) -> IntArray:
         """Periods that lead along the shortest edges of the lattice, one per row."""
         steps: IntArray = np.eye(3, dtype=np.int64)[np.array(self.periodic)]
-        while self._shortened(steps):
+        while len(steps) > 1 and self._shortened(steps):
             pass
         return steps
 
     def _shortened(self, steps: IntArray) -> bool:
-        """Make one of some edges shorter by adding or taking away others, in place, if it can be.
+        """Make one of two or three edges shorter by adding or taking away others, if it can be.
 
-        This ends: a lattice has finitely many edges below a length.
+        The edges are changed in place. This ends: a lattice has finitely many below a length.
         """
-        squared = ((steps @ self.vectors) ** 2).sum(axis=1)
+        edges = steps @ self.vectors
+        squared = (edges**2).sum(axis=1)
+        few = np.array([*product((-1, 0, 1), repeat=len(steps) - 1)], dtype=np.int64)
         for edge in np.argsort(-squared):
             others = np.delete(steps, edge, axis=0)
-            sums = np.array([*product((-1, 0, 1), repeat=len(others))], dtype=np.int64)
-            tried = steps[edge] + sums.reshape(-1, len(others)) @ others
+            # An edge of a very oblique cell may be as long as a million of the others.
+            many = np.rint(edges[edge] @ np.linalg.pinv(np.delete(edges, edge, axis=0)))
+            sums = np.concatenate([few, few - many.astype(np.int64)])
+            tried = steps[edge] + sums @ others
             lengths = ((tried @ self.vectors) ** 2).sum(axis=1)
             best = int(np.argmin(lengths))
             if lengths[best] < squared[edge] * (1 - ROUND_OFF):
