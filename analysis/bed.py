@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .geometry import FloatArray, as_box, as_walls
+from .cell import ROUND_OFF
+from .geometry import BoolArray, FloatArray, as_box, as_walls
 from .spheres import Spheres
 
 # Width of a column [largest diameters]. In narrower ones the gap between two spheres of a dense bed
@@ -68,8 +69,8 @@ def box_in_bed(spheres: Spheres, box: ArrayLike, walls: ArrayLike | None = None)
 
     The bed ends at the outermost centres of each column, 1.5 to 3 largest diameters wide; at a wall
     if no sphere of the largest diameter fits between the two. A sphere that has left the bed does
-    not move its end, unless it is alone in a column. A bed has no end along an edge of its cell
-    that is periodic, nor across the plane of discs: it is infinite there.
+    not move its end, unless it is alone in a column. A bed has no end along an axis that lies in
+    the plane, or along the line, of the cell's periods, nor across discs: it is infinite there.
 
     Parameters
     ----------
@@ -84,15 +85,20 @@ def box_in_bed(spheres: Spheres, box: ArrayLike, walls: ArrayLike | None = None)
     bounds = as_box(box)
     faces = as_walls(walls)
     diameter = 2 * float(spheres.radii.max())
+    endless = _endless(spheres)
+    # Where the bed ends it is looked at as a whole: its end may be far from the box.
+    extent = np.column_stack([spheres.positions.min(axis=0), spheres.positions.max(axis=0)])
+    reach = bounds.copy()
+    reach[~endless, 0] = np.minimum(bounds[:, 0], extent[:, 0])[~endless]
+    reach[~endless, 1] = np.maximum(bounds[:, 1], extent[:, 1])[~endless]
     # A narrow column reaches out of the box by less than its own width.
-    centres = spheres.around(bounds, 2 * COLUMN * diameter).spheres.positions
-    endless = spheres.endless
-    if len(centres) == 0:
-        nothing = np.array([[math.inf, -math.inf]] * 3)
-        nothing[endless] = -math.inf, math.inf
-        return BoxInBed(bounds, nothing, None)
-    whole = _to_walls(np.column_stack([centres.min(axis=0), centres.max(axis=0)]), faces, diameter)
+    centres = spheres.around(reach, 2 * COLUMN * diameter).spheres.positions
+    if len(centres):
+        extent = np.column_stack([centres.min(axis=0), centres.max(axis=0)])
+    whole = _to_walls(extent, faces, diameter)
     whole[endless] = -math.inf, math.inf
+    if len(centres) == 0:
+        return BoxInBed(bounds, whole, None)
     # A column outside of the whole bed is empty: most of a box that is far too large goes at once.
     part = _cut(bounds, whole, diameter)
     for _ in range(MOST_CUTS):
@@ -123,6 +129,17 @@ def _cut(box: FloatArray, bed: FloatArray, diameter: float) -> FloatArray:
     cut[:, 0] = np.where(bed[:, 0] > box[:, 0], np.maximum(low, bed[:, 0]), box[:, 0])
     cut[:, 1] = np.where(bed[:, 1] < box[:, 1], np.minimum(high, bed[:, 1]), box[:, 1])
     return cut
+
+
+def _endless(spheres: Spheres) -> BoolArray:
+    """Say along which axes a bed has no end, (3,): those along which some sum of periods leads."""
+    if spheres.cell is None:
+        return np.zeros(3, dtype=np.bool_)
+    periods = spheres.cell.vectors[np.array(spheres.cell.periodic)]
+    # The part of an axis that lies in the plane of the periods is as long as the axis.
+    endless: BoolArray = np.diag(np.linalg.pinv(periods) @ periods) > 1 - ROUND_OFF
+    endless[2] |= spheres.flat
+    return endless
 
 
 def _ends(

@@ -59,7 +59,7 @@ class Spheres:
             raise InputError("the discs of a two-dimensional packing must all have the same z")
         self.positions: FloatArray = centres
         if cell is not None and cell.has_images:
-            pieces = _in_one_piece(centres, particles, cell)
+            pieces = _in_one_piece(centres, self.radii, particles, cell)
             middles = particles.centres(pieces)
             moves = cell.wrapped(middles) - middles
             self.positions = pieces + moves[particles.index]
@@ -216,15 +216,19 @@ class Images:
         return own
 
 
-def _in_one_piece(positions: FloatArray, particles: Particles, cell: Cell) -> FloatArray:
+def _in_one_piece(
+    positions: FloatArray, radii: FloatArray, particles: Particles, cell: Cell
+) -> FloatArray:
     """Move the spheres of each particle by whole periods, so that the particle is in one piece.
 
-    A particle may be longer than half a period. So each of its spheres is put next to the nearest
-    one that has its place already, beginning with the first.
+    A particle may be longer than half a period. So each of its spheres is put next to the one that
+    has its place already and leaves the smallest gap, beginning with the first: spheres that touch
+    or overlap come before images that a particle does not touch.
 
     Parameters
     ----------
     positions : (n, 3), length
+    radii : (n,), length
     particles : which spheres make up which particle
     cell : the cell with periodic faces
     """
@@ -234,36 +238,37 @@ def _in_one_piece(positions: FloatArray, particles: Particles, cell: Cell) -> Fl
     for size in np.unique(particles.sizes[particles.sizes > 1]).tolist():
         # The spheres of all particles of this size, (b, size).
         members = order[begins[particles.sizes == size][:, None] + np.arange(size)]
-        _gather(moved, members, cell)
+        _gather(moved, radii, members, cell)
     return moved
 
 
-def _gather(positions: FloatArray, members: IntArray, cell: Cell) -> None:
+def _gather(positions: FloatArray, radii: FloatArray, members: IntArray, cell: Cell) -> None:
     """Put the spheres of some bodies together, in place.
 
     Parameters
     ----------
     positions : (n, 3), of all spheres, length
+    radii : (n,), of all spheres, length
     members : (b, k), indices of the spheres of each body
     cell : the cell with periodic faces
     """
     bodies, size = members.shape
     row = np.arange(bodies)
-    # For each sphere: the shortest line to it from one that has its place, and how long that is.
-    line = np.zeros((bodies, size, 3))
-    length = np.full((bodies, size), np.inf)
+    # For each sphere: its smallest gap to one that has its place, and where it is then.
+    gap = np.full((bodies, size), np.inf)
+    near = np.zeros((bodies, size, 3))
     placed = np.zeros((bodies, size), dtype=np.bool_)
-    place = positions[members]
+    place, radius = positions[members], radii[members]
     last = np.zeros(bodies, dtype=np.int64)
     placed[:, 0] = True
     for _ in range(size - 1):
-        apart = place - place[row, last][:, None]
-        shortest = cell.nearest(apart.reshape(-1, 3)).reshape(apart.shape)
-        far = np.linalg.norm(shortest, axis=2)
-        nearer = (far < length) & ~placed
-        length[nearer] = far[nearer]
-        line[nearer] = (place[row, last][:, None] + shortest)[nearer]
-        last = np.argmin(np.where(placed, np.inf, length), axis=1)
-        place[row, last] = line[row, last]
+        start = place[row, last][:, None]
+        shortest = cell.nearest((place - start).reshape(-1, 3)).reshape(place.shape)
+        gaps = np.linalg.norm(shortest, axis=2) - radius - radius[row, last][:, None]
+        nearer = (gaps < gap) & ~placed
+        gap[nearer] = gaps[nearer]
+        near[nearer] = (start + shortest)[nearer]
+        last = np.argmin(np.where(placed, np.inf, gap), axis=1)
+        place[row, last] = near[row, last]
         placed[row, last] = True
     positions[members] = place

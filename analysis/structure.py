@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,15 +147,7 @@ def radial_distribution(
     region = Region(spheres, box)
     centres, chosen = _centres(spheres, box, largest)
     if box is not None:
-        bounds = as_box(box)
-        reach = np.column_stack([bounds[:, 0] - largest, bounds[:, 1] + largest])
-        reach[spheres.endless] = np.inf, -np.inf
-        outside = (reach[:, 0] < centres.min(axis=0)) | (reach[:, 1] > centres.max(axis=0))
-        if outside.any():
-            axis = "xyz"[int(np.argmax(outside))]
-            raise InputError(
-                f"along {axis} the box must be {largest:g} or more away from the outermost centres"
-            )
+        _require_depth(spheres, as_box(box), largest)
     system, points = _system(centres, largest)
     counter: Any = freud.density.RDF(bins=bins, r_max=largest)
     # This distance is above 0, so that no particle counts itself.
@@ -297,6 +290,29 @@ def _centres(spheres: Spheres, box: ArrayLike | None, reach: float) -> tuple[Flo
     if not chosen.any():
         raise InputError("no particle's centre lies in the box: the mean over none does not exist")
     return centres, chosen
+
+
+def _require_depth(spheres: Spheres, box: FloatArray, depth: float) -> None:
+    """Raise InputError for a box that is nearer to the outermost centres where these have an end.
+
+    Between faces of a cell whose other faces are periodic that is a distance across these faces.
+    """
+    centres, names = spheres.centres, "xyz"
+    ends, far, endless = box, np.full(3, depth), spheres.endless
+    cell = spheres.cell
+    if cell is not None and cell.has_images:
+        shares = cell.fractions(np.array([*product(*box)]))
+        ends, far = np.column_stack([shares.min(axis=0), shares.max(axis=0)]), depth / cell.widths
+        centres, endless = cell.fractions(centres), np.array(cell.periodic)
+        endless[2] |= cell.flat
+        names = "xyz" if np.isfinite(cell.flat_faces[~endless]).all() else "abc"
+    short = (ends[:, 0] - far < centres.min(axis=0)) | (ends[:, 1] + far > centres.max(axis=0))
+    short &= ~endless
+    if short.any():
+        raise InputError(
+            f"along {names[int(np.argmax(short))]} the box must be {depth:g} or more away from the "
+            "outermost centres"
+        )
 
 
 def _system(centres: FloatArray, margin: float) -> tuple[Any, FloatArray]:
