@@ -61,9 +61,14 @@ def contact_lines(
     if spheres.cell is not None and spheres.has_images:
         cell = spheres.cell
         # A contact point is nearer to the image of a sphere that it belongs to than to others. One
-        # image of the point belongs to the first sphere in its own place.
-        near = starts + cell.nearest(places - starts)
-        images = cell.nearest_images(ends - near)
+        # image of the point belongs to the first sphere in its own place. It may lie half-way
+        # between two images of the second, or of the same sphere: that one is touched whose centre
+        # is on the other side of the point.
+        arms = cell.nearest(places - starts)
+        near = starts + arms
+        length = np.linalg.norm(arms, axis=1)
+        beyond = arms * (spheres.radii[second] / np.where(length > 0, length, 1))[:, None]
+        images = cell.nearest_images(ends - (near + beyond))
         images[at_wall] = 0
         ends = ends + images @ cell.vectors
         places = near

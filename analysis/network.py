@@ -260,7 +260,8 @@ def _edges(graph: networkx.Graph, lower_half: int | None) -> tuple[FloatArray, F
     graph : from `contact_graph`; the forces are None if an edge has none
     lower_half : the axis up, if only the edges in the lower half of the height are wanted
     """
-    nodes = [node for node in graph if node >= 0]
+    # An edge's vector leads from the lower number; the nodes of a subgraph come in any order.
+    nodes = sorted(node for node in graph if node >= 0)
     place = {node: index for index, node in enumerate(nodes)}
     centres = as_positions([graph.nodes[node]["position"] for node in nodes])
     edges = [

@@ -116,10 +116,11 @@ def test_drawing_in_space_is_no_mirror_image() -> None:
 @pytest.mark.slow
 def test_ten_thousand_spheres_are_drawn_in_seconds(tmp_path: Path) -> None:
     places = np.indices((22, 22, 22)).reshape(3, -1).T[:10_000]
-    contacts = contacts_by_distance(Spheres(places, np.full(10_000, 0.5)), 0.1)
+    spheres = Spheres(places, np.full(10_000, 0.5))
+    contacts = contacts_by_distance(spheres, 0.1)
     forces = np.random.default_rng(0).exponential(1, len(contacts.sides))
     start = time.perf_counter()
-    graph = contact_graph(contacts.sides, np.arange(10_000), places, forces)
+    graph = contact_graph(contacts.sides, np.arange(10_000), spheres, forces)
     assert graph.number_of_edges() > 28_000
     for projection in (None, "3d"):
         figure = Figure()
