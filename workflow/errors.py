@@ -23,6 +23,10 @@ class WriteError(WorkflowError):
     """A file could not be written: the disk is full, or may not be written to."""
 
 
+class PackingError(WorkflowError):
+    """A packing that cannot be made as it was asked for, or that LAMMPS could not make."""
+
+
 class StudyError(WorkflowError):
     """The mistakes of a study file; `mistakes` has one line for each."""
 

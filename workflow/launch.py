@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -86,7 +87,7 @@ def run_study(
     outcome = Outcome()
     waiting = list(cases)
     jobs: list[_Job] = []
-    with _interrupts() as interrupted:
+    with interrupts() as interrupted:
         try:
             while waiting or jobs:
                 while waiting and len(jobs) < options.at_once and not interrupted:
@@ -419,21 +420,23 @@ def kill_group(process: subprocess.Popen[bytes]) -> None:
 
 
 @contextmanager
-def _interrupts() -> Iterator[list[int]]:
+def interrupts() -> Iterator[list[int]]:
     """Collect interrupts, SIGTERM and SIGHUP in a list, in the place of what they do else.
 
     Nothing is cut short by them: an exception at any place could leave a process behind that has
     just been started, and a second one those that were still to be stopped. A signal that is
-    ignored, as SIGHUP under nohup, stays so.
+    ignored, as SIGHUP under nohup, stays so. Only the main thread of Python may take signals: in
+    another one nothing is collected.
     """
     seen: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:
         seen.append(number)
 
+    in_main = threading.current_thread() is threading.main_thread()
     before: dict[int, Any] = {}
     for number in map(int, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
-        if signal.getsignal(number) is not signal.SIG_IGN:
+        if in_main and signal.getsignal(number) is not signal.SIG_IGN:
             before[number] = signal.signal(number, note)
     try:
         yield seen

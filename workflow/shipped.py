@@ -16,6 +16,8 @@ from .errors import WorkflowError
 RESPONSE, SETTLING = "response", "settling"
 # The smallest deck has no variables, and is none for studies.
 MINIMAL = "minimal"
+# The deck behind `pack` in Python is none for studies, either.
+PACK = "pack"
 # These are the names of the decks, in files with the ending `.in`.
 DECKS = ("spheres", "dimers", "clusters", RESPONSE, "gluey", SETTLING)
 # These are the names of the studies, in files with the ending `.toml`, in the order of the paper.

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from .errors import WorkflowError, meant
 from .files import writing
-from .shipped import DECKS, MINIMAL, deck_text, first_study_text
+from .shipped import DECKS, MINIMAL, PACK, deck_text, first_study_text
 from .study import mistake_in_name
 
 STUDY_ENDING = ".toml"
-# These are the names of all shipped decks; a study cannot run the smallest one, without variables.
-ALL_DECKS = (MINIMAL, *DECKS)
+# These are the names of all shipped decks; studies run neither the smallest one, without variables,
+# nor that of `pack`.
+ALL_DECKS = (MINIMAL, *DECKS, PACK)
 
 
 def deck_lines() -> dict[str, str]:

@@ -1,0 +1,302 @@
+"""A packing: arrays, contacts, numbers of the packing deep inside, and files for other programs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lammps_inelastic.analysis import (
+    ContactCounts,
+    ContactFrame,
+    PackingMeasurement,
+    ParticleFrame,
+    Particles,
+    box_in_bed,
+    contact_counts,
+    iterate_contact_frames,
+    largest_pair_overlap,
+    measure_packing,
+    particles_inside,
+    read_particle_frame,
+    write_raw,
+    write_stl,
+    write_tiff,
+    write_vtk,
+    write_xyz,
+)
+from lammps_inelastic.analysis.geometry import FloatArray, IntArray
+
+from ..errors import PackingError
+from ..files import whole, writing
+from ..finished import CONTACTS, PARTICLES
+from .containers import Ball, Container
+from .shapes import Shape
+
+# The seed of the random points is that of `inelastic look`.
+SEED = 1
+# A packing is saved in these files, by the endings of their names.
+ENDINGS = (".csv", ".npz", ".xyz", ".extxyz", ".vtu", ".stl", ".tif", ".raw")
+# The smallest radius is so many voxels long, if no other size is given.
+VOXELS_PER_RADIUS = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Packing:
+    """Particles at rest in a container. A particle is a sphere, or a rigid body of spheres.
+
+    Attributes
+    ----------
+    shape : of the particles
+    container : that they lie in, with its height
+    frame : the spheres, ordered by id
+    contact_frames : the contacts in each of the last steps
+    folder : of LAMMPS's run; a temporary one goes with the packing
+    """
+
+    shape: Shape
+    container: Container
+    frame: ParticleFrame
+    contact_frames: tuple[ContactFrame, ...] = field(repr=False)
+    folder: Path
+
+    @property
+    def positions(self) -> FloatArray:
+        """The centres of the spheres, (n, 3), length."""
+        return self.frame.positions
+
+    @property
+    def radii(self) -> FloatArray:
+        """The radii of the spheres, (n,), length."""
+        return self.frame.radii
+
+    @property
+    def bodies(self) -> IntArray:
+        """The body of each sphere, (n,), from 1 on; 0 for a free sphere."""
+        bodies = self.frame.bodies
+        return np.zeros(len(self.radii), dtype=np.int64) if bodies is None else bodies
+
+    @property
+    def particles(self) -> Particles:
+        """Which spheres make up which particle."""
+        return self.frame.particles
+
+    @property
+    def contacts(self) -> ContactFrame:
+        """The contacts that carry a force, at the end: ids, points, normals, gaps, forces."""
+        return self.contact_frames[-1]
+
+    @property
+    def forces(self) -> FloatArray:
+        """The force of each contact, (m,), mass length/time^2."""
+        return self.contacts.forces
+
+    @cached_property
+    def box(self) -> FloatArray | None:
+        """A box deep in the bed, (3, 2), length, for its numbers; None if the bed is too small.
+
+        It is half as wide as the container and ends where the bed ends; from the floor it keeps a
+        quarter of the smallest of the widths and the height of the bed. In a ball it is the largest
+        of some with their corners a fifteenth of the diameter away from the wall.
+        """
+        boxes = [
+            box for column in self.container.columns if (box := self._part(column)) is not None
+        ]
+        return max(boxes, key=_volume, default=None)
+
+    @property
+    def packing_fraction(self) -> float | None:
+        """Packing fraction in `box`, exact for spheres and dimers; None without a box."""
+        return None if self._measured is None else self._measured.packing_fraction.value
+
+    @property
+    def coordination_number(self) -> float | None:
+        """Mean number of contacts with other particles, of those in `box`; None without a box."""
+        if self._measured is None or self._measured.coordination is None:
+            return None
+        return self._measured.coordination.mean
+
+    @cached_property
+    def largest_overlap(self) -> float:
+        """The largest overlap of two particles, or of one with a wall, length; 0 for none."""
+        pair = largest_pair_overlap(self.positions, self.radii, self.frame.bodies).depth
+        wall = self.radii - self.container.distances(self.positions)
+        return max(float(pair), float(wall.max()), 0.0)
+
+    def measure(self, box: ArrayLike) -> PackingMeasurement:
+        """Measure the packing in a box of your own, as `inelastic look --box` does.
+
+        Parameters
+        ----------
+        box : (3, 2), lower and upper bound per axis, length
+        """
+        return measure_packing(
+            self.frame, self._counts, box, seed=SEED, walls=self.container.bounds
+        )
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        box: ArrayLike | None = None,
+        voxel: float | None = None,
+        subdivisions: int = 2,
+    ) -> Path:
+        """Save the packing; the ending of the name says as what.
+
+        | ending | file |
+        |---|---|
+        | none | the folder of LAMMPS's run, as `inelastic look` reads it, with the deck |
+        | .csv | a line for each sphere: x, y, z, radius, body |
+        | .npz | NumPy's arrays positions, radii, bodies, contact_ids, contact_points, forces |
+        | .xyz, .extxyz | OVITO, ASE: places, radii, ids, bodies, contacts |
+        | .vtu | ParaView: the same |
+        | .stl | triangles of the surfaces of the spheres |
+        | .tif, .raw | an image of voxels, 255 in a particle and 0 in a pore |
+
+        Parameters
+        ----------
+        path : of the file or folder; a file of that name is replaced, a folder is not
+        box : (3, 2), box of an image; without, the container up to the top of the highest sphere
+        voxel : edge of a voxel, length; without, a tenth of the smallest radius
+        subdivisions : each sphere of stl has 20 x 4^subdivisions faces
+
+        Returns
+        -------
+        the path
+
+        Raises PackingError for an ending that is none of these and for a folder that is there,
+        AnalysisError or WriteError if it cannot be written.
+        """
+        target = Path(path)
+        ending = target.suffix.lower()
+        if ending == "":
+            self._save_folder(target)
+            return target
+        if ending not in ENDINGS:
+            raise PackingError(
+                f"{target}: the name must end in {', '.join(ENDINGS)}, or have no ending for a "
+                "folder"
+            )
+        frame, spheres = self.frame, (self.positions, self.radii)
+        ids, bodies, contacts = frame.ids, frame.bodies, frame.contacts
+        edge = float(self.radii.min()) / VOXELS_PER_RADIUS if voxel is None else voxel
+        bounds = self._filled if box is None else box
+        match ending:
+            case ".csv":
+                self._save_csv(target)
+            case ".npz":
+                self._save_npz(target)
+            case ".vtu":
+                write_vtk(target, *spheres, ids=ids, bodies=bodies, contacts=contacts)
+            case ".stl":
+                write_stl(target, *spheres, subdivisions=subdivisions)
+            case ".tif":
+                write_tiff(target, *spheres, bounds, edge)
+            case ".raw":
+                write_raw(target, *spheres, bounds, edge)
+            case _:
+                write_xyz(
+                    target, *spheres, ids=ids, bodies=bodies, contacts=contacts, box=frame.box
+                )
+        return target
+
+    def __repr__(self) -> str:
+        """Return the main numbers, one a line."""
+        small, large = 2 * float(self.radii.min()), 2 * float(self.radii.max())
+        counts = self._counts[-1]
+        rows = [
+            ("diameter", f"{small:g}" if small == large else f"{small:g} to {large:g}"),
+            ("packing fraction", _number(self.packing_fraction, ".4f")),
+            ("coordination number", _number(self.coordination_number, ".3f")),
+            ("measured in", "no box: the bed is too small" if self.box is None else _box(self.box)),
+            ("contacts", f"{counts.particles.sum() // 2}, with walls {counts.walls.sum()}"),
+            ("largest overlap", f"{self.largest_overlap:.2g}"),
+        ]
+        first = f"{len(self.particles)} {self.shape.plural} in {self.container.words}"
+        return "\n".join([first, *(f"  {name:<20} {value}" for name, value in rows)])
+
+    @cached_property
+    def _counts(self) -> list[ContactCounts]:
+        frame = self.frame
+        return [contact_counts(one.ids, frame.ids, frame.particles) for one in self.contact_frames]
+
+    @cached_property
+    def _measured(self) -> PackingMeasurement | None:
+        return None if self.box is None else self.measure(self.box)
+
+    @property
+    def _filled(self) -> FloatArray:
+        """The container up to the top of the highest sphere, (3, 2), length."""
+        bounds = self.container.bounds
+        bounds[1, 1] = min(bounds[1, 1], float((self.positions[:, 1] + self.radii).max()))
+        return bounds
+
+    def _part(self, column: FloatArray) -> FloatArray | None:
+        """Return the part of a column, (3, 2), that is deep in the bed; None if there is none."""
+        bounds = self.container.bounds
+        part = box_in_bed(self.positions, self.radii, column, bounds).inside
+        if part is None:
+            return None
+        box = part.copy()
+        if not isinstance(self.container, Ball):
+            widths = np.diff(bounds[[0, 2]], axis=1)
+            margin = min(float(widths.min()), box[1, 1] - bounds[1, 0]) / 4
+            box[1, 0] = max(box[1, 0], bounds[1, 0] + margin)
+        centres = self.particles.centres(self.positions)
+        inside = (box[:, 0] < box[:, 1]).all() and particles_inside(centres, box).any()
+        return box if inside else None
+
+    def _save_folder(self, target: Path) -> None:
+        if target.exists():
+            raise PackingError(f"{target}: is there already, and is not replaced")
+        with writing(target):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as part:
+                copy = Path(part) / "run"
+                shutil.copytree(self.folder, copy)
+                copy.rename(target)
+
+    def _save_csv(self, target: Path) -> None:
+        table = np.column_stack([self.positions, self.radii, self.bodies])
+        with whole(target) as file:
+            layout = ",".join(["%.17g"] * 4 + ["%d"])
+            np.savetxt(file, table, layout, header="x,y,z,radius,body", comments="")
+
+    def _save_npz(self, target: Path) -> None:
+        with whole(target) as file, file.open("wb") as stream:
+            np.savez_compressed(
+                stream,
+                positions=self.positions,
+                radii=self.radii,
+                bodies=self.bodies,
+                contact_ids=self.contacts.ids,
+                contact_points=self.contacts.points,
+                forces=self.forces,
+            )
+
+
+def read_packing(folder: Path, shape: Shape, container: Container) -> Packing:
+    """Read the packing that LAMMPS has left in a folder. Raises AnalysisError."""
+    frame = read_particle_frame(folder / PARTICLES)
+    contacts = tuple(iterate_contact_frames(folder / CONTACTS))
+    return Packing(shape, container, frame, contacts, folder)
+
+
+def _volume(box: FloatArray) -> float:
+    return float(np.prod(box[:, 1] - box[:, 0]))
+
+
+def _number(value: float | None, layout: str) -> str:
+    return "not known" if value is None else format(value, layout)
+
+
+def _box(box: FloatArray) -> str:
+    ranges = zip("xyz", box.tolist(), strict=True)
+    return ", ".join(f"{axis} {low:.4g} to {high:.4g}" for axis, (low, high) in ranges)
