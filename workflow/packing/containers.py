@@ -41,7 +41,8 @@ class Box:
     def __post_init__(self) -> None:
         """Raise PackingError for sides that are not positive."""
         _set(self, width=self.width, depth=self.width if self.depth is None else self.depth)
-        _set(self, height=self.height)
+        if self.height is not None:
+            _set(self, height=self.height)
 
     @property
     def floor(self) -> float:
@@ -88,13 +89,17 @@ class Box:
     def distances(self, points: FloatArray) -> FloatArray:
         """Return the distance of points inside, (n, 3), from the nearest wall, (n,), length."""
         low, high = self.bounds.T
-        return np.asarray(np.minimum(points - low, high - points).min(axis=1))
+        nearest: FloatArray = np.minimum(points - low, high - points).min(axis=1)
+        return nearest
 
     def draw(self, insets: FloatArray, random: np.random.Generator) -> FloatArray:
         """Draw points, (n, 3), that are at least insets, (n,), away from all walls."""
         low, high = self.bounds.T
         inset = insets[:, None]
-        return low + inset + random.random((len(insets), 3)) * (high - low - 2 * inset)
+        places: FloatArray = (
+            low + inset + random.random((len(insets), 3)) * (high - low - 2 * inset)
+        )
+        return places
 
 
 @dataclass(frozen=True)
@@ -112,7 +117,9 @@ class Cylinder:
 
     def __post_init__(self) -> None:
         """Raise PackingError for lengths that are not positive."""
-        _set(self, diameter=self.diameter, height=self.height)
+        _set(self, diameter=self.diameter)
+        if self.height is not None:
+            _set(self, height=self.height)
 
     @property
     def floor(self) -> float:
@@ -265,11 +272,9 @@ def as_container(value: Any, volume: float, length: float) -> Container:
 
 
 def _set(container: Any, **lengths: Any) -> None:
-    """Set lengths of a container, each checked; None stays."""
+    """Set lengths of a container, each checked."""
     for name, value in lengths.items():
-        if value is not None:
-            value = as_positive(value, f"the {name} of a container")
-        object.__setattr__(container, name, value)
+        object.__setattr__(container, name, as_positive(value, f"the {name} of a container"))
 
 
 def _middle(bounds: FloatArray) -> FloatArray:

@@ -112,7 +112,7 @@ def pack(
             write_start(work / START, form, diameters, walls, float(values["density"]), random)
             ratio = float(diameters.min() / diameters.max())
             values |= {"start": START, "ratio": ratio, "inertia": "solid"}
-        what = f"{count} {form.plural}"
+        what = f"{count} {form.plural} in {walls.words}"
         run_deck(work, values, what=what, steps=steps, ranks=at_once, progress=progress)
         if target is not None:
             with writing(target):

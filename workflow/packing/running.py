@@ -29,7 +29,7 @@ EVERY = 60.0
 _PHASE = re.compile(rb"^Phase: (.+)$")
 _STEP = re.compile(rb"^\s*(\d+)\s+[-\d]")
 # Where in LAMMPS's sources an error was found.
-_SOURCE = re.compile(r"\s*\((?:src/)+[^()]*:\d+\)$")
+_SOURCE = re.compile(r"\s*\([\w/.]+\.(?:cpp|h):\d+\)$")
 
 
 def run_deck(

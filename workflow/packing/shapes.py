@@ -153,8 +153,8 @@ class Cluster:
 
     @cached_property
     def extent(self) -> float:
-        """The largest distance between two centres, diameters; rounded up by some round-off."""
-        return float(pdist(self.points).max()) * (1 + 1e-9)
+        """The largest distance between two centres, without its round-off, diameters."""
+        return round(float(pdist(self.points).max()), 12)
 
     @property
     def room(self) -> float:
