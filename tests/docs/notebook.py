@@ -1,6 +1,6 @@
-"""The notebook of a page: its text and its blocks as cells.
+"""The notebooks of pages: their texts and their blocks as cells.
 
-python -m tests.docs.notebook        # writes docs/tutorials/first-hour.ipynb
+python -m tests.docs.notebook        # writes docs/tutorials/first-hour.ipynb and pack.ipynb
 """
 
 from __future__ import annotations
@@ -12,16 +12,20 @@ from pathlib import Path
 from .blocks import BLOCK, Block, blocks_of
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "tutorials" / "first-hour.md"
-NOTEBOOK = PAGE.with_suffix(".ipynb")
+TUTORIALS = ROOT / "docs" / "tutorials"
 # A notebook starts in its own folder, a reader of the page in the clone.
-FIRST = "%cd ../.."
-LINK_TO_ITSELF = " The same page is a [notebook](first-hour.ipynb)."
+IN_CLONE = "%cd ../.."
+# The pages that are notebooks, and the first cell, for those that need the clone.
+PAGES = {TUTORIALS / "first-hour.md": IN_CLONE, TUTORIALS / "pack.md": None}
+LINK_TO_ITSELF = re.compile(r"\s+The same page is a \[notebook\]\([\w-]+\.ipynb\)\.")
 
 
-def notebook_of(page: str) -> str:
-    """Return a page as a notebook: files are written by cells, outputs come of themselves."""
-    cells = [_cell("code", FIRST)]
+def notebook_of(page: str, first: str | None) -> str:
+    """Return a page as a notebook: files are written by cells, outputs come of themselves.
+
+    `first` is the text of a cell before all others, or None.
+    """
+    cells = [] if first is None else [_cell("code", first)]
     end = 0
     for match, block in zip(BLOCK.finditer(page), blocks_of(page), strict=True):
         cells += _text(page[end : match.start()])
@@ -43,7 +47,7 @@ def notebook_of(page: str) -> str:
 
 
 def _text(text: str) -> list[dict[str, object]]:
-    stripped = re.sub(r"\s+$", "", text.replace(LINK_TO_ITSELF, "")).strip("\n")
+    stripped = re.sub(r"\s+$", "", LINK_TO_ITSELF.sub("", text)).strip("\n")
     return [_cell("markdown", stripped)] if stripped else []
 
 
@@ -65,4 +69,5 @@ def _cell(kind: str, text: str) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    NOTEBOOK.write_text(notebook_of(PAGE.read_text()))
+    for path, first in PAGES.items():
+        path.with_suffix(".ipynb").write_text(notebook_of(path.read_text(), first))

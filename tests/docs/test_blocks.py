@@ -26,8 +26,12 @@ PAGES = [
 SLOW = {
     "docs/start.md",
     "docs/how-to/change-a-deck.md",
+    "docs/how-to/pebble-bed.md",
     "docs/how-to/periodic.md",
-    *(f"docs/tutorials/{name}.md" for name in ("first-hour", "pictures", "python", "study")),
+    *(
+        f"docs/tutorials/{name}.md"
+        for name in ("first-hour", "pack", "pictures", "python", "study")
+    ),
 }
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.shipped import DECKS
+from lammps_inelastic.workflow.shipped import DECKS, PACK
 from tests.fix.lammps_run import Runner, run_lmp
 
 POURED = {
@@ -45,7 +45,7 @@ def variables_of(name: str, packing: Path) -> dict[str, object]:
     return {**SHORT[name], "packing": packing} if name in SHORT else {**POURED}
 
 
-@pytest.mark.parametrize("name", DECKS)
+@pytest.mark.parametrize("name", [*DECKS, PACK])
 def test_the_last_lines_name_the_files_and_the_next_command(
     name: str, packing: Path, lmp: Runner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -76,7 +76,9 @@ def test_soft_contacts_are_looked_at_by_distance(
     assert main([*command.split(), *ALL, "--json"]) == 0
 
 
-@pytest.mark.parametrize(("name", "ranks"), [*((name, 1) for name in DECKS), ("spheres", 2)])
+@pytest.mark.parametrize(
+    ("name", "ranks"), [*((name, 1) for name in [*DECKS, PACK]), ("spheres", 2)]
+)
 def test_a_second_run_in_a_folder_says_once_that_it_overwrites_the_first(
     name: str, ranks: int, packing: Path, lmp: Runner
 ) -> None:

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.decks import Rule, as_value, find_deck, read_rule
-from lammps_inelastic.workflow.shipped import DECKS
+from lammps_inelastic.workflow.decks import Deck, Rule, as_value, read_rule
+from lammps_inelastic.workflow.shipped import DECKS, PACK
 from tests.fix.lammps_run import OF_A_LAUNCHER, Runner, run_lmp
 
 SERVER = Path(__file__).with_name("table_server.py")
@@ -176,10 +176,10 @@ def right_values(rule: Rule) -> list[str]:
     return list(just_inside(rule))
 
 
-@pytest.mark.parametrize("name", DECKS)
+@pytest.mark.parametrize("name", [*DECKS, PACK])
 def test_every_bad_value_is_named_with_what_is_allowed(name: str, ask: Ask) -> None:
     """Every parameter of a deck with every kind of value that it must not have."""
-    rules = find_deck(name, Path()).rules
+    rules = Deck(name, deck(name), shipped=True).rules
     cases = [(each, value) for each, rule in rules.items() for value in wrong_values(rule)]
     assert len(cases) > 200
     for (each, value), error in zip(
@@ -194,9 +194,9 @@ def test_every_bad_value_is_named_with_what_is_allowed(name: str, ask: Ask) -> N
         assert not any(more), error
 
 
-@pytest.mark.parametrize("name", DECKS)
+@pytest.mark.parametrize("name", [*DECKS, PACK])
 def test_the_last_values_within_bounds_are_allowed(name: str, ask: Ask) -> None:
-    rules = find_deck(name, Path()).rules
+    rules = Deck(name, deck(name), shipped=True).rules
     cases = [(each, value) for each, rule in rules.items() for value in right_values(rule)]
     answers = values_in_turn(ask, table_of(deck(name)), cases)
     assert dict(zip(cases, answers, strict=True)) == dict.fromkeys(cases, "")

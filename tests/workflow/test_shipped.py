@@ -7,15 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.decks import as_value, find_deck
+from lammps_inelastic.workflow.decks import Deck, as_value
 from lammps_inelastic.workflow.errors import WorkflowError
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.shipped import (
     DECKS,
+    PACK,
     QUICK_FOLDER,
     RESULTS_VARIABLE,
     STUDIES,
     STUDIES_FOLDER,
+    deck_text,
     find_stored_results,
     shipped_studies,
 )
@@ -92,7 +94,17 @@ MOST = re.compile(r"\bup to ([\d.e]+)(?![\d.e]*\w)")
 
 
 # A deck's table names what is not as in the table of another one.
-TABLE_OF = {"dimers": "spheres", "clusters": "dimers", "response": "spheres", "gluey": "spheres"}
+TABLE_OF = {
+    "dimers": "spheres",
+    "clusters": "dimers",
+    "response": "spheres",
+    "gluey": "spheres",
+    "pack": "spheres",
+}
+
+
+def shipped_deck(name: str) -> Deck:
+    return Deck(name, deck_text(name), shipped=True)
 
 
 def documented(name: str) -> list[tuple[str, str, str]]:
@@ -103,7 +115,7 @@ def documented(name: str) -> list[tuple[str, str, str]]:
     return [row for table in tables for row in ROW.findall(table)]
 
 
-@pytest.mark.parametrize("name", DECKS)
+@pytest.mark.parametrize("name", [*DECKS, PACK])
 def test_the_documentation_has_every_variable(name: str) -> None:
     """With the deck's default, in its own table or in that of the deck that it refers to."""
     defaults: dict[str, str] = {}
@@ -111,14 +123,14 @@ def test_the_documentation_has_every_variable(name: str) -> None:
     while table is not None:
         defaults = {variable: default for variable, default, _ in documented(table)} | defaults
         table = TABLE_OF.get(table)
-    for variable, default in find_deck(name, Path()).variables.items():
+    for variable, default in shipped_deck(name).variables.items():
         assert as_value(defaults[variable]) == default, variable
 
 
-@pytest.mark.parametrize("name", DECKS)
+@pytest.mark.parametrize("name", [*DECKS, PACK])
 def test_the_tables_of_the_documentation_are_those_of_the_deck(name: str) -> None:
     """Names, defaults, words and the ends of ranges in docs/reference/decks.md."""
-    deck = find_deck(name, Path())
+    deck = shipped_deck(name)
     rows = documented(name)
     assert len(rows) >= 4
     for variable, default, meaning in rows:

@@ -10,7 +10,7 @@ import pytest
 
 from lammps_inelastic.workflow.cli.command_line import PAGE, SUBCOMMANDS
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.shipped import DECKS, STUDIES_FOLDER
+from lammps_inelastic.workflow.shipped import DECKS, PACK, STUDIES_FOLDER
 from lammps_inelastic.workflow.study import read_study
 
 COMMANDS = [module.__name__.rpartition(".")[2] for module in SUBCOMMANDS]
@@ -23,7 +23,7 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["minimal", *DECKS])
+@pytest.mark.parametrize("name", ["minimal", *DECKS, PACK])
 def test_a_deck_is_printed_to_the_byte(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     for given in (name, f"{name}.in"):
         assert main(["deck", given]) == 0
@@ -44,7 +44,7 @@ def test_no_deck_of_that_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["deck", "sphere"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("inelastic: no deck 'sphere' (did you mean spheres?): it must be ")
-    assert line.endswith("gluey or settling")
+    assert line.endswith("settling or pack")
 
 
 def test_a_new_study_can_be_read_and_is_not_overwritten(

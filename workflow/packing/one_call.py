@@ -103,27 +103,32 @@ def pack(
     where = Path(tempfile.gettempdir()) if target is None else target.absolute().parent
     with writing(where):
         where.mkdir(parents=True, exist_ok=True)
+        # A temporary folder is its owner's alone, and the run in it may be given a name for all.
         work = Path(tempfile.mkdtemp(prefix="inelastic-pack-", dir=where))
+    run = work / "run"
     try:
+        run.mkdir()
         if isinstance(form, Cluster) and not several:
-            (work / MOLECULE).write_text(form.molecule)
+            (run / MOLECULE).write_text(form.molecule)
             values["shape"] = MOLECULE
         if several:
-            write_start(work / START, form, diameters, walls, float(values["density"]), random)
+            write_start(run / START, form, diameters, walls, float(values["density"]), random)
             ratio = float(diameters.min() / diameters.max())
             values |= {"start": START, "ratio": ratio, "inertia": "solid"}
         what = f"{count} {form.plural} in {walls.words}"
-        run_deck(work, values, what=what, steps=steps, ranks=at_once, progress=progress)
+        run_deck(run, values, what=what, steps=steps, ranks=at_once, progress=progress)
         if target is not None:
             with writing(target):
-                work.rename(target)
-                work = target
-        packing = read_packing(work, form, walls)
+                run.rename(target)
+                run = target
+        packing = read_packing(run, form, walls)
+        if target is None:
+            weakref.finalize(packing, shutil.rmtree, work, ignore_errors=True)
+        else:
+            work.rmdir()
     except BaseException:
         shutil.rmtree(work, ignore_errors=True)
         raise
-    if target is None:
-        weakref.finalize(packing, shutil.rmtree, work, ignore_errors=True)
     return packing
 
 

@@ -23,7 +23,6 @@ from lammps_inelastic.analysis import (
     iterate_contact_frames,
     largest_pair_overlap,
     measure_packing,
-    particles_inside,
     read_particle_frame,
     write_raw,
     write_stl,
@@ -125,7 +124,7 @@ class Packing:
     @cached_property
     def largest_overlap(self) -> float:
         """The largest overlap of two particles, or of one with a wall, length; 0 for none."""
-        pair = largest_pair_overlap(self.positions, self.radii, self.frame.bodies).depth
+        pair = largest_pair_overlap(self.frame.spheres).depth
         wall = self.radii - self.container.distances(self.positions)
         return max(float(pair), float(wall.max()), 0.0)
 
@@ -241,7 +240,7 @@ class Packing:
     def _part(self, column: FloatArray) -> FloatArray | None:
         """Return the part of a column, (3, 2), that is deep in the bed; None if there is none."""
         bounds = self.container.bounds
-        part = box_in_bed(self.positions, self.radii, column, bounds).inside
+        part = box_in_bed(self.frame.spheres, column, bounds).inside
         if part is None:
             return None
         box = part.copy()
@@ -249,9 +248,9 @@ class Packing:
             widths = np.diff(bounds[[0, 2]], axis=1)
             margin = min(float(widths.min()), box[1, 1] - bounds[1, 0]) / 4
             box[1, 0] = max(box[1, 0], bounds[1, 0] + margin)
-        centres = self.particles.centres(self.positions)
-        inside = (box[:, 0] < box[:, 1]).all() and particles_inside(centres, box).any()
-        return box if inside else None
+        if not (box[:, 0] < box[:, 1]).all() or not self.frame.spheres.particles_in(box).any():
+            return None
+        return box
 
     def _save_folder(self, target: Path) -> None:
         if target.exists():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import pdist
 
-from lammps_inelastic.analysis import dimer_volume, packing_fraction
+from lammps_inelastic.analysis import Spheres, dimer_volume, packing_fraction
 from lammps_inelastic.analysis.geometry import FloatArray
 
 from ..decks import Value
@@ -165,7 +165,7 @@ class Cluster:
     def volume(self) -> float:
         """Volume of a particle, diameters^3, by random points."""
         box = np.column_stack([self.points.min(axis=0) - 0.5, self.points.max(axis=0) + 0.5])
-        share = packing_fraction(self.points, np.full(len(self.points), 0.5), box).value
+        share = packing_fraction(Spheres(self.points, np.full(len(self.points), 0.5)), box).value
         return share * float(np.prod(box[:, 1] - box[:, 0]))
 
     @property
