@@ -25,6 +25,7 @@ PAGES = [
 # Pages that take more than some seconds, and run what other pages run, too.
 SLOW = {
     "docs/start.md",
+    "docs/how-to/cfd-bed.md",
     "docs/how-to/change-a-deck.md",
     "docs/how-to/pebble-bed.md",
     "docs/how-to/periodic.md",

@@ -320,7 +320,7 @@ def test_progress_in_a_log(capfd: pytest.CaptureFixture[str]) -> None:
     out, err = capfd.readouterr()
     assert out == ""
     lines = err.splitlines()
-    assert all(line.startswith("20 spheres in a box of ") for line in lines)
+    assert all(line.startswith("20 spheres: ") for line in lines)
     # A phase of a few milliseconds may pass between two looks; the last one is always told.
     assert 1 <= len(lines) <= 5
     assert ": measure, step 8" in lines[-1]

@@ -115,8 +115,15 @@ def pack(
             write_start(run / START, form, diameters, walls, float(values["density"]), random)
             ratio = float(diameters.min() / diameters.max())
             values |= {"start": START, "ratio": ratio, "inertia": "solid"}
-        what = f"{count} {form.plural} in {walls.words}"
-        run_deck(run, values, what=what, steps=steps, ranks=at_once, progress=progress)
+        run_deck(
+            run,
+            values,
+            what=f"{count} {form.plural}",
+            container=walls.words,
+            steps=steps,
+            ranks=at_once,
+            progress=progress,
+        )
         if target is not None:
             with writing(target):
                 run.rename(target)

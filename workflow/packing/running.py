@@ -33,7 +33,14 @@ _SOURCE = re.compile(r"\s*\([\w/.]+\.(?:cpp|h):\d+\)$")
 
 
 def run_deck(
-    folder: Path, values: Mapping[str, Value], *, what: str, steps: int, ranks: int, progress: bool
+    folder: Path,
+    values: Mapping[str, Value],
+    *,
+    what: str,
+    container: str,
+    steps: int,
+    ranks: int,
+    progress: bool,
 ) -> None:
     """Run the deck of `pack` in a folder, in which the files are that it reads.
 
@@ -43,7 +50,7 @@ def run_deck(
     ----------
     folder : where LAMMPS works and writes
     values : parameters of the deck that are not its defaults
-    what : what is packed, for the progress
+    what, container : what is packed in what, in words
     steps : of all phases together
     ranks : number of MPI ranks
     progress : whether to show how far it is
@@ -61,7 +68,9 @@ def run_deck(
     if interrupted:
         raise KeyboardInterrupt(f"LAMMPS is stopped, and nothing is left of {what}")
     if code != 0:
-        raise PackingError(f"LAMMPS could not pack {what}: {_reason(folder / OUTPUT, code)}")
+        raise PackingError(
+            f"LAMMPS could not pack {what} in {container}: {_reason(folder / OUTPUT, code)}"
+        )
     for name in (PARTICLES, CONTACTS, LAST_FILE):
         if not (folder / name).is_file():
             raise PackingError(
