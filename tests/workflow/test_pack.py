@@ -27,6 +27,7 @@ from lammps_inelastic.workflow import Ball, Box, Cluster, Cylinder, Dimer, Packi
 from lammps_inelastic.workflow.errors import PackingError, WorkflowError
 from lammps_inelastic.workflow.main import main
 from tests.fix.lammps_run import LAUNCHER, run_lmp
+from tests.small_disk import mounted
 from tests.workflow.test_pack_arguments import outside
 
 ROOT = Path(__file__).parents[2]
@@ -302,6 +303,28 @@ def test_what_lammps_says_is_the_error(tmp_path: Path, monkeypatch: pytest.Monke
     assert str(caught.value).startswith(said)
     assert str(caught.value).endswith(": Unknown command: nonsense 5")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        # Room for the deck, and for the start of spheres of several sizes; for neither.
+        ("100k", "LAMMPS could not pack 100 spheres in a box of "),
+        ("12k", "cannot be written: No space left on device"),
+    ],
+)
+def test_a_full_disk_is_told_in_one_line(
+    size: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And nothing is left on it."""
+    with mounted(tmp_path / "disk", size) as disk:
+        monkeypatch.setattr("tempfile.tempdir", str(disk))
+        with pytest.raises(WorkflowError) as caught:
+            quiet(100, sizes=[(1.0, 0.5), (1.5, 0.5)])
+        (line,) = str(caught.value).splitlines()
+        assert message in line
+        assert "No space left on device" in line
+        assert list(disk.iterdir()) == []
 
 
 def test_without_lammps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

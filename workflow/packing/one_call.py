@@ -107,12 +107,14 @@ def pack(
         work = Path(tempfile.mkdtemp(prefix="inelastic-pack-", dir=where))
     run = work / "run"
     try:
-        run.mkdir()
-        if isinstance(form, Cluster) and not several:
-            (run / MOLECULE).write_text(form.molecule)
-            values["shape"] = MOLECULE
+        with writing(where):
+            run.mkdir()
+            if isinstance(form, Cluster) and not several:
+                (run / MOLECULE).write_text(form.molecule)
+                values["shape"] = MOLECULE
+            if several:
+                write_start(run / START, form, diameters, walls, float(values["density"]), random)
         if several:
-            write_start(run / START, form, diameters, walls, float(values["density"]), random)
             ratio = float(diameters.min() / diameters.max())
             values |= {"start": START, "ratio": ratio, "inertia": "solid"}
         run_deck(
