@@ -195,8 +195,9 @@ def test_the_numbers_on_one_screen(few: Packing) -> None:
     assert max(map(len, lines)) <= 100
 
 
-def test_a_bed_that_is_too_small_has_no_box() -> None:
-    packing = quiet(2)
+@pytest.mark.parametrize("arguments", [{"particles": 2}, {"particles": 20, "container": Box(0.2)}])
+def test_a_bed_that_is_too_small_has_no_box(arguments: dict[str, Any]) -> None:
+    packing = quiet(**arguments)
     assert packing.box is None
     assert packing.packing_fraction is None
     assert packing.coordination_number is None

@@ -98,11 +98,12 @@ class Packing:
 
     @cached_property
     def box(self) -> FloatArray | None:
-        """A box deep in the bed, (3, 2), length, for its numbers; None if the bed is too small.
+        """A box deep in the bed, (3, 2), length, for its numbers; None if the bed has no such part.
 
         It is half as wide as the container and ends where the bed ends; from the floor it keeps a
         quarter of the smallest of the widths and the height of the bed. In a ball it is the largest
-        of some with their corners a fifteenth of the diameter away from the wall.
+        of some with their corners a fifteenth of the diameter away from the wall. A bed that is
+        less than two largest diameters wide or high has none.
         """
         boxes = [
             box for column in self.container.columns if (box := self._part(column)) is not None
@@ -244,9 +245,12 @@ class Packing:
         if part is None:
             return None
         box = part.copy()
+        widths = np.diff(bounds[[0, 2]], axis=1)
+        margin = min(float(widths.min()), box[1, 1] - bounds[1, 0]) / 4
+        # A box that is nearer to a wall than the spheres at it are holds gaps that no bed has.
+        if margin < self.radii.max():
+            return None
         if not isinstance(self.container, Ball):
-            widths = np.diff(bounds[[0, 2]], axis=1)
-            margin = min(float(widths.min()), box[1, 1] - bounds[1, 0]) / 4
             box[1, 0] = max(box[1, 0], bounds[1, 0] + margin)
         if not (box[:, 0] < box[:, 1]).all() or not self.frame.spheres.particles_in(box).any():
             return None
