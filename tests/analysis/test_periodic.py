@@ -782,3 +782,119 @@ def test_a_gap_in_a_bed_without_an_end() -> None:
     assert not found.is_inside
     assert found.ends == "a gap in the box"
     assert box_in_bed(lone, [[20.5, 21.5]] * 3).is_inside
+
+
+# What may not change a number.
+
+
+def numbers(packing: Packing, seed: int) -> dict[str, Any]:
+    """Return intensive numbers of a packing in a cell that is periodic on all sides."""
+    spheres = packing.spheres(seed)
+    contacts = contacts_by_distance(spheres, 0.3)
+    ids = np.arange(len(spheres))
+    counts = contact_counts(contacts.ids(ids), ids, spheres.particles, images=True)
+    exact = exact_packing_fraction(spheres)
+    order = radial_distribution(spheres, largest=2.73, bins=9)
+    return {
+        "packing fraction": exact.value,
+        "overlap": exact.overlap,
+        "coordination": counts.particles.mean(),
+        "gaps": (contacts.gaps**2).sum() / len(spheres),
+        "depth": largest_pair_overlap(spheres).depth,
+        "g": order.values,
+        "density": order.density,
+        "dimers": np.linalg.norm(dimer_orientation(spheres).components),
+        **(
+            {}
+            if packing.flat
+            else {"q6": bond_order(spheres).q6.mean(), "q4": bond_order(spheres).q4.mean()}
+        ),
+    }
+
+
+def translated(packing: Packing) -> Packing:
+    return replace(packing, positions=packing.positions + np.array([0.7, -2.2, 0]))
+
+
+def of_another_cell(packing: Packing) -> Packing:
+    vectors = packing.vectors.copy()
+    vectors[0] += 2 * vectors[1]
+    if not packing.flat:
+        vectors[2] -= vectors[0] + 3 * vectors[1]
+    # The corner of a cell is anywhere, too.
+    return replace(packing, vectors=vectors, origin=packing.origin + np.array([1.3, 0.4, 0]))
+
+
+def twice(packing: Packing, edge: int) -> Packing:
+    vectors = packing.vectors.copy()
+    vectors[edge] *= 2
+    return replace(
+        packing,
+        positions=np.concatenate([packing.positions, packing.positions + packing.vectors[edge]]),
+        radii=np.tile(packing.radii, 2),
+        bodies=np.concatenate([packing.bodies, np.where(packing.bodies, packing.bodies + 500, 0)]),
+        vectors=vectors,
+    )
+
+
+def in_another_order(packing: Packing) -> Packing:
+    order = np.random.default_rng(4).permutation(len(packing.radii))
+    return replace(
+        packing,
+        positions=packing.positions[order],
+        radii=packing.radii[order],
+        bodies=packing.bodies[order],
+    )
+
+
+def mirrored(packing: Packing) -> Packing:
+    # The edges are left-handed then, which dumps cannot have, but a user may.
+    flip = np.diag([-1.0, 1, 1])
+    return replace(
+        packing,
+        positions=packing.positions @ flip,
+        vectors=packing.vectors @ flip,
+        origin=packing.origin @ flip,
+    )
+
+
+def rotated(packing: Packing) -> Packing:
+    turn = TURN
+    if packing.flat:
+        turn = np.array([[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]])
+    return replace(
+        packing,
+        positions=packing.positions @ turn,
+        vectors=packing.vectors @ turn,
+        origin=packing.origin @ turn,
+    )
+
+
+CHANGES: dict[str, Callable[[Packing], Packing]] = {
+    "translated": translated,
+    "another cell": of_another_cell,
+    "twice along a": lambda packing: twice(packing, 0),
+    "twice along b": lambda packing: twice(packing, 1),
+    "another order": in_another_order,
+    "mirrored": mirrored,
+    "rotated": rotated,
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize(
+    ("make", "cell"),
+    [
+        *((in_space, cell) for cell in ("ppp", "narrow", "tilted", "oblique")),
+        *((in_plane, cell) for cell in ("pp", "narrow", "tilted", "oblique")),
+    ],
+)
+def test_numbers_of_another_description(
+    make: Callable[[str, str, float], Packing], cell: str, change: Callable[[Packing], Packing]
+) -> None:
+    packing = make(cell, "dimers", 0.1)
+    one, other = numbers(packing, 0), numbers(change(packing), 1)
+    # freud's float32 may move single pairs of thousands across the edge of a shell.
+    loose = {"q6": 1e-4, "q4": 1e-4, "g": 2e-2}
+    for name, value in one.items():
+        np.testing.assert_allclose(other[name], value, atol=loose.get(name, 1e-11), err_msg=name)
