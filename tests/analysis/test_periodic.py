@@ -201,6 +201,19 @@ def test_contacts_by_distance(make: Make, gap: float) -> None:
     )
 
 
+@pytest.mark.parametrize("cell", ["ppp", "tilted fpf", "turned"])
+def test_a_cell_twenty_diameters_wide(cell: str) -> None:
+    # Small spheres among some that are five times as large.
+    packing = scattered(cell, 10, 0.06)
+    packing.radii[::25] *= 5
+    expected = packing.pairs(0.01)
+    found = contacts_by_distance(packing.spheres(), 0.01)
+    # A few operations on lengths up to some periods.
+    np.testing.assert_allclose(np.sort(found.gaps), np.sort([*expected.values()]), atol=1e-12)
+    pairs = sorted(name[:2] for name in expected)
+    assert sorted(map(tuple, found.sides.tolist())) == pairs
+
+
 @each_overlapping
 def test_largest_overlap(make: Make) -> None:
     packing = make()
