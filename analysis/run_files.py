@@ -181,7 +181,8 @@ def check_contacts(
         )
     if not same_moment or frame.contacts is None or contacts.step != frame.step:
         return
-    counted = contact_counts(contacts.ids, frame.ids).particles
+    images = frame.cell.has_images
+    counted = contact_counts(contacts.ids, frame.ids, images=images).particles
     wrong = np.flatnonzero(counted != frame.contacts)
     if len(wrong):
         first = wrong[0]
