@@ -22,16 +22,10 @@ from .errors import (
     UnfinishedRunError,
 )
 from .evolution import Evolution, Plateau, measure_evolution, monte_carlo, plateau, plot_evolution
-from .export import (
-    VoxelImage,
-    voxel_shape,
-    voxel_slices,
-    write_raw,
-    write_stl,
-    write_tiff,
-    write_vtk,
-    write_xyz,
-)
+from .export_contacts import write_bonds, write_contacts_csv, write_contacts_vtk
+from .export_points import write_csv, write_json, write_pqr, write_vtk, write_xyz
+from .export_surfaces import write_stl
+from .export_voxels import VoxelImage, voxel_shape, voxel_slices, write_raw, write_tiff
 from .fabric import fabric_tensor
 from .forces import ForceDistribution, contacts_of, force_distribution, plot_force_distribution
 from .measurement import PackingMeasurement, measure_packing
@@ -171,6 +165,12 @@ __all__ = [
     "voxel_slices",
     "wall_profile",
     "wall_profile_monte_carlo",
+    "write_bonds",
+    "write_contacts_csv",
+    "write_contacts_vtk",
+    "write_csv",
+    "write_json",
+    "write_pqr",
     "write_raw",
     "write_stl",
     "write_tiff",

@@ -15,47 +15,62 @@ from rich.progress import Progress as ProgressBar
 
 from lammps_inelastic.analysis import (
     AnalysisError,
+    ContactFrame,
     ParticleDump,
     ParticleFrame,
     RunFilesError,
+    Spheres,
     UnfinishedRunError,
     check_contacts,
     contact_counts,
+    group_spheres,
     iterate_contact_frames,
     voxel_shape,
+    write_bonds,
+    write_contacts_csv,
+    write_contacts_vtk,
+    write_csv,
+    write_json,
+    write_pqr,
     write_raw,
     write_stl,
     write_tiff,
     write_vtk,
     write_xyz,
 )
-from lammps_inelastic.analysis.export import Progress
-from lammps_inelastic.analysis.geometry import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    inside_of,
-    spheres_reaching,
-)
+from lammps_inelastic.analysis.export_files import named
+from lammps_inelastic.analysis.export_voxels import Progress
+from lammps_inelastic.analysis.geometry import FloatArray, IntArray, inside_of, spheres_reaching
 
 from .finished import CONTACTS as CONTACT_DUMP
 from .finished import open_in_folder
 from .frames import choose_index
 
-# The file has this name if no other is given, and its format's ending.
-NAME = "packing"
-ENDINGS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
+# The formats, and the name of each one's file if no other is given.
+FILES = {
+    "xyz": "packing.xyz",
+    "vtk": "packing.vtu",
+    "csv": "packing.csv",
+    "json": "packing.json",
+    "pqr": "packing.pqr",
+    "vtk-contacts": "contacts.vtp",
+    "csv-contacts": "contacts.csv",
+    "bonds": "packing.bonds",
+    "tiff": "packing.tif",
+    "raw": "packing.raw",
+    "stl": "packing.stl",
+}
+OF_CONTACTS = ("vtk-contacts", "csv-contacts", "bonds")
 IMAGES = ("tiff", "raw")
 
 # The smallest radius is so many voxels long, if no other size is given.
 VOXELS_PER_RADIUS = 10
 SUBDIVISIONS = 2
 
-# Why surfaces and images are not made of a periodic box; points know their box, or need none.
-NOT_ACROSS = "spheres that reach through its faces are not drawn on the other side yet"
-
 # A line is printed after each of so many equal parts where there is no terminal.
 PARTS = 10
+
+Rows = list[tuple[str, str]]
 
 
 def choose_frame(
@@ -99,100 +114,163 @@ def write_spheres(
     frame: ParticleFrame,
     box: FloatArray | None,
     source: Path,
-    subdivisions: int | None,
-) -> list[tuple[str, str]]:
-    """Write spheres as points or as surfaces; return names and values of what was written.
+) -> Rows:
+    """Write spheres as points or as a list; return names and values of what was written.
 
     Parameters
     ----------
-    form : xyz, vtk or stl
+    form : xyz, vtk, csv, json or pqr
     out : file to write
     path : path of the dump, for errors
     frame : frame that is written
     box : (3, 2), box in which the centres of the spheres lie, length; None for all spheres
     source : folder of the run, or the dump's own path if it was named alone
-    subdivisions : each sphere of stl has 20 x 4^subdivisions faces; None for the usual ones
     """
-    chosen = np.ones(len(frame.ids), dtype=np.bool_)
-    if box is not None:
-        chosen = inside_of(frame.positions, box)
-        if not chosen.any():
-            raise AnalysisError(f"{path}: no sphere's centre lies in the box at step {frame.step}")
-    positions, radii = frame.positions[chosen], frame.radii[chosen]
-    rows = [("spheres", f"{len(radii)} of {len(chosen)}, step {frame.step}")]
-    if form == "stl":
-        _check_not_periodic(frame, path)
-        divided = SUBDIVISIONS if subdivisions is None else subdivisions
-        faces = write_stl(out, positions, radii, subdivisions=divided)
-        return [*rows, ("faces", f"{faces}"), _as_file("file", out)]
-
-    columns = _Columns.of(frame, chosen, source)
+    chosen = _Chosen.of(frame, box, path)
+    spheres, ids = chosen.spheres, frame.ids[chosen.index]
+    said = [("spheres", chosen.said)]
+    if form == "pqr":
+        write_pqr(out, spheres, ids=ids)
+        return [
+            *said,
+            ("columns", "radius, id; a residue for each particle"),
+            _as_file("file", out),
+        ]
+    bodies = None if frame.bodies is None else frame.bodies[chosen.index]
+    counts = _counts(frame, source)
+    contacts = None if counts is None else counts[chosen.index]
     if form == "xyz":
-        write_xyz(
-            out,
-            positions,
-            radii,
-            **columns.arrays,
-            box=frame.box,
-            # A reader takes a box of which nothing is said for a periodic one.
-            periodic=["p" in flags for flags in frame.boundaries or ("", "", "")],
-            step=frame.step,
-        )
+        write_xyz(out, spheres, ids=ids, bodies=bodies, contacts=contacts, step=frame.step)
+    elif form == "json":
+        write_json(out, spheres, ids=ids, bodies=bodies, contacts=contacts, step=frame.step)
     else:
-        write_vtk(out, positions, radii, **columns.arrays)
-    return [*rows, ("columns", columns.names), _as_file("file", out)]
+        write = {"vtk": write_vtk, "csv": write_csv}[form]
+        write(out, spheres, ids=ids, bodies=bodies, contacts=contacts)
+    names = "radius, id" + ("" if bodies is None else ", body")
+    names += "; no contacts are known at this step" if contacts is None else ", contacts"
+    return [*said, ("columns", names), _as_file("file", out)]
 
 
-def _check_not_periodic(frame: ParticleFrame, path: Path) -> None:
-    if frame.cell.has_images:
-        told = " ".join(frame.boundaries or ())
-        raise AnalysisError(
-            f"{path}: the box is periodic ({told}), and {NOT_ACROSS}: all boundaries must be "
-            "f, s or m"
-        )
+def write_surfaces(
+    out: Path, path: Path, frame: ParticleFrame, box: FloatArray | None, subdivisions: int
+) -> Rows:
+    """Write the surfaces of spheres as STL; return names and values of what was written.
+
+    Parameters
+    ----------
+    out : file to write
+    path : path of the dump, for errors
+    frame : frame that is written
+    box : (3, 2), box in which the centres of the spheres lie, length; None for all spheres, and
+        the images of those that reach through a periodic face
+    subdivisions : each sphere has 20 x 4^subdivisions faces
+    """
+    chosen = _Chosen.of(frame, box, path)
+    faces = write_stl(out, chosen.spheres, subdivisions=subdivisions)
+    said = chosen.said
+    images = faces // (20 * 4**subdivisions) - len(chosen.spheres)
+    if chosen.spheres.has_images:
+        said += f", and {images} images that reach into the cell"
+    return [("spheres", said), ("faces", f"{faces}"), _as_file("file", out)]
+
+
+def write_contacts(
+    form: str,
+    out: Path,
+    path: Path,
+    frame: ParticleFrame,
+    box: FloatArray | None,
+    source: Path,
+) -> Rows:
+    """Write contacts with their forces; return names and values of what was written.
+
+    Parameters
+    ----------
+    form : vtk-contacts, csv-contacts or bonds
+    out : file to write
+    path : path of the dump, for errors
+    frame : frame whose contacts are written
+    box : (3, 2), box in which the contact points lie, length; None for all contacts
+    source : folder of the run
+
+    Raises AnalysisError where the contacts of the frame's step are not known.
+    """
+    contacts = _contacts(frame, source)
+    if contacts is None:
+        if not source.is_dir():
+            raise AnalysisError(
+                f"{path}: a dump alone has no contacts: name the folder of the run, which holds "
+                f"{CONTACT_DUMP}"
+            )
+        raise AnalysisError(f"{source / CONTACT_DUMP}: no contacts of step {frame.step}")
+    said = [("contacts", _as_contacts(contacts, frame.step))]
+    if form == "bonds":
+        points = named(out, (".bonds",)).with_suffix(".xyz")
+        # Bonds lead between the places of the spheres in this file, which are written first.
+        rows = write_spheres("xyz", points, path, frame, None, source)
+        bonds = write_bonds(out, contacts, frame.ids, frame.spheres)
+        return [*rows, *said, ("bonds", f"{bonds} between spheres"), _as_file("file", out)]
+    if form == "vtk-contacts":
+        lines = write_contacts_vtk(out, contacts, frame.ids, frame.spheres, box=box)
+        said.append(("lines", f"{lines} with force, gap, normal, id1, id2, wall, copy"))
+    else:
+        rows_written = write_contacts_csv(out, contacts, frame.ids, frame.spheres, box=box)
+        said.append(("rows", f"{rows_written}"))
+    return [*said, _as_file("file", out)]
+
+
+def _as_contacts(contacts: ContactFrame, step: int) -> str:
+    walls = int((contacts.ids[:, 1] < 0).sum())
+    return f"{len(contacts.ids)}, step {step}; {walls} of them with walls"
 
 
 @dataclass(frozen=True, eq=False)
-class _Columns:
-    """The columns for k chosen spheres that are written beside place and radius.
+class _Chosen:
+    """The spheres of a frame that are written.
 
     Attributes
     ----------
-    ids : (k,)
-    bodies : (k,), 0 for a free sphere; None where the dump has no bodies
-    contacts : (k,), contacts with other spheres, of all the packing; None where they are not known
+    spheres : k spheres; cut out of a packing, they are not periodic
+    index : (k,), index of each one in the frame
+    said : how many they are, for the user
     """
 
-    ids: IntArray
-    bodies: IntArray | None
-    contacts: IntArray | None
+    spheres: Spheres
+    index: IntArray
+    said: str
 
     @classmethod
-    def of(cls, frame: ParticleFrame, chosen: BoolArray, source: Path) -> _Columns:
-        """Return the columns of the chosen spheres, (n,) of bool, of a frame."""
-        contacts = _contacts(frame, source)
-        return cls(
-            ids=frame.ids[chosen],
-            bodies=None if frame.bodies is None else frame.bodies[chosen],
-            contacts=None if contacts is None else contacts[chosen],
-        )
-
-    @property
-    def arrays(self) -> dict[str, IntArray | None]:
-        """The columns by the names that the writers give them."""
-        return {"ids": self.ids, "bodies": self.bodies, "contacts": self.contacts}
-
-    @property
-    def names(self) -> str:
-        """The names of the columns, for the user."""
-        names = "radius, id" + ("" if self.bodies is None else ", body")
-        if self.contacts is None:
-            return f"{names}; no contacts are known at this step"
-        return f"{names}, contacts"
+    def of(cls, frame: ParticleFrame, box: FloatArray | None, path: Path) -> _Chosen:
+        """Choose all spheres, or those whose centres, or images of them, lie in a box, (3, 2)."""
+        everything = frame.spheres
+        count = len(everything)
+        if box is None:
+            return cls(everything, np.arange(count), f"{count} of {count}, step {frame.step}")
+        images = everything.around(box)
+        places = images.spheres
+        chosen = inside_of(places.positions, box, flat=everything.flat)
+        if not chosen.any():
+            raise AnalysisError(f"{path}: no sphere's centre lies in the box at step {frame.step}")
+        index = images.sphere[chosen]
+        said = f"{len(index)} of {count}, step {frame.step}"
+        if everything.has_images:
+            said = f"{len(index)}, images among them, of {count}, step {frame.step}"
+        particles = group_spheres(places.particles.index[chosen] + 1)
+        piece = Spheres(places.positions[chosen], places.radii[chosen], particles, places.cell)
+        return cls(piece, index, said)
 
 
-def _contacts(frame: ParticleFrame, source: Path) -> IntArray | None:
-    """Count each sphere's contacts with others, (n,), where a run's contact dump has the step.
+def _counts(frame: ParticleFrame, source: Path) -> IntArray | None:
+    """Count each sphere's contacts with others, (n,), where they are known."""
+    contacts = _contacts(frame, source)
+    if contacts is None:
+        return None
+    images = frame.cell.has_images
+    return contact_counts(contacts.ids, frame.ids, images=images).particles
+
+
+def _contacts(frame: ParticleFrame, source: Path) -> ContactFrame | None:
+    """Return the contacts of a frame's step, if a run's contact dump has them.
 
     A dump that was named alone may be of another run than the contacts beside it.
     """
@@ -202,7 +280,7 @@ def _contacts(frame: ParticleFrame, source: Path) -> IntArray | None:
     for contacts in iterate_contact_frames(path):
         if contacts.step == frame.step:
             check_contacts(contacts, frame, path)
-            return contact_counts(contacts.ids, frame.ids).particles
+            return contacts
     return None
 
 
@@ -213,7 +291,7 @@ def write_image(
     frame: ParticleFrame,
     box: FloatArray | None,
     voxel: float | None,
-) -> list[tuple[str, str]]:
+) -> Rows:
     """Write a voxel image; return names and values of what was written.
 
     Parameters
@@ -222,18 +300,18 @@ def write_image(
     out : file to write
     path : path of the dump, for errors
     frame : frame that is written
-    box : (3, 2), box of the image, length; None for the dump's
+    box : (3, 2), box of the image, length; None for the one that encloses the dump's
     voxel : edge of a voxel, length; None for a tenth of the smallest radius
     """
-    _check_not_periodic(frame, path)
     bounds = frame.box if box is None else box
-    if not spheres_reaching(frame.positions, frame.radii, bounds).any():
+    drawn = frame.spheres.around(bounds).spheres
+    if not spheres_reaching(drawn.positions, drawn.radii, bounds).any():
         raise AnalysisError(f"{path}: no sphere reaches into the box at step {frame.step}")
     edge = float(frame.radii.min()) / VOXELS_PER_RADIUS if voxel is None else voxel
     slices, rows, columns = voxel_shape(bounds, edge)
     write = write_tiff if form == "tiff" else write_raw
     with _progress() as progress:
-        image = write(out, frame.positions, frame.radii, bounds, edge, progress=progress)
+        image = write(out, frame.spheres, bounds, edge, progress=progress)
     said = [
         ("spheres", f"{len(frame.ids)}, step {frame.step}"),
         ("voxels", f"{columns} x {rows} x {slices} of {edge:g}"),

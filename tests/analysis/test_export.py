@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from collections.abc import Callable
@@ -11,20 +12,27 @@ from typing import Any
 import MDAnalysis
 import meshio
 import numpy as np
+import pandas
 import pytest
 import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import ConvexHull
+from scipy.spatial.distance import cdist
 
-from lammps_inelastic import analysis
 from lammps_inelastic.analysis import (
+    Cell,
     ExportError,
     InputError,
+    Spheres,
     VoxelImage,
+    group_spheres,
     packing_fraction,
     voxel_shape,
     voxel_slices,
+    write_csv,
+    write_json,
+    write_pqr,
     write_raw,
     write_stl,
     write_tiff,
@@ -32,18 +40,22 @@ from lammps_inelastic.analysis import (
     write_xyz,
 )
 from lammps_inelastic.analysis.geometry import FloatArray
+from tests.analysis.touching_spheres import CELLS, PERIODIC, scene
 
-# Positions and radii.
-Spheres = tuple[FloatArray, FloatArray]
 UNIT = [[0, 1]] * 3
+ONE = Spheres([[0.5] * 3], [0.5])
 INTEGERS = {"ids": [3, 5, 2**40], "bodies": [7, 7, 0], "contacts": [1, 0, 12]}
 
 
 @pytest.fixture
 def spheres() -> Spheres:
-    """Return positions (60, 3) and radii (60,) of spheres that overlap and leave the unit cube."""
+    """Return 60 spheres that overlap and leave the unit cube."""
     generator = np.random.default_rng(3)
-    return generator.uniform(-0.1, 1.1, (60, 3)), generator.uniform(0.02, 0.25, 60)
+    return Spheres(generator.uniform(-0.1, 1.1, (60, 3)), generator.uniform(0.02, 0.25, 60))
+
+
+def first(count: int, spheres: Spheres, cell: Cell | None = None) -> Spheres:
+    return Spheres(spheres.positions[:count], spheres.radii[:count], cell=cell)
 
 
 def parsed_xyz(path: Path) -> tuple[dict[str, str], dict[tuple[str, str], Any]]:
@@ -61,22 +73,19 @@ def parsed_xyz(path: Path) -> tuple[dict[str, str], dict[tuple[str, str], Any]]:
 
 
 def test_xyz_holds_all_digits(tmp_path: Path, spheres: Spheres) -> None:
-    positions, radii = spheres
-    write_xyz(tmp_path / "packing.xyz", positions, radii)
+    write_xyz(tmp_path / "packing.xyz", spheres)
     said, columns = parsed_xyz(tmp_path / "packing.xyz")
     assert list(said) == ["Properties"]
     # Equality, not closeness: 17 digits give a float64 back.
-    assert columns["pos", "R"].astype(float).tolist() == positions.tolist()
-    assert columns["radius", "R"].astype(float).ravel().tolist() == radii.tolist()
+    assert columns["pos", "R"].astype(float).tolist() == spheres.positions.tolist()
+    assert columns["radius", "R"].astype(float).ravel().tolist() == spheres.radii.tolist()
     assert list(columns) == [("species", "S"), ("pos", "R"), ("radius", "R")]
 
 
 def test_xyz_with_all_that_is_known(tmp_path: Path, spheres: Spheres) -> None:
-    positions, radii = (values[:3] for values in spheres)
     path = tmp_path / "packing.extxyz"
-    box = [[-0.5, 1], [0, 5], [0.25, 1]]
-    periodic = (True, False, True)
-    write_xyz(path, positions, radii, **INTEGERS, box=box, periodic=periodic, step=90)
+    cell = Cell.of_box([[-0.5, 1], [0, 5], [0.25, 1]], (True, False, True))
+    write_xyz(path, first(3, spheres, cell), **INTEGERS, step=90)
     said, columns = parsed_xyz(path)
     for name, values in zip(("id", "body", "contacts"), INTEGERS.values(), strict=True):
         assert columns[name, "I"].astype(int).ravel().tolist() == values
@@ -87,26 +96,25 @@ def test_xyz_with_all_that_is_known(tmp_path: Path, spheres: Spheres) -> None:
 
 
 def test_xyz_is_read_by_mdanalysis(tmp_path: Path, spheres: Spheres) -> None:
-    positions, radii = spheres
     path = tmp_path / "packing.xyz"
-    write_xyz(path, positions, radii, contacts=np.arange(60), box=UNIT, step=1)
+    write_xyz(path, spheres, contacts=np.arange(60), step=1)
     universe = MDAnalysis.Universe(str(path), to_guess=())
     # MDAnalysis keeps positions as float32, of seven digits and more.
-    assert universe.atoms.positions == pytest.approx(positions, rel=1e-7)
+    assert universe.atoms.positions == pytest.approx(spheres.positions, rel=1e-7)
     assert set(universe.atoms.names) == {"X"}
 
 
 def test_vtk(tmp_path: Path, spheres: Spheres) -> None:
-    positions, radii = (values[:3] for values in spheres)
-    write_vtk(tmp_path / "packing.vtu", positions, radii, **INTEGERS)
+    three = first(3, spheres)
+    write_vtk(tmp_path / "packing.vtu", three, **INTEGERS)
     mesh = meshio.read(tmp_path / "packing.vtu")
     # Binary: the same numbers.
-    assert mesh.points.tolist() == positions.tolist()
+    assert mesh.points.tolist() == three.positions.tolist()
     assert mesh.cells_dict["vertex"].tolist() == [[0], [1], [2]]
     found = {name: values.tolist() for name, values in mesh.point_data.items()}
     assert found == {
-        "radius": radii.tolist(),
-        "diameter": (2 * radii).tolist(),
+        "radius": three.radii.tolist(),
+        "diameter": (2 * three.radii).tolist(),
         "id": INTEGERS["ids"],
         "body": INTEGERS["bodies"],
         "contacts": INTEGERS["contacts"],
@@ -114,8 +122,70 @@ def test_vtk(tmp_path: Path, spheres: Spheres) -> None:
 
 
 def test_vtk_without_what_is_not_known(tmp_path: Path, spheres: Spheres) -> None:
-    write_vtk(tmp_path / "packing.vtu", *spheres)
+    write_vtk(tmp_path / "packing.vtu", spheres)
     assert list(meshio.read(tmp_path / "packing.vtu").point_data) == ["radius", "diameter"]
+
+
+def test_table_is_read_by_pandas(tmp_path: Path, spheres: Spheres) -> None:
+    three = first(3, spheres)
+    write_csv(tmp_path / "packing.csv", three, **INTEGERS)
+    table = pandas.read_csv(tmp_path / "packing.csv")
+    assert list(table) == [
+        "id",
+        "body",
+        *(f"{axis} [length]" for axis in "xyz"),
+        "radius [length]",
+        "contacts",
+    ]
+    assert table["id"].tolist() == INTEGERS["ids"]
+    assert table[[f"{axis} [length]" for axis in "xyz"]].to_numpy().tolist() == (
+        three.positions.tolist()
+    )
+    assert table["radius [length]"].tolist() == three.radii.tolist()
+
+
+def test_json_is_a_list_of_spheres_and_a_cell(tmp_path: Path, spheres: Spheres) -> None:
+    cell = Cell([0.5, 0, -1], [[2, 0, 0], [0.5, 2, 0], [0, -0.25, 3]], (True, False, True))
+    three = first(3, spheres, cell)
+    write_json(tmp_path / "packing.json", three, **INTEGERS, step=90)
+    read = json.loads((tmp_path / "packing.json").read_text())
+    assert read["step"] == 90
+    assert read["cell"]["origin"] == [0.5, 0, -1]
+    assert read["cell"]["vectors"] == cell.vectors.tolist()
+    assert read["cell"]["periodic"] == [True, False, True]
+    assert [one["center"] for one in read["spheres"]] == three.positions.tolist()
+    assert [one["radius"] for one in read["spheres"]] == three.radii.tolist()
+    assert [one["body"] for one in read["spheres"]] == INTEGERS["bodies"]
+    write_json(tmp_path / "packing.json", spheres)
+    read = json.loads((tmp_path / "packing.json").read_text())
+    assert (read["cell"], len(read["spheres"])) == (None, 60)
+    assert list(read["spheres"][0]) == ["center", "radius"]
+
+
+def test_mdanalysis_has_the_radii_of_pqr(tmp_path: Path, spheres: Spheres) -> None:
+    bodies = [0, 4, 4]
+    three = Spheres(spheres.positions[:3], spheres.radii[:3], group_spheres(bodies))
+    write_pqr(tmp_path / "packing.pqr", three, ids=[3, 5, 2])
+    atoms = MDAnalysis.Universe(str(tmp_path / "packing.pqr"), to_guess=()).atoms
+    # MDAnalysis keeps positions and radii as float32.
+    assert atoms.radii == pytest.approx(three.radii, rel=1e-7)
+    assert atoms.positions == pytest.approx(three.positions, rel=1e-7)
+    assert atoms.resids.tolist() == [1, 2, 2]
+    assert atoms.ids.tolist() == [3, 5, 2]
+    write_pqr(tmp_path / "packing.pqr", spheres)
+    assert MDAnalysis.Universe(str(tmp_path / "packing.pqr"), to_guess=()).atoms.ids[-1] == 60
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_xyz_keeps_cell_and_periods(tmp_path: Path, name: str) -> None:
+    one = scene(name)
+    write_xyz(tmp_path / "packing.xyz", one.spheres, ids=one.ids)
+    said, columns = parsed_xyz(tmp_path / "packing.xyz")
+    cell = CELLS[name]
+    assert [float(word) for word in said["Lattice"].split()] == cell.vectors.ravel().tolist()
+    assert [float(word) for word in said["Origin"].split()] == cell.origin.tolist()
+    assert said["pbc"] == " ".join("T" if flag else "F" for flag in cell.periodic)
+    assert columns["pos", "R"].astype(float).tolist() == one.spheres.positions.tolist()
 
 
 def stack(path: Path) -> NDArray[np.uint8]:
@@ -132,42 +202,76 @@ BOX = np.array([[0, 1], [0.1, 0.85], [-0.2, 0.4]])
 
 
 def by_looking_at_every_sphere(
-    positions: FloatArray, radii: FloatArray, voxel: float, shape: tuple[int, ...]
+    spheres: Spheres, voxel: float, shape: tuple[int, ...], box: FloatArray = BOX
 ) -> NDArray[np.int64]:
-    """Return the voxel image of BOX from its definition."""
+    """Return the voxel image of a box from its definition."""
     z, y, x = (
         lower + (np.arange(count) + 0.5) * voxel
-        for lower, count in zip(BOX[::-1, 0], shape, strict=True)
+        for lower, count in zip(box[::-1, 0], shape, strict=True)
     )
     centres = np.stack(np.meshgrid(z, y, x, indexing="ij"), axis=-1)[..., ::-1]
-    squared = ((centres[..., None, :] - positions) ** 2).sum(axis=-1)
-    return np.where((squared < radii**2).any(axis=-1), 255, 0)
+    squared = ((centres[..., None, :] - spheres.positions) ** 2).sum(axis=-1)
+    return np.where((squared < spheres.radii**2).any(axis=-1), 255, 0)
 
 
 def test_voxels_by_looking_at_every_sphere(spheres: Spheres) -> None:
     # No centre of a voxel is so close to one of these surfaces that round-off could decide.
-    found = np.array(list(voxel_slices(*spheres, BOX, 0.025)))
+    found = np.array(list(voxel_slices(spheres, BOX, 0.025)))
     assert found.dtype == np.uint8
     assert found.shape == (24, 30, 40)
-    assert (found == by_looking_at_every_sphere(*spheres, 0.025, found.shape)).all()
+    assert (found == by_looking_at_every_sphere(spheres, 0.025, found.shape)).all()
     assert 0.2 < found.mean() / 255 < 0.8
+
+
+def every_image(spheres: Spheres) -> Spheres:
+    """Return spheres of a periodic cell with all images up to four periods away, in the open."""
+    cell = spheres.cell
+    moves = np.array([*np.ndindex(9, 9, 9)]) - 4
+    moves = moves[(moves[:, ~np.array(cell.periodic)] == 0).all(axis=1)]
+    places = (spheres.positions + (moves @ cell.vectors)[:, None]).reshape(-1, 3)
+    return Spheres(places, np.tile(spheres.radii, len(moves)))
+
+
+SOLID_CELLS = [name for name in PERIODIC if not CELLS[name].flat]
+
+
+@pytest.mark.parametrize("name", SOLID_CELLS)
+def test_voxels_of_a_periodic_cell_by_looking_at_every_image(name: str) -> None:
+    spheres = scene(name).spheres
+    box = spheres.cell.bounds
+    found = np.array(list(voxel_slices(spheres, box, 0.05)))
+    near = every_image(spheres)
+    reach = ((near.positions > box[:, 0] - 0.3) & (near.positions < box[:, 1] + 0.3)).all(axis=1)
+    around = Spheres(near.positions[reach], near.radii[reach])
+    expected = by_looking_at_every_sphere(around, 0.05, found.shape, box)
+    assert (found == expected).all()
+    assert 0.1 < found.mean() / 255 < 0.99
+
+
+def test_voxels_repeat_after_a_period() -> None:
+    """In a box of two periods, somewhere else than the cell."""
+    spheres = scene("periodic").spheres
+    found = np.array(list(voxel_slices(spheres, [[7, 9], [0, 1], [-3, -1]], 0.125)))
+    assert found.shape == (16, 8, 16)
+    assert (found[:8] == found[8:]).all()
+    assert (found[:, :, :8] == found[:, :, 8:]).all()
 
 
 def test_what_is_on_the_surface_is_pore() -> None:
     # The sphere ends at the centres of its neighbours: exact in binary.
-    found = np.array(list(voxel_slices([[0.625] * 3], [0.25], UNIT, 0.25)))
+    found = np.array(list(voxel_slices(Spheres([[0.625] * 3], [0.25]), UNIT, 0.25)))
     assert np.argwhere(found).tolist() == [[2, 2, 2]]
 
 
 def test_spheres_smaller_than_a_voxel_may_be_missed() -> None:
-    corner_of_eight = np.array(list(voxel_slices([[0.5] * 3], [0.1], UNIT, 0.25)))
+    corner_of_eight = np.array(list(voxel_slices(Spheres([[0.5] * 3], [0.1]), UNIT, 0.25)))
     assert not corner_of_eight.any()
 
 
 def test_solid_share_is_the_packing_fraction(tmp_path: Path, spheres: Spheres) -> None:
     cells = 120
-    image = write_tiff(tmp_path / "packing.tif", *spheres, UNIT, 1 / cells)
-    measured = packing_fraction(analysis.Spheres(*spheres), UNIT)
+    image = write_tiff(tmp_path / "packing.tif", spheres, UNIT, 1 / cells)
+    measured = packing_fraction(spheres, UNIT)
     solid = stack(tmp_path / "packing.tif") == 255
     assert image == VoxelImage((cells,) * 3, 1 / cells, np.count_nonzero(solid))
     # The voxels at the surface are right or wrong by chance, half a voxel each; to both this and
@@ -182,8 +286,8 @@ def test_solid_share_is_the_packing_fraction(tmp_path: Path, spheres: Spheres) -
 
 def test_tiff_holds_the_scale_and_the_place(tmp_path: Path, spheres: Spheres) -> None:
     path = tmp_path / "packing.tiff"
-    assert write_tiff(path, *spheres, BOX, 0.025).shape == (24, 30, 40)
-    assert (stack(path) == np.array(list(voxel_slices(*spheres, BOX, 0.025)))).all()
+    assert write_tiff(path, spheres, BOX, 0.025).shape == (24, 30, 40)
+    assert (stack(path) == np.array(list(voxel_slices(spheres, BOX, 0.025)))).all()
     with Image.open(path) as image:
         tags = dict(image.tag_v2)
     # Voxels per length, without a unit.
@@ -196,7 +300,7 @@ def test_tiff_holds_the_scale_and_the_place(tmp_path: Path, spheres: Spheres) ->
 
 
 def test_raw_and_its_header(tmp_path: Path, spheres: Spheres) -> None:
-    image = write_raw(tmp_path / "packing.raw", *spheres, BOX, 0.025)
+    image = write_raw(tmp_path / "packing.raw", spheres, BOX, 0.025)
     lines = (tmp_path / "packing.mhd").read_text().splitlines()
     header = dict(line.split(" = ") for line in lines)
     assert list(header)[-1] == "ElementDataFile"
@@ -209,7 +313,7 @@ def test_raw_and_its_header(tmp_path: Path, spheres: Spheres) -> None:
     assert offset == pytest.approx([0.0125, 0.1125, -0.1875], abs=1e-15)
     found = np.fromfile(tmp_path / header["ElementDataFile"], dtype=np.uint8)
     assert image.solid == np.count_nonzero(found)
-    expected = np.array(list(voxel_slices(*spheres, BOX, 0.025)))
+    expected = np.array(list(voxel_slices(spheres, BOX, 0.025)))
     assert (found.reshape(slices, rows, columns) == expected).all()
 
 
@@ -217,7 +321,7 @@ def test_raw_and_its_header(tmp_path: Path, spheres: Spheres) -> None:
 def test_progress(tmp_path: Path, spheres: Spheres, write: Callable[..., Any]) -> None:
     seen = []
     name = {write_tiff: "packing.tif", write_raw: "packing.raw"}[write]
-    write(tmp_path / name, *spheres, UNIT, 0.25, progress=lambda *done: seen.append(done))
+    write(tmp_path / name, spheres, UNIT, 0.25, progress=lambda *done: seen.append(done))
     assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
@@ -251,7 +355,7 @@ def test_as_many_voxels_as_have_their_centres_in_the_box(
 )
 def test_wrong_voxels(box: Any, voxel: float, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        voxel_slices([[0.5] * 3], [0.5], box, voxel)
+        voxel_slices(ONE, box, voxel)
 
 
 # The icosahedron's share of its sphere, in closed form, and those that the documentation names.
@@ -265,7 +369,7 @@ ICOSAHEDRON = 5 / 12 * (3 + np.sqrt(5)) * EDGE**3 / (4 / 3 * np.pi)
 def test_stl(tmp_path: Path, subdivisions: int, share: float) -> None:
     positions, radii = [[0.5, 0.25, 3], [0.6, 0.25, 3], [-1, 0, 0]], [0.1, 0.3, 0.2]
     path = tmp_path / "packing.stl"
-    faces = write_stl(path, positions, radii, subdivisions=subdivisions)
+    faces = write_stl(path, Spheres(positions, radii), subdivisions=subdivisions)
     assert faces == 3 * 20 * 4**subdivisions
     # A header of 80 bytes, the number of faces, and 50 bytes for each.
     assert path.stat().st_size == 84 + 50 * faces
@@ -296,11 +400,38 @@ def test_stl(tmp_path: Path, subdivisions: int, share: float) -> None:
     assert written == pytest.approx(outwards, abs=1e-4)
 
 
+@pytest.mark.parametrize("name", SOLID_CELLS)
+def test_stl_of_a_periodic_cell_has_the_images_that_reach_into_it(
+    tmp_path: Path, name: str
+) -> None:
+    spheres = scene(name, 4).spheres
+    faces = write_stl(tmp_path / "packing.stl", spheres, subdivisions=1)
+    mesh = trimesh.load_mesh(tmp_path / "packing.stl", process=False)
+    assert len(mesh.faces) == faces
+    # The corners of a sphere are mirrored at its centre.
+    centres = mesh.triangles.reshape(faces // 80, 240, 3).mean(axis=1)
+    assert centres[:4] == pytest.approx(spheres.positions, abs=1e-6)
+    # Each image is there once.
+    assert len(np.unique(np.round(centres, 5), axis=0)) == len(centres)
+    # Points of the cell are in a sphere or in an image: that is in one that is drawn.
+    cell = spheres.cell
+    points = cell.origin + np.random.default_rng(2).uniform(0, 1, (3000, 3)) @ cell.vectors
+    images = every_image(spheres)
+    covered = cdist(points, images.positions) < images.radii
+    drawn = cdist(images.positions, centres).min(axis=1) < 1e-5
+    assert covered.any(axis=1).any()
+    assert not covered[:, ~drawn].any()
+    # None of the images is drawn in vain but those that pass an edge of the cell by.
+    assert len(centres) <= 4 * 8
+
+
 @pytest.mark.slow
 def test_stl_of_many_spheres_is_written_in_parts(tmp_path: Path) -> None:
     # 20 faces each: 10,000 spheres are written at once.
     centres = np.random.default_rng(6).uniform(0, 1, (20_001, 3))
-    faces = write_stl(tmp_path / "packing.stl", centres, np.full(20_001, 0.01), subdivisions=0)
+    faces = write_stl(
+        tmp_path / "packing.stl", Spheres(centres, np.full(20_001, 0.01)), subdivisions=0
+    )
     mesh = trimesh.load_mesh(tmp_path / "packing.stl", process=False)
     assert len(mesh.faces) == faces
     found = mesh.triangles.reshape(20_001, 60, 3).mean(axis=1)
@@ -317,15 +448,18 @@ def test_stl_of_many_spheres_is_written_in_parts(tmp_path: Path) -> None:
 )
 def test_wrong_subdivisions(tmp_path: Path, subdivisions: int, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        write_stl(tmp_path / "packing.stl", [[0, 0, 0]], [1], subdivisions=subdivisions)
+        write_stl(tmp_path / "packing.stl", ONE, subdivisions=subdivisions)
 
 
 WRITERS = {
-    "packing.xyz": lambda path: write_xyz(path, [[0.5] * 3], [0.5]),
-    "packing.vtu": lambda path: write_vtk(path, [[0.5] * 3], [0.5]),
-    "packing.tif": lambda path: write_tiff(path, [[0.5] * 3], [0.5], UNIT, 0.5),
-    "packing.raw": lambda path: write_raw(path, [[0.5] * 3], [0.5], UNIT, 0.5),
-    "packing.stl": lambda path: write_stl(path, [[0.5] * 3], [0.5]),
+    "packing.xyz": lambda path: write_xyz(path, ONE),
+    "packing.vtu": lambda path: write_vtk(path, ONE),
+    "packing.csv": lambda path: write_csv(path, ONE),
+    "packing.json": lambda path: write_json(path, ONE),
+    "packing.pqr": lambda path: write_pqr(path, ONE),
+    "packing.tif": lambda path: write_tiff(path, ONE, UNIT, 0.5),
+    "packing.raw": lambda path: write_raw(path, ONE, UNIT, 0.5),
+    "packing.stl": lambda path: write_stl(path, ONE),
 }
 
 
@@ -350,6 +484,19 @@ def test_name_of_another_format(tmp_path: Path, name: str) -> None:
         WRITERS[name](tmp_path / "packing.dat")
 
 
+@pytest.mark.parametrize("name", ["packing.tif", "packing.raw", "packing.stl"])
+def test_no_solid_of_discs(tmp_path: Path, name: str) -> None:
+    discs = scene("flat").spheres
+    write = {
+        "packing.tif": lambda path: write_tiff(path, discs, UNIT, 0.5),
+        "packing.raw": lambda path: write_raw(path, discs, UNIT, 0.5),
+        "packing.stl": lambda path: write_stl(path, discs),
+    }[name]
+    with pytest.raises(InputError, match=r"a two-dimensional packing has no .* no volume"):
+        write(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("name", ["packing.tif", "packing.raw"])
 def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path: Path, name: str) -> None:
     def stop(done: int, total: int) -> None:
@@ -358,7 +505,7 @@ def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path: Path, name: str
     (tmp_path / name).write_text("old")
     write = write_tiff if name == "packing.tif" else write_raw
     with pytest.raises(KeyboardInterrupt):
-        write(tmp_path / name, [[0.5] * 3], [0.5], UNIT, 0.5, progress=stop)
+        write(tmp_path / name, ONE, UNIT, 0.5, progress=stop)
     assert (tmp_path / name).read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == [name]
 
@@ -366,6 +513,6 @@ def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path: Path, name: str
 def test_a_column_of_another_length(tmp_path: Path) -> None:
     message = r"body must have shape \(1,\), not \(2,\)"
     with pytest.raises(InputError, match=message):
-        write_xyz(tmp_path / "packing.xyz", [[0, 0, 0]], [1], bodies=[1, 2])
+        write_xyz(tmp_path / "packing.xyz", ONE, bodies=[1, 2])
     with pytest.raises(InputError, match=message):
-        write_vtk(tmp_path / "packing.vtu", [[0, 0, 0]], [1], bodies=[1, 2])
+        write_vtk(tmp_path / "packing.vtu", ONE, bodies=[1, 2])

@@ -18,7 +18,20 @@ from tests.analysis.written_dumps import Rows, Writer
 
 CENTRES = np.array([(0.3, 1, 0.5), (0.4, 1, 0.5), (0.6, 1.5, 0.5)])
 RADIUS = 0.125
-ENDINGS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
+FILES = {
+    "xyz": "packing.xyz",
+    "vtk": "packing.vtu",
+    "csv": "packing.csv",
+    "json": "packing.json",
+    "pqr": "packing.pqr",
+    "vtk-contacts": "contacts.vtp",
+    "csv-contacts": "contacts.csv",
+    "bonds": "packing.bonds",
+    "tiff": "packing.tif",
+    "raw": "packing.raw",
+    "stl": "packing.stl",
+}
+OF_CONTACTS = ("vtk-contacts", "csv-contacts", "bonds")
 # About the first two spheres.
 BOX = ["--box", "0.2", "0.5", "0.8", "1.2", "0.25", "0.75"]
 
@@ -50,12 +63,12 @@ def xyz_rows(path: Path) -> list[list[float]]:
     ]
 
 
-@pytest.mark.parametrize("name", ENDINGS)
+@pytest.mark.parametrize("name", FILES)
 def test_the_last_frame_into_the_folder_of_the_run(
     run: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", str(run), "--format", name]) == 0
-    path = run / f"packing{ENDINGS[name]}"
+    path = run / FILES[name]
     assert path.exists()
     output = capsys.readouterr().out
     assert f"{path} (" in output
@@ -201,6 +214,8 @@ def failure_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["xyz", "--frame", "3"], "no frame 3; there are 3, from 0 to 2"),
         (["xyz", "--frame", "-4"], "no frame -4; there are 3, from 0 to 2"),
         (["xyz", "--voxel", "1"], "--voxel is for tiff and raw, not for xyz"),
+        (["bonds", "--box", "0", "1", "0", "1", "0", "1"], "--box is not for bonds: OVITO's"),
+        (["bonds", "--out", "packing.xyz"], "packing.xyz: the name must end in .bonds"),
         (["raw", "--subdivisions", "1"], "--subdivisions is for stl, not for raw"),
         (["stl", "--subdivisions", "-1"], "subdivisions must be at least 0, not -1"),
         (["stl", "--box", "2", "3", "2", "3", "2", "3"], "no sphere's centre lies in the box"),
@@ -245,16 +260,92 @@ def test_what_is_no_file(run: Path, name: str, capsys: pytest.CaptureFixture[str
     assert said in failure_of([str(run), "--format", "xyz"], capsys)
 
 
-@pytest.mark.parametrize("form", ["raw", "tiff", "stl"])
-def test_no_solid_of_a_periodic_box(
+def periodic(run: Path, flags: str) -> None:
+    """Give the faces of the run's boxes other flags."""
+    for name in ("particles", "contacts"):
+        path = run / f"{name}.lammpsdump"
+        path.write_text(path.read_text().replace("ff ff ff", flags))
+
+
+def test_solids_of_a_periodic_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An image of sphere 1 is in a box beyond the face."""
+    periodic(run, "pp ff ff")
+    command = ["export", str(run), "--format"]
+    # Sphere 1 reaches from 0.175 to 0.425, and its image a period further on.
+    piece = ["--box", "0.9", "1.2", "0.8", "1.2", "0.25", "0.75", "--voxel", "0.005"]
+    assert main([*command, "raw", *piece]) == 0
+    share = float(re.search(r"solid share  (\S+)", capsys.readouterr().out)[1])
+    cap = np.pi / 3 * 0.025**2 * (3 * RADIUS - 0.025)
+    # A thousand pairs of neighbours, of which one is solid, each right or wrong by half a voxel.
+    # Four standard deviations.
+    assert share * 0.3 * 0.4 * 0.5 == pytest.approx(cap, abs=4 * 0.5 * np.sqrt(1000) * 0.005**3)
+
+
+def test_surfaces_of_a_periodic_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    periodic(run, "pp ff ff")
+    assert main(["export", str(run), "--format", "stl", "--subdivisions", "0"]) == 0
+    assert "spheres  3 of 3, step 90, and 0 images that reach into the cell" in (
+        capsys.readouterr().out
+    )
+    # Cut out at x from 1 to 1.35, an image of sphere 1 alone has its centre in the box.
+    piece = ["--box", "1", "1.35", "0", "5", "0", "1"]
+    assert main(["export", str(run), "--format", "stl", "--subdivisions", "1", *piece]) == 0
+    assert "spheres  1, images among them, of 3, step 90" in capsys.readouterr().out
+    mesh = trimesh.load_mesh(run / "packing.stl")
+    assert mesh.center_mass == pytest.approx([1.3, 1, 0.5], abs=1e-6)
+    assert main(["export", str(run), "--format", "csv", *piece]) == 0
+    (row,) = (run / "packing.csv").read_text().split("\n")[1:-1]
+    # 1.3 is a sum.
+    assert [float(word) for word in row.split(",")] == pytest.approx(
+        [1, 1, 1.3, 1, 0.5, RADIUS, 0], abs=1e-15
+    )
+
+
+def test_bonds_stand_beside_the_spheres(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    periodic(run, "pp ff ff")
+    assert main(["export", str(run), "--format", "bonds", "--out", str(run / "some.bonds")]) == 0
+    output = capsys.readouterr().out
+    assert "contacts  2, step 90; 1 of them with walls\n" in output
+    assert "bonds     1 between spheres\n" in output
+    assert f"{run / 'some.xyz'} (" in output
+    assert [row[4] for row in xyz_rows(run / "some.xyz")] == [1, 2, 3]
+    (bond,) = (run / "some.bonds").read_text().split("\n")[5:-1]
+    assert bond.split()[:2] == ["2", "3"]
+
+
+def test_contacts_of_a_box(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # Both contact points are at the origin.
+    command = ["export", str(run), "--format", "csv-contacts"]
+    assert main([*command, "--box", "0", "1", "0", "1", "0", "1"]) == 0
+    assert "rows      2\n" in capsys.readouterr().out
+    assert main([*command, "--box", "0.1", "1", "0", "1", "0", "1"]) == 0
+    assert "rows      0\n" in capsys.readouterr().out
+    assert len((run / "contacts.csv").read_text().split("\n")) == 2
+
+
+@pytest.mark.parametrize("form", OF_CONTACTS)
+def test_contacts_that_are_not_known(
     form: str, run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Images and surfaces would lack what reaches through its faces."""
-    path = run / "particles.lammpsdump"
-    path.write_text(path.read_text().replace("ff ff ff", "pp ff ff"))
+    message = failure_of([str(run), "--format", form, "--step", "0"], capsys)
+    assert message.endswith("contacts.lammpsdump: no contacts of step 0\n")
+    message = failure_of([str(run / "particles.lammpsdump"), "--format", form], capsys)
+    assert "a dump alone has no contacts: name the folder of the run" in message
+    (run / "contacts.lammpsdump").unlink()
     message = failure_of([str(run), "--format", form], capsys)
-    assert "the box is periodic (pp ff ff)" in message
-    assert "f, s or m" in message
+    assert message.endswith("contacts.lammpsdump: no contacts of step 90\n")
+
+
+@pytest.mark.parametrize("form", FILES)
+def test_discs(form: str, run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A two-dimensional packing has points and contacts, but no solids."""
+    periodic(run, "ff ff pp")
+    if form in ("tiff", "raw", "stl"):
+        assert "two-dimensional" in failure_of([str(run), "--format", form], capsys)
+        assert len(list(run.iterdir())) == 2
+    else:
+        assert main(["export", str(run), "--format", form]) == 0
+        assert (run / FILES[form]).exists()
 
 
 @pytest.mark.parametrize(

@@ -145,16 +145,16 @@ def test_wrong_input_of_files(tmp_path: Path) -> None:
     small = np.array(BOX) * 1e-9
     for name, write in {
         "voxels of 1e-10: they must be from": lambda: analysis.write_tiff(
-            tmp_path / "a.tif", [[5e-10] * 3], [3e-10], small, 1e-10
+            tmp_path / "a.tif", analysis.Spheres([[5e-10] * 3], [3e-10]), small, 1e-10
         ),
         "subdivisions must be a whole number": lambda: analysis.write_stl(
-            tmp_path / "a.stl", CENTRE, RADIUS, subdivisions=1.5
+            tmp_path / "a.stl", ONE[0], subdivisions=1.5
         ),
         "more than 1e+08 faces": lambda: analysis.write_stl(
-            tmp_path / "a.stl", CENTRE, RADIUS, subdivisions=10**12
+            tmp_path / "a.stl", ONE[0], subdivisions=10**12
         ),
         "id must be whole numbers": lambda: analysis.write_xyz(
-            tmp_path / "a.xyz", CENTRE, RADIUS, ids=[1.5]
+            tmp_path / "a.xyz", ONE[0], ids=[1.5]
         ),
         "pixels must be at least 1": lambda: analysis.draw_packing(
             tmp_path / "a.png", *ONE, pixels=0

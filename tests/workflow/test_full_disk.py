@@ -18,13 +18,13 @@ from pathlib import Path
 
 import pytest
 
+from lammps_inelastic.workflow.export import FILES as EXPORTS
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.store import read_studies
 from tests.small_disk import mounted
 from tests.workflow.few_spheres import TINY
 from tests.workflow.study_run import inelastic, run_few
 
-EXPORTS = {"xyz": ".xyz", "vtk": ".vtu", "tiff": ".tif", "raw": ".raw", "stl": ".stl"}
 # What each of them needs to be small: 30 spheres, and no more than 27,000 voxels.
 MORE = {"tiff": ["--voxel", "0.1"], "raw": ["--voxel", "0.1"]}
 
@@ -92,11 +92,11 @@ def test_exports(form: str, study: Path, refused: Callable[..., str]) -> None:
     arguments = ["export", str(run), "--format", form, *MORE.get(form, [])]
     assert main(arguments) == 0
     before = contents(study)
-    path = run / f"packing{EXPORTS[form]}"
+    path = run / EXPORTS[form]
     for size in (0, 100, path.stat().st_size - 1):
         # The header of raw bytes is written first.
         assert re.fullmatch(
-            rf"{run}/packing\.\w+: cannot be written: File too large",
+            rf"{run}/(packing|contacts)\.\w+: cannot be written: File too large",
             refused(*arguments, size=size),
         )
         assert contents(study) == before

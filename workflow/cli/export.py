@@ -11,7 +11,17 @@ import numpy as np
 from lammps_inelastic.analysis import AnalysisError, ParticleDump
 from lammps_inelastic.analysis.geometry import as_box
 
-from ..export import ENDINGS, IMAGES, NAME, SUBDIVISIONS, choose_frame, write_image, write_spheres
+from ..export import (
+    FILES,
+    IMAGES,
+    OF_CONTACTS,
+    SUBDIVISIONS,
+    choose_frame,
+    write_contacts,
+    write_image,
+    write_spheres,
+    write_surfaces,
+)
 from ..finished import PARTICLES as PARTICLE_DUMP
 from ..frames import notes_of
 from .arguments import add_frame
@@ -22,9 +32,11 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     export = commands.add_parser(
         "export",
         help="write a packing for another program",
-        description="Write one frame of a run as points (xyz for OVITO, ASE and MDAnalysis; vtk "
-        "for ParaView), as a voxel image (tiff; raw, with a MetaImage header) or as the surfaces "
-        "of its spheres (stl).",
+        description="Write one frame of a run: its spheres (xyz for OVITO and ASE; vtk for "
+        "ParaView; pqr for MDAnalysis, with radii; csv and json for scripts), its contacts with "
+        "their forces (vtk-contacts: lines for ParaView and OVITO; bonds for OVITO, and the "
+        "spheres as xyz; csv-contacts: a table), a voxel image (tiff; raw, with a MetaImage "
+        "header) or the surfaces of its spheres (stl).",
     )
     export.add_argument(
         "source",
@@ -32,12 +44,13 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="FOLDER|DUMP",
         help=f"folder of a run, which holds {PARTICLE_DUMP}, or a particle dump",
     )
-    export.add_argument("--format", required=True, choices=tuple(ENDINGS))
+    export.add_argument("--format", required=True, choices=tuple(FILES))
     export.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"file to write (default: {NAME} and the format's ending, in the run's folder)",
+        help="file to write (default: packing or contacts, and the format's ending, in the run's "
+        "folder)",
     )
     add_frame(export)
     export.add_argument(
@@ -45,8 +58,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         type=float,
         nargs=6,
         metavar=("XLO", "XHI", "YLO", "YHI", "ZLO", "ZHI"),
-        help="box of a voxel image (default: the dump's); for the other formats, write the spheres "
-        "whose centres lie in this box (default: all)",
+        help="box of a voxel image (default: the dump's); otherwise write the spheres whose "
+        "centres, or the contacts whose points, lie in this box (default: all)",
     )
     export.add_argument(
         "--voxel",
@@ -70,17 +83,23 @@ def run(options: argparse.Namespace) -> int:
         raise AnalysisError(f"--voxel is for tiff and raw, not for {options.format}")
     if options.subdivisions is not None and options.format != "stl":
         raise AnalysisError(f"--subdivisions is for stl, not for {options.format}")
+    if options.box is not None and options.format == "bonds":
+        raise AnalysisError("--box is not for bonds: OVITO's modifier Slice cuts spheres and bonds")
     source: Path = options.source
     dump = ParticleDump(source / PARTICLE_DUMP if source.is_dir() else source, whole=False)
     frame = choose_frame(dump, source, number=options.frame, step=options.step)
     box = None if options.box is None else as_box(np.reshape(options.box, (3, 2)))
-    out: Path = options.out or dump.path.with_name(NAME + ENDINGS[options.format])
-    if options.format in IMAGES:
-        rows = write_image(options.format, out, dump.path, frame, box, options.voxel)
+    form: str = options.format
+    out: Path = options.out or dump.path.with_name(FILES[form])
+    if form in IMAGES:
+        rows = write_image(form, out, dump.path, frame, box, options.voxel)
+    elif form in OF_CONTACTS:
+        rows = write_contacts(form, out, dump.path, frame, box, source)
+    elif form == "stl":
+        subdivisions = SUBDIVISIONS if options.subdivisions is None else options.subdivisions
+        rows = write_surfaces(out, dump.path, frame, box, subdivisions)
     else:
-        rows = write_spheres(
-            options.format, out, dump.path, frame, box, source, options.subdivisions
-        )
+        rows = write_spheres(form, out, dump.path, frame, box, source)
     rows += [("note", note) for note in notes_of(dump, frame)]
     left = max(len(name) for name, _ in rows)
     print("\n".join(f"{name:<{left}}  {value}" for name, value in rows))
