@@ -5,6 +5,7 @@
 # make validate  set up, check the physics (an hour)
 # make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
+# make programs  install OVITO, VTK and ASE, too (1.1 GB): slow tests open in them what is exported
 # make docs      build the documentation as a site, build/site, and check its links
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
 # make wheel     set up, put the package with its compiled parts into dist: for machines without a compiler
@@ -23,7 +24,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # Two processes; the tests of a file stay together, since they share the fixtures of its module.
 PYTEST := pytest -n 2 --dist loadfile
 
-.PHONY: run report test test-all style validate tables bench bench-quick docs setup wheel clean
+.PHONY: run report test test-all style validate tables bench bench-quick docs programs setup wheel clean
 
 run: setup
 	lmp -in inputs/spheres.in -var out out
@@ -42,7 +43,7 @@ test: style
 	$(PYTEST) -m "not slow and not validation"
 
 test-all: test
-	$(PYTEST) -m "slow and not validation"
+	$(PYTEST) -rs -m "slow and not validation"
 
 validate: setup
 	pytest -m validation -s --durations=0
@@ -55,6 +56,8 @@ bench: setup
 
 bench-quick: setup
 	python -m tests.benchmark --quick
+
+programs: $(VENV)/other_programs
 
 docs: $(VENV)/site_builder
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict --quiet
@@ -87,10 +90,12 @@ $(VENV)/requirements.txt: pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
 	mv $@.new $@
 
-# The site needs nothing that is compiled.
-$(VENV)/site_builder: $(VENV)/requirements.txt
+# The site and the other programs need nothing that is compiled.
+$(VENV)/site_builder: GROUP := docs
+$(VENV)/other_programs: GROUP := programs
+$(VENV)/site_builder $(VENV)/other_programs: $(VENV)/requirements.txt
 	$(BIN)/python -c 'import tomllib; file = tomllib.load(open("pyproject.toml", "rb")); \
-	  print(*file["project"]["optional-dependencies"]["docs"], sep="\n")' > $@.new
+	  print(*file["project"]["optional-dependencies"]["$(GROUP)"], sep="\n")' > $@.new
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
 	mv $@.new $@
 

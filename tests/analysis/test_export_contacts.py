@@ -24,7 +24,7 @@ from lammps_inelastic.analysis import (
     write_contacts_csv,
     write_contacts_vtk,
 )
-from tests.analysis.touching_spheres import CELLS, PERIODIC, Scene, lengths, scene
+from tests.analysis.touching_spheres import CELLS, PERIODIC, Scene, lengths, scene, turned
 
 # Sums and differences of numbers below 10.
 ROUND_OFF = 1e-13
@@ -53,15 +53,6 @@ def parsed_lines(path: Path) -> tuple[NDArray[np.float64], dict[str, NDArray[Any
     assert len(points) == int(piece.attrib["NumberOfPoints"])
     ends = [points[line] for line in np.split(lines["connectivity"], lines["offsets"][:-1])]
     return np.array(ends).reshape(-1, 2, 3), arrays["CellData"], arrays["PointData"]
-
-
-def turned(found: NDArray[Any], sides: NDArray[Any], expected: NDArray[Any]) -> NDArray[Any]:
-    """Turn vectors, (m, 3), of contacts of a sphere with its own image to the expected side.
-
-    Either side of the sphere is right: both stand for the same contact.
-    """
-    away = (sides[:, 0] == sides[:, 1]) & ((found * expected).sum(axis=1) < 0)
-    return np.where(away[:, None], -found, found)
 
 
 def write_lines(path: Path, one: Scene, **options: Any) -> tuple[NDArray[np.float64], Any, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,3 +98,12 @@ def lengths(scene: Scene, contact: NDArray[np.int64]) -> FloatArray:
         gap = scene.contacts.gaps[row]
         sums.append(radii[index[one]] + (radii[index[other]] + gap if other > 0 else 0))
     return np.array(sums)
+
+
+def turned(found: NDArray[Any], sides: NDArray[Any], expected: NDArray[Any]) -> NDArray[Any]:
+    """Turn vectors, (m, 3), of contacts of a sphere with its own image to the expected side.
+
+    Either side of the sphere is right: both stand for the same contact.
+    """
+    away = (sides[:, 0] == sides[:, 1]) & ((found * expected).sum(axis=1) < 0)
+    return np.where(away[:, None], -found, found)
