@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import MDAnalysis
 import meshio
 import numpy as np
 import pytest
@@ -226,6 +228,13 @@ def test_what_is_saved_is_the_packing(
     assert np.array_equal(np.loadtxt(rows, usecols=(1, 2, 3), skiprows=2), few.positions)
     grid = meshio.read(few.save(tmp_path / "p.vtu"))
     assert np.array_equal(grid.point_data["radius"], few.radii)
+    read = json.loads(few.save(tmp_path / "p.json").read_text())
+    assert [one["center"] for one in read["spheres"]] == few.positions.tolist()
+    atoms = MDAnalysis.Universe(str(few.save(tmp_path / "p.pqr")), to_guess=()).atoms
+    # MDAnalysis keeps float32.
+    assert atoms.radii == pytest.approx(few.radii, rel=1e-7)
+    lines = few.save(tmp_path / "p.vtp").read_text()
+    assert f'NumberOfLines="{len(few.forces)}"' in lines
     few.save(tmp_path / "p.stl", subdivisions=1)
     # A head of 84 bytes, and 50 for each of 80 triangles.
     assert (tmp_path / "p.stl").stat().st_size == 84 + 50 * 80 * 300
@@ -243,7 +252,10 @@ def test_what_is_saved_is_the_packing(
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("p.docx", "p.docx: the name must end in .csv, .npz, .xyz, .extxyz, .vtu, .stl, .tif, .ra"),
+        (
+            "p.docx",
+            "p.docx: the name must end in .csv, .npz, .json, .pqr, .xyz, .extxyz, ",
+        ),
         (".", "is there already, and is not replaced"),
         ("file.txt/run", "file.txt"),
         ("file.txt/p.csv", "file.txt"),

@@ -24,6 +24,9 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     measure_packing,
     read_particle_frame,
+    write_contacts_vtk,
+    write_json,
+    write_pqr,
     write_raw,
     write_stl,
     write_tiff,
@@ -41,7 +44,10 @@ from .shapes import Shape
 # The seed of the random points is that of `inelastic look`.
 SEED = 1
 # A packing is saved in these files, by the endings of their names.
-ENDINGS = (".csv", ".npz", ".xyz", ".extxyz", ".vtu", ".stl", ".tif", ".raw")
+ENDINGS = (
+    *(".csv", ".npz", ".json", ".pqr", ".xyz", ".extxyz"),
+    *(".vtu", ".vtp", ".stl", ".tif", ".raw"),
+)
 # The smallest radius is so many voxels long, if no other size is given.
 VOXELS_PER_RADIUS = 10
 
@@ -157,6 +163,9 @@ class Packing:
         | .npz | NumPy's arrays positions, radii, bodies, contact_ids, contact_points, forces |
         | .xyz, .extxyz | OVITO, ASE: places, radii, ids, bodies, contacts |
         | .vtu | ParaView: the same |
+        | .vtp | ParaView, OVITO: the contacts as lines, with forces |
+        | .json | places, radii, ids, bodies, contacts and the box, for scripts |
+        | .pqr | MDAnalysis: places and radii |
         | .stl | triangles of the surfaces of the spheres |
         | .tif, .raw | an image of voxels, 255 in a particle and 0 in a pore |
 
@@ -184,7 +193,7 @@ class Packing:
                 f"{target}: the name must end in {', '.join(ENDINGS)}, or have no ending for a "
                 "folder"
             )
-        frame, spheres = self.frame, (self.positions, self.radii)
+        frame, spheres = self.frame, self.frame.spheres
         ids, bodies, contacts = frame.ids, frame.bodies, frame.contacts
         edge = float(self.radii.min()) / VOXELS_PER_RADIUS if voxel is None else voxel
         bounds = self._filled if box is None else box
@@ -194,17 +203,21 @@ class Packing:
             case ".npz":
                 self._save_npz(target)
             case ".vtu":
-                write_vtk(target, *spheres, ids=ids, bodies=bodies, contacts=contacts)
+                write_vtk(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
+            case ".vtp":
+                write_contacts_vtk(target, self.contacts, ids, spheres)
+            case ".json":
+                write_json(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
+            case ".pqr":
+                write_pqr(target, spheres, ids=ids)
             case ".stl":
-                write_stl(target, *spheres, subdivisions=subdivisions)
+                write_stl(target, spheres, subdivisions=subdivisions)
             case ".tif":
-                write_tiff(target, *spheres, bounds, edge)
+                write_tiff(target, spheres, bounds, edge)
             case ".raw":
-                write_raw(target, *spheres, bounds, edge)
+                write_raw(target, spheres, bounds, edge)
             case _:
-                write_xyz(
-                    target, *spheres, ids=ids, bodies=bodies, contacts=contacts, box=frame.box
-                )
+                write_xyz(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
         return target
 
     def __repr__(self) -> str:
