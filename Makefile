@@ -5,7 +5,7 @@
 # make validate  set up, check the physics (an hour)
 # make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
-# make programs  install OVITO, VTK and ASE, too (1.1 GB): slow tests open in them what is exported
+# make programs  install OVITO, VTK, ASE and Playwright, too (1.1 GB): slow tests open in them what is exported, and pages
 # make docs      build the documentation as a site, build/site, and check its links
 # make setup     set up only: Python files and decks are used where they are, C++ is compiled again
 # make wheel     set up, put the package with its compiled parts into dist: for machines without a compiler

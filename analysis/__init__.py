@@ -70,6 +70,7 @@ from .structure import (
     plot_radial_distribution,
     radial_distribution,
 )
+from .view import PackingView, write_view
 from .volumes import particle_volumes_in_box, sphere_volumes_in_box
 
 __all__ = [
@@ -96,6 +97,7 @@ __all__ = [
     "Orientation",
     "PackingFraction",
     "PackingMeasurement",
+    "PackingView",
     "PairOverlap",
     "ParticleDump",
     "ParticleFrame",
@@ -174,6 +176,7 @@ __all__ = [
     "write_raw",
     "write_stl",
     "write_tiff",
+    "write_view",
     "write_vtk",
     "write_xyz",
 ]

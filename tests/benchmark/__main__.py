@@ -12,7 +12,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.benchmark import earlier, machine, million, ranks, recorded, scenes_without, settling
+from tests.benchmark import (
+    earlier,
+    machine,
+    million,
+    page,
+    ranks,
+    recorded,
+    scenes_without,
+    settling,
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +58,9 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="smaller scenes: 9 minutes")
     parser.add_argument("--out", type=Path, default=Path("benchmark"), help="folder for the runs")
     parser.add_argument(
-        "parts", nargs="*", help="of: machine settling recorded growth ranks parts million earlier"
+        "parts",
+        nargs="*",
+        help="of: machine settling recorded growth ranks parts million earlier page",
     )
     parser.add_argument(
         "--commit", help="with which the decks are compared, as `git` names it (part earlier)"
@@ -69,6 +80,9 @@ def main() -> int:
         "million": lambda: million.measure(out / "million"),
         "earlier": lambda: earlier.measure(options.commit, size.particles, size.diameter),
     }
+    # It needs chromium and playwright, and is run if it is named.
+    if "page" in options.parts:
+        parts["page"] = page.measure
     if not size.million:
         del parts["million"]
     if options.commit is None:

@@ -64,5 +64,7 @@ def test_a_wheel_runs_the_smallest_deck_in_an_environment_of_its_own(tmp_path: P
     assert "Next: inelastic look minimal" in screen
     box = ("--box", 0, 1, 0, 5, 0, 1, "--no-picture")
     assert run(work, *inelastic, "look", "minimal", *box).startswith("particles")
+    # The page's template is no Python file.
+    assert (packages / "lammps_inelastic" / "analysis" / "view.html").is_file()
     run(work, *inelastic, "new", "mine.toml")
     assert run(work, *inelastic, "run", "mine.toml", "--dry-run").count("lmp") == 6
