@@ -28,6 +28,7 @@ from .finished import open_in_folder
 from .frames import choose_index, notes_of
 from .pictures import draw_frame
 from .study import PAPER_BOX
+from .view import MOST_SPHERES, KnownContacts, draw_page
 
 PICTURE = "packing.png"
 
@@ -54,7 +55,8 @@ class Look:
     walls_known : whether contacts with walls are counted
     wall_contacts_in_all : contacts of all particles with walls, mean over the contact frames
     picture : path of the picture; None if there is none
-    failure : reason why there is no picture; None if there is one, or none was asked for
+    page : path of the page of the packing; None if there is none
+    failure : reason why there is no picture or no page; None if there is one, or none was asked for
     notes : one line for each thing that the dump lacks
     """
 
@@ -70,6 +72,7 @@ class Look:
     walls_known: bool
     wall_contacts_in_all: float
     picture: Path | None
+    page: Path | None
     failure: PictureError | None
     notes: tuple[str, ...]
 
@@ -94,6 +97,7 @@ def look_at(
     container: FloatArray | None,
     box_is_container: bool,
     picture: Path | None,
+    page: Path | None,
 ) -> Look:
     """Measure a frame of a run and its contacts, and draw it.
 
@@ -117,9 +121,10 @@ def look_at(
         fixed
     box_is_container : whether the faces of the dump's box are walls even if they are not fixed
     picture : path of the picture; None draws none
+    page : path of the page of the packing; None writes none
 
-    Raises AnalysisError with one line. A picture that cannot be drawn is told by `Look.failure`:
-    the numbers do not need it.
+    Raises AnalysisError with one line. A picture that cannot be drawn, or a page that cannot be
+    written, is told by `Look.failure`: the numbers do not need it.
     """
     particle_dump = ParticleDump(dump, radius=radius, whole=False)
     chosen = number is not None or step is not None
@@ -132,11 +137,20 @@ def look_at(
     if walls is None and (box_is_container or _ends_are_fixed(frame)):
         walls = frame.cell.flat_faces
     gap = None if contact_gap is None else contact_gap * float(frame.radii.min())
-    steps, counts = _count_contacts(files, frame, gap, walls, frame.step if chosen else None)
+    steps, counts, last = _count_contacts(files, frame, gap, walls, frame.step if chosen else None)
     failure = None if picture is None else _draw(picture, frame, walls, counts[-1])
     packing = measure_packing(frame, counts, box, points=points, seed=seed, walls=walls)
     # There is a frame of contacts, and a particle in the box.
     assert packing.coordination is not None
+    notes = notes_of(particle_dump, frame)
+    if page is not None and len(frame.ids) > MOST_SPHERES:
+        notes.append(f"no {page.name}: it has at most {MOST_SPHERES:,} spheres")
+        page = None
+    if page is not None:
+        try:
+            draw_page(page, frame, last, packing.packing_fraction.value)
+        except PictureError as error:
+            failure, page = failure or error, None
     return Look(
         dump=dump,
         contact_dump=contact_dump if gap is None else None,
@@ -150,8 +164,9 @@ def look_at(
         walls_known=gap is None or walls is not None,
         wall_contacts_in_all=float(np.mean([count.walls.sum() for count in counts])),
         picture=picture if failure is None else None,
+        page=page,
         failure=failure,
-        notes=tuple(notes_of(particle_dump, frame)),
+        notes=tuple(notes),
     )
 
 
@@ -220,26 +235,29 @@ def _count_contacts(
     gap: float | None,
     walls: FloatArray | None,
     step: int | None,
-) -> tuple[list[int], list[ContactCounts]]:
+) -> tuple[list[int], list[ContactCounts], KnownContacts]:
     """Count contacts by distance or in contact frames, all of them or those of one step.
 
-    The frames' steps are returned, too.
+    The frames' steps are returned, too, and the contacts of the last one.
     """
     particles, images = frame.particles, frame.cell.has_images
     if gap is not None:
         near = contacts_by_distance(frame.spheres, gap, walls)
         ids = near.ids(frame.ids)
-        return [frame.step], [contact_counts(ids, frame.ids, particles, images=images)]
+        counted = contact_counts(ids, frame.ids, particles, images=images)
+        return [frame.step], [counted], KnownContacts(ids, near.points, None)
     steps, counts = [], []
+    last = None
     for contacts in files.contact_frames(frame, step):
         steps.append(contacts.step)
         counts.append(contact_counts(contacts.ids, frame.ids, particles, images=images))
-    if not steps:
+        last = KnownContacts(contacts.ids, contacts.points, contacts.forces)
+    if last is None:
         raise AnalysisError(
             f"{files.contacts}: no contacts of step {frame.step}; --contact-gap GAP counts them "
             "by distance"
         )
-    return steps, counts
+    return steps, counts, last
 
 
 def as_ranges(box: FloatArray) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich import filesize
 
 from lammps_inelastic.analysis import (
     BoxInBed,
@@ -45,6 +47,7 @@ def as_text(found: Look) -> str:
         if found.contact_gap is None
         else ("contacts", f"gaps below {found.contact_gap / found.smallest_radius:.3g} r"),
         ("picture", found.picture or "none"),
+        ("page", "none" if found.page is None else f"{found.page} ({_size(found.page)})"),
     ]
     return "\n".join(
         [
@@ -58,6 +61,10 @@ def as_text(found: Look) -> str:
             *(wrapped(f"{'note':<{left}}  ", note) for note in found.notes),
         ]
     )
+
+
+def _size(path: Path) -> str:
+    return filesize.decimal(path.stat().st_size)
 
 
 def _box(found: Look) -> str:
@@ -193,6 +200,7 @@ def as_json(found: Look) -> str:
             "particles": str(found.dump),
             "contacts": None if found.contact_dump is None else str(found.contact_dump),
             "picture": None if found.picture is None else str(found.picture),
+            "page": None if found.page is None else str(found.page),
         },
     }
     if found.frame.particles.composite:

@@ -72,6 +72,7 @@ from .settling import contact_frames, has_soft_contacts, is_settling, measure_se
 from .store import Result, write_result
 from .study import Outputs, ProfileOutput
 from .thermo import cumulated, read_thermo
+from .view import KnownContacts, packing_values
 
 # The packing fraction of a frame has so many random points, where it is not exact.
 POINTS_PER_FRAME = 100_000
@@ -101,7 +102,11 @@ def measure_case(folder: Path, outputs: Outputs) -> Result:
         pictures: dict[str, bytes] = {}
         if is_last:
             values["numbers/wall_seconds"] = np.asarray(record["wall_seconds"], dtype=float)
-            pictures = pictures_of(files.particles, _last_contacts(files, stage, outputs), outputs)
+            contacts = _last_contacts(files, stage, outputs)
+            pictures = pictures_of(files.particles, contacts if outputs.network else None, outputs)
+            if outputs.packing and contacts is not None:
+                known = KnownContacts(contacts.ids, contacts.points, contacts.forces)
+                values |= packing_values(files.particles[-1], known)
         result = Result(values, pictures, measured, outputs.measured, before=result)
     assert result is not None
     return result
@@ -288,8 +293,8 @@ def _orientation(lie: Orientation | None) -> dict[str, float]:
 def _last_contacts(
     files: RunFiles, stage: Mapping[str, Any], outputs: Outputs
 ) -> ContactFrame | None:
-    """Return the last contact frame; None if the contact network is not asked for."""
-    if not outputs.network:
+    """Return the last contact frame; None if neither network nor packing is asked for."""
+    if not (outputs.network or outputs.packing):
         return None
     *_, contacts = contact_frames(files, stage, files.particles[-1])
     return contacts

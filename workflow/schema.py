@@ -137,6 +137,20 @@ SCHEMA: Mapping[str, Entry] = {
     "network/forces": Entry(
         "(m,)", "force", "settling: of each contact; soft: its depth, in units of the stiffness"
     ),
+    "packing/step": _number("steps", "of the last frame of the particle dump, which is kept here"),
+    "packing/ids": Entry("(n,)", "1", "of its spheres"),
+    "packing/positions": Entry("(n, 3)", "length", "of their centres"),
+    "packing/velocities": Entry("(n, 3)", "length/time", "of their centres"),
+    "packing/radii": Entry("(n,)", "length", "of the spheres"),
+    "packing/bodies": Entry("(n,)", "1", "body of each sphere, 0 for a free one"),
+    "packing/cell": Entry("(4, 3)", "length", "origin of the simulation box, then its three edges"),
+    "packing/periodic": Entry("(3,)", "1", "1 where there are periods along an edge"),
+    "packing/flat": _number("1", "1 if the packing is two-dimensional"),
+    "packing/contact_ids": Entry(
+        "(m, 2)", "1", "spheres of each contact of the last contact frame; -k for wall k"
+    ),
+    "packing/contact_points": Entry("(m, 3)", "length", "where they touch"),
+    "packing/contact_forces": Entry("(m,)", "force", "of each contact, < 0 where it pulls"),
     "forces/ratio": Entry("(b,)", "1", "contact force over its mean, middle of each bin"),
     "forces/density": Entry("(b,)", "1", "probability density of that ratio"),
     "forces/local_ratio": Entry(

@@ -15,6 +15,7 @@ from ..finished import PARTICLES as PARTICLE_DUMP
 from ..look import PICTURE, look_at
 from ..look_output import as_json, as_text
 from ..study import MOST_POINTS
+from ..view import PAGE
 from .arguments import add_frame
 
 
@@ -24,8 +25,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "look",
         help="measure a run and draw its packing",
         description=f"Measure the packing in a run's folder, which holds {PARTICLE_DUMP} and "
-        f"{CONTACT_DUMP}, and draw it as {PICTURE}. Any dump custom of spheres will do with "
-        "--dump, --contact-gap and --radius.",
+        f"{CONTACT_DUMP}, and draw it: as {PICTURE}, and as {PAGE}, a page to turn and to look "
+        "into. Any dump custom of spheres will do with --dump, --contact-gap and --radius.",
     )
     look.add_argument(
         "folder",
@@ -82,7 +83,10 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     walls.add_argument(
         "--container", type=float, nargs=6, metavar=bounds, help="take the faces of this box"
     )
-    look.add_argument("--no-picture", action="store_true", help="draw nothing")
+    look.add_argument(
+        "--no-picture", action="store_true", help=f"draw nothing, neither {PICTURE} nor {PAGE}"
+    )
+    look.add_argument("--no-page", action="store_true", help=f"write no {PAGE}")
     look.add_argument("--json", action="store_true", help="print JSON")
     look.set_defaults(run=run)
 
@@ -117,6 +121,7 @@ def run(options: argparse.Namespace) -> int:
         else np.reshape(np.asarray(options.container, dtype=np.float64), (3, 2)),
         box_is_container=options.walls,
         picture=None if options.no_picture else folder / PICTURE,
+        page=None if options.no_picture or options.no_page else folder / PAGE,
     )
     print(as_json(found) if options.json else as_text(found))
     if found.failure is not None:

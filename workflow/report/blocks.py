@@ -87,7 +87,28 @@ class Table:
         ]
 
 
-Block = Text | Listing | Table | Figure | Pictures
+@dataclass(frozen=True)
+class Packing:
+    """A packing to turn, which is drawn when it is unfolded.
+
+    Attributes
+    ----------
+    name : the name of the figure
+    caption : what is seen
+    page : its HTML page, which needs nothing else
+    """
+
+    name: str
+    caption: str
+    page: str
+
+    @property
+    def kind(self) -> str:
+        """The name by which the template tells blocks apart."""
+        return "packing"
+
+
+Block = Text | Listing | Table | Figure | Pictures | Packing
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,7 @@ class Outputs(_Table):
     structure : whether radial distribution function and bond-orientational order are measured
     pictures : steps at which the packing is drawn; a frame of the dump each
     network : whether the contact network is drawn
+    packing : whether the last frame is kept with its contacts, so that a report can show it
     keep : `everything`, or `results` to delete the dumps of a case that has been measured
     """
 
@@ -90,6 +91,7 @@ class Outputs(_Table):
     structure: _Boolean = True
     pictures: tuple[Annotated[int, _from_to(0, 2**63 - 1)], ...] = ()
     network: _Boolean = False
+    packing: _Boolean = False
     keep: Literal["everything", "results"] = "everything"
 
     @field_validator("box")
@@ -118,7 +120,9 @@ class Outputs(_Table):
     @property
     def measured(self) -> str:
         """All that decides what is measured, as JSON: equal texts, equal measurements."""
-        return json.dumps(self.model_dump(exclude={"keep"}), sort_keys=True)
+        # Results that were measured before there was `packing` are those without it.
+        silent = {"keep"} if self.packing else {"keep", "packing"}
+        return json.dumps(self.model_dump(exclude=silent), sort_keys=True)
 
 
 class StudyFile(_Table):

@@ -18,7 +18,7 @@ from ..groups import box_is_in_bed, by_value, by_variables, grouped, labelled, v
 from ..quantities import OF_ANY_STUDY
 from ..statistics import numbers
 from ..text import as_value
-from .pictures import network_picture, step_pictures
+from .pictures import kept_packing, network_picture, step_pictures
 from .provenance import commands_of
 
 # One plot has at most so many curves: more cannot be told apart.
@@ -49,6 +49,7 @@ def study_section(study: StoredStudy) -> Section:
             blocks += step_pictures(group, f"{anchor}-pictures-{number}", label)
             caption = f"Network of contacts: {label}"
             blocks += network_picture(group, f"{anchor}-network-{number}", caption)
+        blocks += kept_packing(study.results, f"{anchor}-packing")
     return Section(
         anchor,
         f"{study.title} ({study.name})",

@@ -9,7 +9,8 @@ from lammps_inelastic.analysis.plots import draw_dimer, draw_dimer_section
 
 from ...pictures import NETWORK_DIAMETERS
 from ...store import Result
-from ..blocks import Block, Content, Text
+from ...view import MOST_IN_REPORT, page_of_values
+from ..blocks import Block, Content, Packing, Text
 from ..data import Data
 from ..figures import Figure, Pictures
 from ..groups import count_of
@@ -44,7 +45,8 @@ def network(data: Data) -> Content:
         "and colour grow with the force. A picture with a scale shows a slab of "
         f"{NETWORK_DIAMETERS} diameters in the middle, one without it the whole depth."
     )
-    return Content(network_picture(drawn, "figure-8", caption))
+    blocks = network_picture(drawn, "figure-8", caption)
+    return Content([*blocks, *kept_packing(drawn, "figure-8-packing")])
 
 
 def one_dimer(_: Data) -> Content:
@@ -89,6 +91,20 @@ def step_pictures(results: Sequence[Result], name: str, caption: str) -> list[Bl
         if steps:
             shown = {f"step {as_count(int(step))}": result.pictures[step] for step in steps}
             return [Pictures(name, caption, shown)]
+    return []
+
+
+def kept_packing(results: Sequence[Result], name: str) -> list[Block]:
+    """Return the packing of the first result that keeps one; more of them would swell the page."""
+    kept = [result for result in results if "packing/ids" in result.values]
+    small = [result for result in kept if len(result.values["packing/ids"]) <= MOST_IN_REPORT]
+    if small:
+        result = small[0]
+        page = page_of_values(result.values, result.case, result.number("packing_fraction"))
+        return [Packing(name, f"The packing of {result.case}, to turn and to look into", page)]
+    if kept:
+        most = as_count(MOST_IN_REPORT)
+        return [Text(f"Packings of more than {most} spheres are in the HDF5 file alone.")]
     return []
 
 
