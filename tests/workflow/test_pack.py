@@ -216,9 +216,12 @@ def test_what_is_saved_is_the_packing(
 ) -> None:
     """Every file as other programs read it."""
     table = lines_of(few.save(tmp_path / "p.csv"))
-    assert (tmp_path / "p.csv").read_text().startswith("x,y,z,radius,body\n")
-    expected = np.column_stack([few.positions, few.radii, few.bodies])
-    assert np.array_equal(table, expected)
+    names = "id,body,x [length],y [length],z [length],radius [length],contacts"
+    assert (tmp_path / "p.csv").read_text().startswith(f"{names}\n")
+    assert few.frame.contacts is not None
+    ids, bodies = few.frame.ids, few.bodies
+    expected = [ids, bodies, few.positions, few.radii, few.frame.contacts]
+    assert np.array_equal(table, np.column_stack(expected))
     with np.load(few.save(tmp_path / "p.npz")) as arrays:
         assert np.array_equal(arrays["positions"], few.positions)
         assert np.array_equal(arrays["contact_ids"], few.contacts.ids)

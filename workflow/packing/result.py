@@ -25,6 +25,7 @@ from lammps_inelastic.analysis import (
     measure_packing,
     read_particle_frame,
     write_contacts_vtk,
+    write_csv,
     write_json,
     write_pqr,
     write_raw,
@@ -159,7 +160,7 @@ class Packing:
         | ending | file |
         |---|---|
         | none | the folder of LAMMPS's run, as `inelastic look` reads it, with the deck |
-        | .csv | a line for each sphere: x, y, z, radius, body |
+        | .csv | a table of the spheres: id, body, x, y, z, radius, contacts |
         | .npz | NumPy's arrays positions, radii, bodies, contact_ids, contact_points, forces |
         | .xyz, .extxyz | OVITO, ASE: places, radii, ids, bodies, contacts |
         | .vtu | ParaView: the same |
@@ -199,7 +200,7 @@ class Packing:
         bounds = self._filled if box is None else box
         match ending:
             case ".csv":
-                self._save_csv(target)
+                write_csv(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
             case ".npz":
                 self._save_npz(target)
             case ".vtu":
@@ -278,12 +279,6 @@ class Packing:
                 copy = Path(part) / "run"
                 shutil.copytree(self.folder, copy)
                 copy.rename(target)
-
-    def _save_csv(self, target: Path) -> None:
-        table = np.column_stack([self.positions, self.radii, self.bodies])
-        with whole(target) as file:
-            layout = ",".join(["%.17g"] * 4 + ["%d"])
-            np.savetxt(file, table, layout, header="x,y,z,radius,body", comments="")
 
     def _save_npz(self, target: Path) -> None:
         with whole(target) as file, file.open("wb") as stream:
