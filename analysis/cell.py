@@ -237,10 +237,10 @@ class Cell:
         first = np.where(self.periodic, np.ceil(low - shares), 0.0)
         last = np.where(self.periodic, np.floor(high - shares), 0.0)
         numbers = np.maximum(last - first + 1, 0)
-        # Whole numbers would overflow where the float that says "far too many" does no harm.
-        with np.errstate(over="ignore"):
+        # Whole numbers would overflow; a float may be infinite, or NaN, and is too large then.
+        with np.errstate(over="ignore", invalid="ignore"):
             needed = float(numbers.prod(axis=1).sum())
-        if needed > MOST_IMAGES:
+        if not needed <= MOST_IMAGES:
             raise InputError(
                 f"{needed:.2g} periodic images of {len(positions)} spheres are needed, more "
                 f"than {MOST_IMAGES:.0e}: choose a smaller box or a shorter distance"
@@ -249,10 +249,10 @@ class Cell:
         each = counts.prod(axis=1)
         owner = np.repeat(np.arange(len(positions)), each)
         place = np.arange(len(owner)) - np.repeat(np.cumsum(each) - each, each)
-        of_owner = counts[owner]
-        place, along_c = np.divmod(place, of_owner[:, 2])
-        along_a, along_b = np.divmod(place, of_owner[:, 1])
-        moves = first.astype(np.int64)[owner] + np.column_stack([along_a, along_b, along_c])
+        moves = first.astype(np.int64)[owner]
+        for edge in (2, 1, 0):
+            place, along = np.divmod(place, counts[owner, edge])
+            moves[:, edge] += along
         if not own:
             away = moves.any(axis=1)
             owner, moves = owner[away], moves[away]

@@ -55,6 +55,7 @@ from tests.analysis.replicas import (
 )
 
 ALL = packings("spheres", "dimers", "clusters")
+SPHERES = packings("spheres")
 EXACT = packings("spheres", "dimers")
 OVERLAPPING = packings("dimers", overlapping=0.1)
 each_packing = pytest.mark.parametrize("make", ALL.values(), ids=ALL)
@@ -163,12 +164,8 @@ def test_a_small_sphere_on_a_large_one() -> None:
 # Pairs.
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.02, 0.4, 2.0])
-@each_packing
-def test_contacts_by_distance(make: Make, gap: float) -> None:
-    packing = make()
-    if gap > 1 and not packing.flat and len(packing.radii) > 30:
-        pytest.skip("the large gap is tried with few spheres, which make ten thousand pairs")
+def assert_pairs(packing: Packing, gap: float) -> None:
+    """Compare the contacts by distance with all pairs of images."""
     expected = packing.pairs(gap)
     spheres = packing.spheres()
     found = contacts_by_distance(spheres, gap)
@@ -199,6 +196,17 @@ def test_contacts_by_distance(make: Make, gap: float) -> None:
     np.testing.assert_allclose(
         np.sort(small_gaps(spheres, gap)), np.sort([*expected.values()]), atol=1e-12
     )
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02, 0.4])
+@each_packing
+def test_contacts_by_distance(make: Make, gap: float) -> None:
+    assert_pairs(make(), gap)
+
+
+@pytest.mark.parametrize("make", SPHERES.values(), ids=SPHERES)
+def test_contacts_across_several_periods(make: Make) -> None:
+    assert_pairs(make(), 2.0)
 
 
 @pytest.mark.parametrize("cell", ["ppp", "tilted fpf", "turned"])
@@ -292,9 +300,16 @@ def test_packing_fraction_of_a_cell_that_cuts(cell: str) -> None:
     )
 
 
-@pytest.mark.parametrize("cell", ["tilted fpf"])
-def test_oblique_walls_cut_no_exact_volume(cell: str) -> None:
-    spheres = in_space(cell, "spheres").spheres()
+def test_packing_fraction_of_a_plane_that_cuts() -> None:
+    packing = in_plane("pf", "dimers")
+    box = packing.cell.bounds + np.array([[0.3, 0.3], [0, 0], [5, 7]])
+    found = exact_packing_fraction(packing.spheres())
+    # The error of the integration over cut discs.
+    assert found.value == pytest.approx(packing.size_in(box)[0] / packing.volume, rel=1e-9)
+
+
+def test_oblique_walls_cut_no_exact_volume() -> None:
+    spheres = in_space("tilted fpf", "spheres").spheres()
     with pytest.raises(InputError, match="face of the cell across a is oblique"):
         exact_packing_fraction(spheres)
 
@@ -627,6 +642,9 @@ def test_bond_order_of_the_cell(cell: str, shapes: str) -> None:
     centres = packing.centres
     span = 2 * np.linalg.norm(np.ptp(centres, axis=0)) + 3
     everywhere = (centres[:, None] + packing.shifts(span)).reshape(-1, 3)
+    # Three diameters around the cell are enough for the neighbours of neighbours.
+    reach = np.array([centres.min(axis=0) - 3, centres.max(axis=0) + 3])
+    everywhere = everywhere[((everywhere >= reach[0]) & (everywhere <= reach[1])).all(axis=1)]
     found = bond_order(packing.spheres(), w6=True)
     assert len(found.q6) == len(centres)
     for particle, place in enumerate(centres):
