@@ -229,6 +229,8 @@ def test_what_is_saved_is_the_packing(
     rows = few.save(tmp_path / "p.xyz").read_text().splitlines()
     assert int(rows[0]) == 300 == len(rows) - 2
     assert np.array_equal(np.loadtxt(rows, usecols=(1, 2, 3), skiprows=2), few.positions)
+    page = few.save(tmp_path / "p.html").read_text()
+    assert "150 dimers of aspect ratio 1.5" in page
     grid = meshio.read(few.save(tmp_path / "p.vtu"))
     assert np.array_equal(grid.point_data["radius"], few.radii)
     read = json.loads(few.save(tmp_path / "p.json").read_text())

@@ -31,6 +31,7 @@ from lammps_inelastic.analysis import (
     write_raw,
     write_stl,
     write_tiff,
+    write_view,
     write_vtk,
     write_xyz,
 )
@@ -39,6 +40,7 @@ from lammps_inelastic.analysis.geometry import FloatArray, IntArray
 from ..errors import PackingError
 from ..files import whole, writing
 from ..finished import CONTACTS, PARTICLES
+from ..view import KnownContacts, view_of
 from .containers import Ball, Container
 from .shapes import Shape
 
@@ -47,7 +49,7 @@ SEED = 1
 # A packing is saved in these files, by the endings of their names.
 ENDINGS = (
     *(".csv", ".npz", ".json", ".pqr", ".xyz", ".extxyz"),
-    *(".vtu", ".vtp", ".stl", ".tif", ".raw"),
+    *(".vtu", ".vtp", ".html", ".stl", ".tif", ".raw"),
 )
 # The smallest radius is so many voxels long, if no other size is given.
 VOXELS_PER_RADIUS = 10
@@ -165,6 +167,7 @@ class Packing:
         | .xyz, .extxyz | OVITO, ASE: places, radii, ids, bodies, contacts |
         | .vtu | ParaView: the same |
         | .vtp | ParaView, OVITO: the contacts as lines, with forces |
+        | .html | a page for a browser, to turn and to look into |
         | .json | places, radii, ids, bodies, contacts and the box, for scripts |
         | .pqr | MDAnalysis: places and radii |
         | .stl | triangles of the surfaces of the spheres |
@@ -207,6 +210,10 @@ class Packing:
                 write_vtk(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
             case ".vtp":
                 write_contacts_vtk(target, self.contacts, ids, spheres)
+            case ".html":
+                known = KnownContacts(self.contacts.ids, self.contacts.points, self.forces)
+                caption = repr(self).partition("\n")[0]
+                write_view(target, view_of(frame, known, target.stem, caption))
             case ".json":
                 write_json(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
             case ".pqr":
