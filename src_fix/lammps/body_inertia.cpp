@@ -1,6 +1,6 @@
 #include "body_inertia.h"
 
-#include "lammps_versions.h"
+#include "periods.h"
 #include "step.h"
 
 #include "atom.h"
@@ -99,7 +99,7 @@ void BodyInertias::measure_masses(inelastic::RigidBodies &bodies, std::size_t b)
     const int i = bodies.member[k];
     double *const r = arm + 3 * k;
     for (int d = 0; d < 3; ++d) r[d] = x[i][d] - x0[d];
-    to_nearest_image(domain, r);
+    Periods(lmp).to_nearest_image(r);
     const double m = mass_of(atom, i);
     total += m;
     for (int d = 0; d < 3; ++d) centre[d] += m * r[d];

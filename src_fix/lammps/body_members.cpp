@@ -1,8 +1,9 @@
 #include "body_members.h"
 
+#include "periods.h"
+
 #include "atom.h"
 #include "comm.h"
-#include "domain.h"
 #include "error.h"
 #include "fix.h"
 #include "modify.h"
@@ -223,8 +224,8 @@ void BodyMembers::check_reach() const
   for (std::size_t k = 0; k < bodies.member.size(); ++k)
     extent = std::max(extent, 2.0 * std::sqrt(dot(&bodies.arm[3 * k], &bodies.arm[3 * k])));
   host_.reduce(nullptr, 0, &extent, 1);
-  const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;
-  if (comm->nprocs == 1 && !periodic) return;
+  const Periods periods(lmp);
+  if (comm->nprocs == 1 && !periods.any()) return;
   const double needed = neighbor->cutneighmax + extent;
   const double cutoff = std::max(comm->cutghostuser, neighbor->cutneighmax);
   if (cutoff < needed)
@@ -232,14 +233,9 @@ void BodyMembers::check_reach() const
                "Fix inelastic rigid: ranks and periodic images see {:.6g} far, which is too short "
                "for bodies of this size: set comm_modify cutoff to at least {:.6g}",
                cutoff, ROUNDED_UP * needed);
-  const double period[3] = {domain->xperiodic ? domain->xprd : 2.0 * needed,
-                            domain->yperiodic ? domain->yprd : 2.0 * needed,
-                            domain->zperiodic ? domain->zprd : 2.0 * needed};
-  for (const double length : period)
-    if (length < 2.0 * needed)
-      error->all(
-          FLERR,
-          "Fix inelastic rigid: the periodic box is {:.6g} wide and must be at least {:.6g}, "
-          "so that no body can meet its own image",
-          length, 2.0 * ROUNDED_UP * needed);
+  if (periods.narrowest() < 2.0 * needed)
+    error->all(FLERR,
+               "Fix inelastic rigid: the periodic box is {:.6g} wide and must be at least {:.6g}, "
+               "so that no body can meet its own image",
+               periods.narrowest(), 2.0 * ROUNDED_UP * needed);
 }

@@ -52,10 +52,6 @@ struct NearestImage<D,
   static void of(D *domain, double *vector) { domain->minimum_image(__FILE__, __LINE__, vector); }
 };
 
-// Replaces a vector (3) between two points by that to the nearest periodic image of the second.
-inline void to_nearest_image(Domain *domain, double *vector)
-{ NearestImage<Domain>::of(domain, vector); }
-
 template <typename I, typename = void> struct Description {
   static std::string of_variable(I &, int) { return ""; }
 };

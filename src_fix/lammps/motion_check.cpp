@@ -2,7 +2,7 @@
 
 #include "atom_state.h"
 #include "ghost_exchange.h"
-#include "lammps_versions.h"
+#include "periods.h"
 #include "rigid_motion.h"
 
 #include "atom.h"
@@ -144,7 +144,7 @@ std::string MotionCheck::compare(int i) const
   const double *const expected_v = state_.expected_velocity(i);
   double off[3] = {atom->x[i][0] - expected_x[0], atom->x[i][1] - expected_x[1],
                    atom->x[i][2] - expected_x[2]};
-  to_nearest_image(domain, off);
+  Periods(lmp).to_nearest_image(off);
   const double faster[3] = {atom->v[i][0] - expected_v[0], atom->v[i][1] - expected_v[1],
                             atom->v[i][2] - expected_v[2]};
   const bool frozen = (atom->mask[i] & step_.settings.frozen_bit) != 0;

@@ -2,9 +2,9 @@
 
 #include "atom_state.h"
 #include "ghost_exchange.h"
+#include "periods.h"
 
 #include "atom.h"
-#include "domain.h"
 
 #include <algorithm>
 #include <cmath>
@@ -243,7 +243,7 @@ void Rest::measure_clusters()
     }
     double square = dot(cluster.velocity.data(), cluster.velocity.data());
     // Through periodic boundaries a cluster has no centre.
-    if (!domain->xperiodic && !domain->yperiodic && !domain->zperiodic) {
+    if (!Periods(lmp).any()) {
       double of_centre[3], about_centre[3], inertia[6];
       cross(cluster.centre.data(), s + MOMENTUM, of_centre);
       const double *const x = cluster.centre.data();

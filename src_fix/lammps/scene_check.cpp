@@ -1,8 +1,9 @@
 #include "scene_check.h"
 
+#include "periods.h"
+
 #include "atom.h"
 #include "comm.h"
-#include "domain.h"
 #include "error.h"
 #include "fix.h"
 #include "force.h"
@@ -14,15 +15,8 @@
 
 using namespace LAMMPS_NS;
 
-// Along a direction that is not periodic the box is no part of any gap.
 bool SceneCheck::changes_periods(const Fix *fix) const
-{
-  int matters = Fix::BOX_CHANGE_ANY | Fix::BOX_CHANGE_SHAPE;
-  if (domain->xperiodic) matters |= Fix::BOX_CHANGE_X;
-  if (domain->yperiodic) matters |= Fix::BOX_CHANGE_Y;
-  if (domain->zperiodic) matters |= Fix::BOX_CHANGE_Z;
-  return (fix->box_change & matters) != 0;
-}
+{ return (fix->box_change & Periods(lmp).changes()) != 0; }
 
 void SceneCheck::check(bool shorten) const
 {
@@ -177,24 +171,14 @@ bool SceneCheck::is_integrated(int i) const
   return false;
 }
 
-std::vector<double> SceneCheck::box() const
-{
-  std::vector<double> sizes;
-  for (int d = 0; d < 3; ++d)
-    if (domain->periodicity[d]) sizes.push_back(domain->prd[d]);
-  sizes.insert(sizes.end(), {domain->xy, domain->xz, domain->yz});
-  return sizes;
-}
-
 void SceneCheck::remember_box()
-{ box_at_start_ = box(); }
+{ box_at_start_ = Periods(lmp).lengths_and_tilts(); }
 
 std::string SceneCheck::change_of_box() const
 {
-  if (box() == box_at_start_) return "";
+  if (Periods(lmp).lengths_and_tilts() == box_at_start_) return "";
   return "the periodic box has changed during the run, and the contacts do not follow it: change "
-         "it "
-         "between runs (change_box)";
+         "it between runs (change_box)";
 }
 
 std::string SceneCheck::fixes_that_change_radii() const

@@ -47,9 +47,6 @@ class SceneCheck : protected Pointers {
   std::string fixes_that_change_radii() const;
 
  private:
-  // The periods of the directions that are periodic, and the three tilts.
-  std::vector<double> box() const;
-
   static bool sets_forces(const Fix *fix);
   bool changes_periods(const Fix *fix) const;
   template <typename One, typename Other>
@@ -57,7 +54,7 @@ class SceneCheck : protected Pointers {
   void warn_of_hidden(const std::string &what) const;
   bool any(bool here) const;
 
-  std::vector<double> box_at_start_;
+  std::vector<double> box_at_start_;    // periods and tilts
 };
 
 }    // namespace LAMMPS_NS

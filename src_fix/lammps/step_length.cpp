@@ -1,6 +1,7 @@
 #include "step_length.h"
 
 #include "ghost_exchange.h"
+#include "periods.h"
 
 #include "atom.h"
 #include "comm.h"
@@ -178,11 +179,11 @@ void StepLength::check_reach_of_types() const
 // (with two ranks in a direction, the other one is the next on both sides).
 void StepLength::measure_farthest()
 {
+  const Periods periods(lmp);
   double narrowest[3];
   for (int d = 0; d < 3; ++d) {
-    const double part = domain->triclinic ? domain->subhi_lamda[d] - domain->sublo_lamda[d]
-                                          : (domain->subhi[d] - domain->sublo[d]) / domain->prd[d];
-    const bool bounded = domain->periodicity[d] || comm->nprocs > 1;
+    const double part = periods.own_part(d);
+    const bool bounded = periods.along(d) || comm->nprocs > 1;
     own_width_[d] = bounded ? part * domain->prd[d] : EXTREME;
     narrowest[d] = -part;
   }
@@ -190,7 +191,7 @@ void StepLength::measure_farthest()
   for (int d = 0; d < 3; ++d) {
     const bool tiled = comm->layout == Comm::LAYOUT_TILED;
     const int ranks = tiled ? comm->nprocs : comm->procgrid[d];
-    farthest_[d] = domain->periodicity[d] ? 1.0 : EXTREME;
+    farthest_[d] = periods.along(d) ? 1.0 : EXTREME;
     if (ranks > 2) farthest_[d] = std::min(farthest_[d], -narrowest[d]);
   }
 }

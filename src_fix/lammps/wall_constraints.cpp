@@ -7,7 +7,6 @@
 #include "rigid_motion.h"
 
 #include "atom.h"
-#include "domain.h"
 
 #include "fmt/format.h"
 
@@ -32,7 +31,7 @@ WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawCo
                                  RegionWalls &walls, GhostExchange &ranks,
                                  const ContactMemory &memory, const RigidMotion *bodies) :
     Pointers(lmp), step_(step), rules_(rules), laws_(laws), walls_(walls), ranks_(ranks),
-    memory_(memory), bodies_(bodies)
+    memory_(memory), bodies_(bodies), periods_(lmp)
 {
 }
 
@@ -44,7 +43,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
   const double h = step_.problem.timestep;
   // A wall that moves away from a sphere that it holds may be far at the end of the step.
   const bool may_be_far = laws_.has_law() && walls_.any_moves();
-  const double anywhere = std::max({domain->xprd, domain->yprd, domain->zprd});
+  const double anywhere = periods_.widest();
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
@@ -55,44 +54,10 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
   return viewpoints_;
 }
 
-bool WallConstraints::is_periodic() const
-{ return domain->xperiodic || domain->yperiodic || domain->zperiodic; }
-
 // Moves a point beyond a periodic boundary to the other side. Tells whether it was beyond one. (LAMMPS
 // shows the walls of a region only at that side of the boundary where they are.)
 bool WallConstraints::wrap(RegionWalls::Viewpoint &from) const
-{
-  if (!is_periodic()) return false;
-  if (domain->triclinic) return wrap_tilted(from);
-  bool wrapped = false;
-  for (int d = 0; d < 3; ++d) {
-    const double beyond =
-        std::max(domain->boxlo[d] - from.where[d], from.where[d] - domain->boxhi[d]);
-    if (!domain->periodicity[d] || beyond <= 0.0) continue;
-    const double widths = std::floor((from.where[d] - domain->boxlo[d]) / domain->prd[d]);
-    from.image[d] = widths * domain->prd[d];
-    from.where[d] -= from.image[d];
-    wrapped = true;
-  }
-  return wrapped;
-}
-
-// The same in a box whose periods are not at right angles.
-bool WallConstraints::wrap_tilted(RegionWalls::Viewpoint &from) const
-{
-  double of_box[3], widths[3] = {0.0, 0.0, 0.0};
-  domain->x2lamda(from.where, of_box);
-  for (int d = 0; d < 3; ++d)
-    if (domain->periodicity[d] && (of_box[d] < 0.0 || of_box[d] > 1.0))
-      widths[d] = std::floor(of_box[d]);
-  if (widths[0] == 0.0 && widths[1] == 0.0 && widths[2] == 0.0) return false;
-  const double *const h = domain->h;
-  from.image[0] = h[0] * widths[0] + h[5] * widths[1] + h[4] * widths[2];
-  from.image[1] = h[1] * widths[1] + h[3] * widths[2];
-  from.image[2] = h[2] * widths[2];
-  for (int d = 0; d < 3; ++d) from.where[d] -= from.image[d];
-  return true;
-}
+{ return periods_.wrap(from.where, from.image); }
 
 // Points where the step takes those atoms for which the constraint of a wall may be inexact. A
 // constraint that was set by an earlier look is set again wherever its wall is now.

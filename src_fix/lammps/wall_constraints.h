@@ -4,6 +4,7 @@
 #ifndef INELASTIC_WALL_CONSTRAINTS_H
 #define INELASTIC_WALL_CONSTRAINTS_H
 
+#include "periods.h"
 #include "region_walls.h"
 #include "step.h"
 
@@ -52,11 +53,9 @@ class WallConstraints : protected Pointers {
   std::uint64_t key(int i, int wall) const
   { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
 
-  bool is_periodic() const;
   // Tells whether only walls without exact constraints can be met at the end of a step.
-  bool only_inexact() const { return !bodies_ && !is_periodic() && !step_.settings.law; }
+  bool only_inexact() const { return !bodies_ && !periods_.any() && !step_.settings.law; }
   bool wrap(RegionWalls::Viewpoint &) const;
-  bool wrap_tilted(RegionWalls::Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
   const Viewpoints &viewpoints(const double *velocity, double beyond);
@@ -76,6 +75,7 @@ class WallConstraints : protected Pointers {
   GhostExchange &ranks_;
   const ContactMemory &memory_;
   const RigidMotion *bodies_;
+  const Periods periods_;
   std::unordered_map<std::uint64_t, std::size_t> constraint_;    // atom and wall -> the latest one
   Viewpoints viewpoints_;                                        // room for them
   std::vector<double> clear_of_walls_;    // per owned atom: no wall of this step is as near as this
