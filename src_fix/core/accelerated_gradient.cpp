@@ -12,8 +12,9 @@ namespace {
 
   constexpr double UNIT_ROUND_OFF = 0.5 * std::numeric_limits<double>::epsilon();
 
-  // Returns the residual at which a search ends because of its precision, in packed units: some ten times
-  // the round-off of the largest change in single precision; double precision is the best there is.
+  // Returns the residual at which a search ends because of its precision, in packed units: some ten
+  // times the round-off of the largest change in single precision; double precision is the best
+  // there is.
   template <typename Real> double least_residual(double largest_change)
   {
     constexpr double PART = 1.0 / 3.0e5;
@@ -97,8 +98,8 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   // The residual comes down to 0.6 to 1.6 times the unit round-off of the heaviest impulse as a
   // length (measured in columns, heaps and crystals of 2 to 600 particles).
   constexpr double BELOW_ROUND_OFF = 0.5;
-  // A residual that came down by less than a tenth over half of so many iterations comes down no more:
-  // where there is hardly any room, the targets are not to be had, but the tolerance may be.
+  // A residual that came down by less than a tenth over half of so many iterations comes down no
+  // more: where there is hardly any room, the targets are not to be had, but the tolerance may be.
   constexpr long LONG = 5000;
   constexpr double STUCK = 0.9;
   const bool infeasible = is_infeasible(problem, gap_operator_, limits, host);
@@ -130,13 +131,13 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
                                              const Scales &scales, Host &host, SolverResult &result)
 {
   // If double precision refuses so many residuals that single precision finds within the tolerance,
-  // round-off shows and this search is given up. (It also refuses where a constraint was idle for too
-  // long, once or twice in a solve.)
+  // round-off shows and this search is given up. (It also refuses where a constraint was idle for
+  // too long, once or twice in a solve.)
   constexpr long MOST_FAILURES = 8;
   // Idle constraints are looked at in every so many iterations. A constraint is idle above so many
-  // residuals, or tolerances where they are more: gaps change by some residuals until the end. (With
-  // tolerances alone a bed at rest moved up to four times as fast, measured: contacts that closed in
-  // the step came in late.)
+  // residuals, or tolerances where they are more: gaps change by some residuals until the end.
+  // (With tolerances alone a bed at rest moved up to four times as fast, measured: contacts that
+  // closed in the step came in late.)
   constexpr long LOOK_EVERY = 20;
   constexpr double IDLE_GAP = 5.0;
   constexpr bool SINGLE = sizeof(Real) < sizeof(double);
@@ -147,10 +148,10 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     return iteration == 2 || iteration == 4 || iteration == 8 || iteration == 14 ||
         iteration % TARGETS_EVERY == 0;
   };
-  // In a chain residuals add up, and what is left of a velocity is many times what is left of a gap. So a search goes
-  // on where velocities differ from those that a half to two thirds as many iterations had found by more than a
-  // fortieth of what contacts change: this part of the sixteenth that targets are of it (contact_targets.cpp; of bodies
-  // a third as much).
+  // In a chain residuals add up, and what is left of a velocity is many times what is left of a
+  // gap. So a search goes on where velocities differ from those that a half to two thirds as many
+  // iterations had found by more than a fortieth of what contacts change: this part of the
+  // sixteenth that targets are of it (contact_targets.cpp; of bodies a third as much).
   constexpr double MOST_MOVED = 0.4;
   const bool by_velocity = limits.accuracy > 0.0 && limits.coarseness == 1.0;
 
@@ -221,8 +222,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
 SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
                                                  const SolverLimits &limits, Host &host)
 {
-  // A first guess with a residual above so many of its targets is left to double precision. Otherwise at most so
-  // many searches in single precision come first.
+  // A first guess with a residual above so many of its targets is left to double precision.
+  // Otherwise at most so many searches in single precision come first.
   constexpr double WITHIN_SINGLE = 1.0e12;
   constexpr int MOST_SEARCHES = 3;
   // L is let down a little between calls, so that it can follow a packing that becomes less

@@ -1,12 +1,13 @@
-// This solver is the proximal optimized gradient method (Taylor, Hendrickx and Glineur, SIAM J. Optim.
-// 27 (2017) 1283), an accelerated projected gradient, with adaptive restart (Kim and Fessler, J. Optim.
-// Theory Appl. 178 (2018) 240) on the dual problem of contact_problem.h. It needs about 0.7 times as
-// many iterations as Nesterov's method with the same L. From the impulses lambda_k of m constraints
-// [mass length / time] iteration k makes
+// This solver is the proximal optimized gradient method (Taylor, Hendrickx and Glineur, SIAM J.
+// Optim. 27 (2017) 1283), an accelerated projected gradient, with adaptive restart (Kim and
+// Fessler, J. Optim. Theory Appl. 178 (2018) 240) on the dual problem of contact_problem.h. It
+// needs about 0.7 times as many iterations as Nesterov's method with the same L. From the impulses
+// lambda_k of m constraints [mass length / time] iteration k makes
 //
 //   down_k       = -w(lambda_k) / (L D)
 //   led_k        = lambda_k + down_k
-//   unbound_k+1  = led_k + along_k (led_k - led_k-1) + beyond_k down_k + back_k (unbound_k - lambda_k)
+//   unbound_k+1  = led_k + along_k (led_k - led_k-1) + beyond_k down_k
+//                  + back_k (unbound_k - lambda_k)
 //   lambda_k+1   = max(l, unbound_k+1),   l the least impulses
 //
 // D is the diagonal of A: in impulses scaled by its root A has a unit diagonal. The weights follow
@@ -17,18 +18,19 @@
 //   back_k   = (t_k - 1) / (t_k+1 g_k),   g_0 = 1,   g_k+1 = (2 t_k + t_k+1 - 1) / t_k+1
 //
 // (L as of iteration k; g is L times the length of the step that unbound_k made), and t is 1 again
-// where the dual function rises along the last change. L must not be below the largest eigenvalue of
-// the scaled A, of the constraints with impulses: the method then diverges, as Nesterov's does not for long. With u the last
-// change it is raised to |A u|^2 / u.A u over these constraints, where that is more, which costs no
-// product with A, and is remembered from one call to the next.
+// where the dual function rises along the last change. L must not be below the largest eigenvalue
+// of the scaled A, of the constraints with impulses: with a smaller one this method diverges at
+// once, where Nesterov's goes on for a while. With u the last change L is raised to |A u|^2 / u.A u
+// over these constraints, where that is more, which costs no product with A, and is remembered from
+// one call to the next.
 //
-// In an impact most constraints never have an impulse. An iteration reads only those that have one or
-// whose gap is near closed; the idle ones are looked at in every twentieth, as support vector
+// In an impact most constraints never have an impulse. An iteration reads only those that have one
+// or whose gap is near closed; the idle ones are looked at in every twentieth, as support vector
 // machines are trained ("shrinking": Joachims, in Advances in Kernel Methods, MIT Press 1999, p.
-// 169). Iterations look for the change of the impulses in single precision. Where its round-off shows
-// they start again from what was reached, and in the end go on in double precision
-// (packed_iterations.h). The verdict whether impulses are a solution is always in double precision, by
-// gap_operator.h.
+// 169). Iterations look for the change of the impulses in single precision. Where its round-off
+// shows they start again from what was reached, and in the end go on in double precision
+// (packed_iterations.h). The verdict whether impulses are a solution is always in double precision,
+// by gap_operator.h.
 
 #pragma once
 
@@ -45,21 +47,22 @@ class AcceleratedProjectedGradient final : public Solver {
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
 
  private:
-  // Iterates from the impulses in `problem`, whose gaps are gap_, until all residuals, judged in double
-  // precision, are at most their targets and velocities settle, or more iterations in this precision are of no use. Returns
-  // OUT_OF_ITERATIONS also if iterations are left and this precision does not suffice.
+  // Iterates from the impulses in `problem`, whose gaps are gap_, until all residuals, judged in
+  // double precision, are at most their targets and velocities settle, or more iterations in this
+  // precision are of no use. Returns OUT_OF_ITERATIONS also if iterations are left and this
+  // precision does not suffice.
   template <typename Real>
   Status iterate(PackedIterations<Real> &iterations, ContactProblem &problem,
                  const SolverLimits &limits, const Scales &scales, Host &host,
                  SolverResult &result);
 
-  // Sets the gaps gap_, the residual and the targets of the impulses in `problem`. Returns whether every
-  // residual is at most its target.
+  // Sets the gaps gap_, the residual and the targets of the impulses in `problem`. Returns whether
+  // every residual is at most its target.
   bool judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
              SolverResult &result);
 
-  // Returns how the search ends if more iterations from the impulses in `problem` are of no use, in the
-  // precision that it has.
+  // Returns how the search ends if more iterations from the impulses in `problem` are of no use, in
+  // the precision that it has.
   std::optional<Status> judge_prospects(const ContactProblem &problem, const SolverLimits &limits,
                                         bool single_precision, Host &host, SolverResult &result);
 

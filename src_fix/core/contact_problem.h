@@ -7,18 +7,18 @@
 //   subject to         gap_c + h G_c . V >= 0      for every rigid constraint c
 //
 // M is the mass matrix, h the time step, and G_c . V = n_c . (v_first - v_second). l_c <= 0 is the
-// least impulse of the constraint: where it is 0 the contact only pushes, elsewhere it takes that much
-// energy a length to open it. The dual problem has one impulse lambda_c per constraint; the optimality
-// conditions are
+// least impulse of the constraint: where it is 0 the contact only pushes, elsewhere it takes that
+// much energy a length to open it. The dual problem has one impulse lambda_c per constraint; the
+// optimality conditions are
 //
 //   V = V* + M^-1 G^T lambda,   lambda >= l,  w >= 0,  (lambda - l) . w = 0,
 //   w(lambda) = gap + h G V + C lambda
 //
 // C is diagonal and has the compliances. A rigid constraint has none; one with a compliance is a
-// spring, which costs 1 / (2 h) C_c lambda_c^2 beside the energy that is minimised. w_c is a length:
-// for a rigid constraint the gap at the end of the step as the linearised constraint sees it. The
-// vector w is the gradient of the dual function 1/2 lambda^T A lambda + (gap + h G V*)^T lambda,
-// where A = h G M^-1 G^T + C [time / mass].
+// spring, which costs 1 / (2 h) C_c lambda_c^2 beside the energy that is minimised. w_c is a
+// length: for a rigid constraint the gap at the end of the step as the linearised constraint sees
+// it. The vector w is the gradient of the dual function 1/2 lambda^T A lambda + (gap + h G V*)^T
+// lambda, where A = h G M^-1 G^T + C [time / mass].
 //
 // Every array per particle has one more entry than there are particles: a dummy particle that never
 // moves stands for all walls.

@@ -13,11 +13,12 @@
 //   C_c    is the compliance of the contact, 0 for a rigid one: under its impulse the gap may be
 //          smaller by C_c lambda_c.
 //
-// Each constraint carries one impulse lambda_c [mass length / time]: +lambda_c n_c acts on the first
-// particle and -lambda_c n_c on the second. It is at least l_c <= 0: where l_c is 0 a contact only
-// pushes; elsewhere it may also pull, by up to -l_c, and opens only where it pulls by as much.
+// Each constraint carries one impulse lambda_c [mass length / time]: +lambda_c n_c acts on the
+// first particle and -lambda_c n_c on the second. It is at least l_c <= 0: where l_c is 0 a contact
+// only pushes; elsewhere it may also pull, by up to -l_c, and opens only where it pulls by as much.
 //
-// Solvers resolve each constraint to a target of its own (contact_targets.h), which the refinement makes smaller.
+// Solvers resolve each constraint to a target of its own (contact_targets.h), which the refinement
+// makes smaller.
 
 #pragma once
 

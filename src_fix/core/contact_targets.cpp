@@ -11,8 +11,8 @@ namespace inelastic {
 
 namespace {
 
-  // In a bed of many contacts residuals make velocities of some hundred times their size, in a chain of n up to n
-  // times (which accelerated_gradient.h looks at).
+  // In a bed of many contacts residuals make velocities of some hundred times their size, in a
+  // chain of n up to n times (which accelerated_gradient.h looks at).
   constexpr double IN_NETWORKS = 1.0 / 16.0;
   // Bodies turn, too: the softest motions of their networks are softer.
   constexpr double OF_BODIES = 1.0 / 48.0;

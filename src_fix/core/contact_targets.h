@@ -1,22 +1,30 @@
-// The accuracy to which each contact is resolved, which belongs to the contact and not to the scene.
+// The accuracy to which each contact is resolved, which belongs to the contact and not to the
+// scene.
 //
-// A search for the impulses ends when the residual of every contact (solver.h) is at most its target
+// A search for the impulses ends when the residual of every contact (solver.h) is at most its
+// target
 //
-//   t_c = min(tolerance, max(round-off, A/16 max(v_c, r_c, l_c / 50000)))                      [length]
+//   t_c = min(tolerance, max(round-off, A/16 max(v_c, r_c, l_c / 50000)))     [length]
+//
 //   v_c = min over its particles that can move of max(s_i, n_i)
 //
-// for contact c, with the accuracy A and, of particle i,
+// for contact c, with the accuracy A. Of particle i
 //
-//   s_i   h times the change of its velocity by all of its contacts together. At rest that is what its
-//         forces would give it, whatever it carries: its weight alone, under a column as well as on top
-//   n_i   the part of it that this search has added to the first guess: what is new. In a chain that is hit
-//         at one end the targets so follow the impact
-//   r_c   the residual of the first guess: for two spheres that meet, by how much they would overlap
-//   l_c   the length by which the contact's own impulse of the first guess opens its gap. It matters where
-//         forces balance and change no velocity, and tells there what is small
+// - s_i is h times the change of its velocity by all of its contacts together. At rest that is what
+//   its forces would give it, whatever it carries: its weight alone, under a column as well as on
+//   top;
+// - n_i is the part of it that this search has added to the first guess: what is new. In a chain
+//   that is hit at one end the targets so follow the impact.
 //
-// Changes of velocity are those of the present impulses. Contacts of bodies have A/48. A contact whose refinement
-// (contact_set.h) is below 1 has that part of A.
+// Of contact c
+//
+// - r_c is the residual of the first guess: for two spheres that meet, by how much they would
+//   overlap;
+// - l_c is the length by which the contact's own impulse of the first guess opens its gap. It
+//   matters where forces balance and change no velocity, and tells there what is small.
+//
+// Changes of velocity are those of the present impulses. Contacts of bodies have A/48. A contact
+// whose refinement (contact_set.h) is below 1 has that part of A.
 
 #pragma once
 
@@ -30,20 +38,22 @@ namespace inelastic {
 
 struct SolverLimits;
 
-// Returns the residual of one constraint: what is lacking of its gap, or what its gap is open under a force.
+// Returns the residual of one constraint: what is lacking of its gap, or what its gap is open under
+// a force.
 inline double residual_of_one(double gap_at_end, double impulse, double least)
 { return impulse > least && gap_at_end > 0.0 ? gap_at_end : gap_at_end < 0.0 ? -gap_at_end : 0.0; }
 
 class ContactTargets {
  public:
-  // Takes the first guess: the operator was last applied to it, and `gap` are its gaps at the end of the step.
-  // `diagonal` is that of A, one number per constraint as well.
+  // Takes the first guess: the operator was last applied to it, and `gap` are its gaps at the end
+  // of the step. `diagonal` is that of A, one number per constraint as well.
   void begin(const ContactProblem &problem, const SolverLimits &limits,
              const GapOperator &gap_operator, const std::vector<double> &gap,
              const std::vector<double> &diagonal);
 
-  // Sets the targets for the present impulses, to which the operator was last applied. Returns the largest residual
-  // as a part of its target, over all ranks; infinity if a number is not finite. Collective.
+  // Sets the targets for the present impulses, to which the operator was last applied. Returns the
+  // largest residual as a part of its target, over all ranks; infinity if a number is not finite.
+  // Collective.
   double judge(const ContactProblem &problem, const SolverLimits &limits,
                const GapOperator &gap_operator, const std::vector<double> &gap, Host &host);
 

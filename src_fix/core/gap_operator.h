@@ -29,8 +29,8 @@ class GapOperator {
   // Writes V* + M^-1 G^T impulse, 3 per particle [length / time], ghosts included.
   void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
 
-  // M^-1 G^T impulse for the impulses of the last call of apply(): by how much contacts change the velocity
-  // of each particle, the dummy included; 3 numbers per particle [length / time].
+  // M^-1 G^T impulse for the impulses of the last call of apply(): by how much contacts change the
+  // velocity of each particle, the dummy included; 3 numbers per particle [length / time].
   const std::vector<double> &change() const { return change_; }
 
   // Writes the same for the impulses of the last call of apply(), without communication.

@@ -31,8 +31,8 @@ class Host {
   virtual void sum_over_chosen_ghosts(double *per_particle) = 0;
   virtual void sum_over_chosen_ghosts(float *per_particle) = 0;
 
-  // Gives every ghost the value of its owner, 3 numbers per particle. Programs that set up a problem
-  // need it: the ghosts must have predicted velocities too.
+  // Gives every ghost the value of its owner, 3 numbers per particle. Programs that set up a
+  // problem need it: the ghosts must have predicted velocities too.
   virtual void share_with_ghosts(double *per_particle) = 0;
 
   // Replaces a few numbers by their sums over all ranks and others by their maxima, in one

@@ -10,18 +10,19 @@ namespace inelastic {
 
 namespace {
 
-  // Working constraints that could be idle become so when they are more than one in so many: each look would
-  // otherwise move them all to save little.
+  // Working constraints that could be idle become so when they are more than one in so many: each
+  // look would otherwise move them all to save little.
   constexpr std::size_t FEW = 10;
 
-  // Working constraints are looked at for those that could be idle at every so many looks: it takes a
-  // pass over them, and they become idle more rarely than idle ones come in.
+  // Working constraints are looked at for those that could be idle at every so many looks: it takes
+  // a pass over them, and they become idle more rarely than idle ones come in.
   constexpr int SET_IDLE_EVERY = 4;
 
   // A gap is known to a few units of round-off of the largest change.
   constexpr double ROUND_OFFS = 2.0;
 
-  // What a particle moves alone counts by so much of what it moves together with one that it touches.
+  // What a particle moves alone counts by so much of what it moves together with one that it
+  // touches.
   constexpr double ALONE = 0.5;
 
   // A velocity, which is a sum of some impulses, to so many units of its own round-off.
@@ -234,9 +235,9 @@ void PackedIterations<Real>::join(const std::vector<double> &gap, const Scales &
   wake(near, packed.data());
 }
 
-// Makes idle constraints working, given by their places in ascending order. `gap` has one number per
-// idle constraint. It is kept as the gap of the impulses before, which is not known: the next advance uses
-// it in the momentum alone.
+// Makes idle constraints working, given by their places in ascending order. `gap` has one number
+// per idle constraint. It is kept as the gap of the impulses before, which is not known: the next
+// advance uses it in the momentum alone.
 template <typename Real>
 void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Real *gap)
 {

@@ -2,17 +2,18 @@
 // problem, runs the passes in the order that the exchange between ranks needs, and unpacks
 // impulses.
 //
-// The unknown is the change of the impulses since the start of the search, not the impulses, and the
-// gaps are those at the start plus what the change makes of them. Round-off is then in proportion to
-// the change, and single precision can find what a heavy bed still lacks.
+// The unknown is the change of the impulses since the start of the search, not the impulses, and
+// the gaps are those at the start plus what the change makes of them. Round-off is then in
+// proportion to the change, and single precision can find what a heavy bed still lacks.
 //
-// Constraints that have no more than their least impulse and whose gaps are far from closed are idle:
-// iterations leave them out until they are looked at and found to be near. The others are working. Each rank chooses for
-// itself; nothing is communicated for it.
+// Constraints that have no more than their least impulse and whose gaps are far from closed are
+// idle: iterations leave them out until they are looked at and found to be near. The others are
+// working. Each rank chooses for itself; nothing is communicated for it.
 //
-// Constraints and n particles are packed as normals with gaps, diagonal entries, compliances and least
-// changes, one for each constraint, and n + 1 vectors (contact_problem.h has the dummy particle). Everything has
-// units in which the largest length is near 1, so that single precision can hold it.
+// Constraints and n particles are packed as normals with gaps, diagonal entries, compliances and
+// least changes, one for each constraint, and n + 1 vectors (contact_problem.h has the dummy
+// particle). Everything has units in which the largest length is near 1, so that single precision
+// can hold it.
 
 #pragma once
 
@@ -42,38 +43,39 @@ template <typename Real> class PackedIterations {
  public:
   // Packs a problem, whose impulses are the start. `diagonal` is that of A, `gap` has the gaps w of
   // these impulses, one number per constraint each (contact_problem.h). Constraints without an
-  // impulse whose gap is above `idle_gap` [length] are idle. `change` are the changes of velocity by these
-  // impulses (GapOperator::change), and the targets were judged with them. No target is above the tolerance
-  // [length].
+  // impulse whose gap is above `idle_gap` [length] are idle. `change` are the changes of velocity
+  // by these impulses (GapOperator::change), and the targets were judged with them. No target is
+  // above the tolerance [length].
   void prepare(const ContactProblem &problem, const std::vector<double> &diagonal,
                const std::vector<double> &gap, double idle_gap, const Scales &scales,
                const ContactTargets &targets, const std::vector<double> &change, double tolerance);
 
-  // Sets the targets by the present changes of velocity (contact_targets.h). Call it between finish and
-  // advance.
+  // Sets the targets by the present changes of velocity (contact_targets.h). Call it between finish
+  // and advance.
   void set_targets();
 
   // Keeps the present changes of velocity; the last two that were kept can be compared with.
   void keep_velocities();
 
-  // Returns by how much velocities have changed since those that were kept last but one: the largest over both
-  // sides of the working constraints with an impulse, as a part of what the target is the accuracy's part of.
-  // Before two were kept it is the change since the start of the search. What may be round-off of a velocity
-  // does not count. `accuracy` is above 0. Call it after finish and set_targets.
+  // Returns by how much velocities have changed since those that were kept last but one: the
+  // largest over both sides of the working constraints with an impulse, as a part of what the
+  // target is the accuracy's part of. Before two were kept it is the change since the start of the
+  // search. What may be round-off of a velocity does not count. `accuracy` is above 0. Call it
+  // after finish and set_targets.
   double moved_since_kept(double accuracy) const;
 
-  // Begins an iteration with a step of 1 / L: the next impulses become the present ones. Returns sums
-  // and maxima over this rank's constraints; those of gaps and changes are of the impulses before. Residuals
-  // below `blur`, in packed units, may be round-off.
+  // Begins an iteration with a step of 1 / L: the next impulses become the present ones. Returns
+  // sums and maxima over this rank's constraints; those of gaps and changes are of the impulses
+  // before. Residuals below `blur`, in packed units, may be round-off.
   packed::Passed advance(const Weights &weights, double step, double blur);
 
-  // Ends an iteration: computes the changes of velocity of the present impulses. Collective. The host must
-  // know which ghosts are in constraints (Host::choose_ghosts).
+  // Ends an iteration: computes the changes of velocity of the present impulses. Collective. The
+  // host must know which ghosts are in constraints (Host::choose_ghosts).
   void finish(Host &host);
 
-  // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units. Makes the
-  // working ones idle that have no impulse and gaps above it, where they are more than a few. Call it
-  // between finish and advance.
+  // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units. Makes
+  // the working ones idle that have no impulse and gaps above it, where they are more than a few.
+  // Call it between finish and advance.
   void look(double idle_gap);
 
   // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per
@@ -130,12 +132,12 @@ template <typename Real> class PackedIterations {
   Real idle_gap_ = 0;                 // above it a constraint without an impulse is idle
   std::vector<Real> inverse_mass_;    // per particle; 1 for particles in bodies
   std::vector<Vector> sum_, velocity_;
-  // Per particle: the change of velocity by the impulses at the start of the search, in all and since the
-  // first guess of the solve
+  // Per particle: the change of velocity by the impulses at the start of the search, in all and
+  // since the first guess of the solve
   std::vector<Vector> at_start_, since_guess_;
-  std::vector<char> mobile_;    // per particle
-  std::vector<Real>
-      changed_;    // per particle that can move, what targets are a part of, as set_targets found it
+  std::vector<char> mobile_;     // per particle
+  std::vector<Real> changed_;    // per particle that can move, what targets are a part of, as
+                                 // set_targets found it
   std::vector<Vector> kept_, kept_before_;    // of velocity_
   Real most_target_ = 0;
   std::vector<packed::Rod<Real>> rods_;

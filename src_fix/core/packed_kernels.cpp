@@ -20,10 +20,11 @@ namespace {
         ->lanes;
   }
 
-  // Adds the changes of a block to the sums of their particles. Constraints that follow one another mostly
-  // have the same first particle (they come from its list of neighbours). Its sum is kept in a register:
-  // one that was just written is slow to read again. (Constraints in an order in which neighbours have no
-  // particle in common, and every sum written, took a tenth longer for all of an iteration, measured.)
+  // Adds the changes of a block to the sums of their particles. Constraints that follow one another
+  // mostly have the same first particle (they come from its list of neighbours). Its sum is kept in
+  // a register: one that was just written is slow to read again. (Constraints in an order in which
+  // neighbours have no particle in common, and every sum written, took a tenth longer for all of an
+  // iteration, measured.)
   template <typename Real>
   inline __attribute__((always_inline)) void scatter(const Pass<Real> &pass, std::size_t begin,
                                                      std::size_t end, const Real *change)
@@ -82,8 +83,8 @@ namespace {
     add_up(terms, *gap);
   }
 
-  // The part of advance_impulses between its gathers and its scatters makes the next changes of a block,
-  // `next`, from the gaps that the present ones leave, and adds to what is passed.
+  // The part of advance_impulses between its gathers and its scatters makes the next changes of a
+  // block, `next`, from the gaps that the present ones leave, and adds to what is passed.
   template <typename Real>
   inline __attribute__((always_inline)) void step_block(const Pass<Real> &pass, std::size_t begin,
                                                         std::size_t size, const Real *gap,

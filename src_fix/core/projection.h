@@ -55,8 +55,8 @@ inline Status worse(Status a, Status b)
 // Projects problem.predicted_velocity in one to `max_rounds` rounds. On return `velocity` (3 per
 // particle, ghosts included) holds the projection and problem.contacts.impulse the impulses. If the
 // last round added constraints, `velocity` knows nothing of them and their impulses are 0.
-// Where the limits are coarse, they are so until a round has left nothing to add or change; what follows is
-// solved as it should be. Collective.
+// Where the limits are coarse, they are so until a round has left nothing to add or change; what
+// follows is solved as it should be. Collective.
 ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,
                          const SolverLimits &limits, int max_rounds, Host &host,
                          std::vector<double> &velocity);

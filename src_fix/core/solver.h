@@ -1,7 +1,8 @@
 // The interface of all solvers of the projection problem (contact_problem.h).
 //
 // Solvers work on the dual problem: they look for the impulses lambda. All are judged by the same
-// two residuals, in units of length, with w the gaps at the end of the step and l the least impulses:
+// two residuals, in units of length, with w the gaps at the end of the step and l the least
+// impulses:
 //
 //   feasibility       the largest -w_c of all constraints: what is lacking of the gap that they ask
 //                     for; where l_c < 0 and lambda_c > l_c also the largest w_c: the contact holds
@@ -35,7 +36,8 @@ struct Residual {
 constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
                                std::numeric_limits<double>::infinity()};
 
-// Returns the residual of this rank's constraints with their impulses; UNSOLVED if a number is not finite.
+// Returns the residual of this rank's constraints with their impulses; UNSOLVED if a number is not
+// finite.
 Residual residual(const double *gap_at_end, const ContactSet &contacts);
 
 // Returns the same over the constraints of all ranks. Collective.
@@ -89,13 +91,14 @@ struct SolverLimits {
   long max_iterations = 0;
   // [length] Steps that move particles further than this are not sensible (infeasibility.h).
   double reach = std::numeric_limits<double>::infinity();
-  // The part of what contacts change to which they are resolved (contact_targets.h); 0 = only the tolerance
-  // counts.
+  // The part of what contacts change to which they are resolved (contact_targets.h); 0 = only the
+  // tolerance counts.
   double accuracy = 0.0;
-  // By this the targets are larger, at least 1. Above 1 velocities need not settle, either: enough of a solution to
-  // tell which constraints change (projection.h).
+  // By this the targets are larger, at least 1. Above 1 velocities need not settle, either: enough
+  // of a solution to tell which constraints change (projection.h).
   double coarseness = 1.0;
-  // [length] Shorter lengths are round-off of positions: no target is below it, unless it is the tolerance.
+  // [length] Shorter lengths are round-off of positions: no target is below it, unless it is the
+  // tolerance.
   double least_length = 0.0;
 };
 
@@ -130,8 +133,9 @@ class Solver {
   GapOperator &gap_operator() { return gap_operator_; }
 
  protected:
-  // Judges the impulses of the problem, of which those below the least become that, and sets the diagonal and
-  // what the targets need of the first guess. The operator must be prepared for the problem. Collective.
+  // Judges the impulses of the problem, of which those below the least become that, and sets the
+  // diagonal and what the targets need of the first guess. The operator must be prepared for the
+  // problem. Collective.
   Guess judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host);
 
   GapOperator gap_operator_;

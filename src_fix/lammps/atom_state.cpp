@@ -120,8 +120,8 @@ bool AtomState::is_pushed(int i) const
       (step_.has_bodies && momenta_.has_held(i));
 }
 
-// The layout is: this size; with a law, what it remembers of contacts, without one, if there is more, a 0; the
-// push, if there is one.
+// The layout is: this size; with a law, what it remembers of contacts, without one, if there is
+// more, a 0; the push, if there is one.
 int AtomState::restart_size(int i, bool writes) const
 {
   if (!writes) return 0;

@@ -1,5 +1,5 @@
-// This room holds the memory of every atom from step to step, which therefore follows the atoms when LAMMPS
-// sorts them, hands them to other ranks and writes them to restart files.
+// This room holds the memory of every atom from step to step, which therefore follows the atoms
+// when LAMMPS sorts them, hands them to other ranks and writes them to restart files.
 
 #ifndef INELASTIC_ATOM_STATE_H
 #define INELASTIC_ATOM_STATE_H
@@ -29,8 +29,8 @@ class AtomState : protected Pointers {
   static constexpr double OUTSIDE =
       -1.0;    // in place of the radius of an atom outside of the group
 
-  // The part of a velocity that takes a bad overlap apart and is no momentum: after the last move, and at
-  // whole steps.
+  // The part of a velocity that takes a bad overlap apart and is no momentum: after the last move,
+  // and at whole steps.
   double *push_next(int i) { return state_[i] + PUSH_NEXT; }
   double *push_held(int i) { return state_[i] + PUSH_HELD; }
   // At the end of a run: velocities are momentum alone from here on.
@@ -38,19 +38,21 @@ class AtomState : protected Pointers {
 
   // For how many steps a particle has been quiet (rest.h).
   double &quiet_steps(int i) { return state_[i][QUIET_STEPS]; }
-  // The load of a particle at rest in the last step, [force / mass]; 0 if it was not at rest (rest.h).
+  // The load of a particle at rest in the last step, [force / mass]; 0 if it was not at rest
+  // (rest.h).
   double &load_at_rest(int i) { return state_[i][LOAD_AT_REST]; }
 
   ContactMemory &contact_memory() { return memory_; }
   LawMemory &law_memory() { return law_memory_; }
   CarriedMomenta &momenta() { return momenta_; }
 
-  // Both atoms of a contact remember it, those of other ranks included: the next neighbour list may show
-  // the pair from the other side, and atoms may migrate before it is built. Collective.
+  // Both atoms of a contact remember it, those of other ranks included: the next neighbour list may
+  // show the pair from the other side, and atoms may migrate before it is built. Collective.
   void remember_contacts(GhostExchange &ranks);
 
-  // Finds how long the messages of an atom are: after each step, and where a restart file has brought what the law
-  // remembers, before LAMMPS hands atoms to other ranks or writes another file. Collective.
+  // Finds how long the messages of an atom are: after each step, and where a restart file has
+  // brought what the law remembers, before LAMMPS hands atoms to other ranks or writes another
+  // file. Collective.
   void measure_messages(GhostExchange &ranks);
 
   // LAMMPS's callbacks.
@@ -62,15 +64,15 @@ class AtomState : protected Pointers {
   // The largest message of an atom that is handed to another rank [numbers].
   int exchange_size() const;
 
-  // Restart files hold what the contact law remembers. Those that are written during a run hold velocities
-  // with the push in them: it goes along, with the velocity that it belongs to. Most atoms have none. Where
-  // none has, and without a law (`writes` false), the file holds nothing of this fix: LAMMPS would refuse
-  // change_box after it.
+  // Restart files hold what the contact law remembers. Those that are written during a run hold
+  // velocities with the push in them: it goes along, with the velocity that it belongs to. Most
+  // atoms have none. Where none has, and without a law (`writes` false), the file holds nothing of
+  // this fix: LAMMPS would refuse change_box after it.
   int restart_size(int i, bool writes) const;
   int largest_restart_size() const;
   int pack_restart(int i, double *buffer, bool writes) const;
-  // `written` tells whether a run with a law has written the file, and `same_law` whether it is that of this
-  // run. Errors: LAMMPS gives the atom what belongs to another one.
+  // `written` tells whether a run with a law has written the file, and `same_law` whether it is
+  // that of this run. Errors: LAMMPS gives the atom what belongs to another one.
   void unpack_restart(int i, int nth, bool written, bool same_law);
 
   double memory_usage() const;    // [numbers] per atom

@@ -20,8 +20,8 @@ using inelastic::norm;
 namespace {
 
 constexpr double COLLINEAR = 1.0e-7;    // smallest moment over the others; LAMMPS drops it there
-// Point masses nearer to one another than this part of the largest coordinate, times the machine epsilon,
-// have an inertia, and turn, as the round-off of their positions will have it.
+// Point masses nearer to one another than this part of the largest coordinate, times the machine
+// epsilon, have an inertia, and turn, as the round-off of their positions will have it.
 constexpr double RESOLVED_ARM = 1.0e7;
 constexpr double AGREEMENT = 1.0e-6;    // relative, of masses and moments computed in two ways
 
@@ -39,8 +39,8 @@ double trace_of_square(const double *a)
   return a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + 2.0 * (a[3] * a[3] + a[4] * a[4] + a[5] * a[5]);
 }
 
-// The inverse of an inertia; its pseudo-inverse where the masses lie on a line (two equal moments t and a
-// third of zero: A A = t A) or in one point; then the result is true.
+// The inverse of an inertia; its pseudo-inverse where the masses lie on a line (two equal moments t
+// and a third of zero: A A = t A) or in one point; then the result is true.
 bool invert_inertia(const double *a, double *inverse)
 {
   const double t = 0.5 * trace(a);

@@ -1,5 +1,5 @@
-// Mass and moments of inertia of bodies at the present positions of their spheres, and whether LAMMPS's
-// own bodies have the same.
+// Mass and moments of inertia of bodies at the present positions of their spheres, and whether
+// LAMMPS's own bodies have the same.
 
 #ifndef INELASTIC_BODY_INERTIA_H
 #define INELASTIC_BODY_INERTIA_H
@@ -32,12 +32,12 @@ class BodyInertias : protected Pointers {
   const BodyInertia &operator[](std::size_t body) const { return inertias_[body]; }
   Inertia kind() const { return kind_; }
 
-  // Sets arms, inverse masses and inverse inertias of the problem's bodies. `original_of` tells of each member
-  // which of its body's originals it is.
+  // Sets arms, inverse masses and inverse inertias of the problem's bodies. `original_of` tells of
+  // each member which of its body's originals it is.
   void measure(inelastic::ContactProblem &problem, const std::vector<int> &original_of);
 
-  // Compares mass and moments of the bodies of a fix rigid/small with these. Says which are otherwise;
-  // empty if none of this rank's are.
+  // Compares mass and moments of the bodies of a fix rigid/small with these. Says which are
+  // otherwise; empty if none of this rank's are.
   std::string disagreement(const inelastic::ContactProblem &problem, const std::string &fix_id);
 
  private:

@@ -130,8 +130,8 @@ std::string BodyMembers::find()
   return explained(message);
 }
 
-// The spheres of a body become a chain, whose links are `next`, and bodies stand in the order of their
-// first ones: spheres that are near in space are near in memory.
+// The spheres of a body become a chain, whose links are `next`, and bodies stand in the order of
+// their first ones: spheres that are near in space are near in memory.
 std::vector<int> BodyMembers::first_spheres(std::vector<int> &next, std::string &message)
 {
   std::vector<int> first;

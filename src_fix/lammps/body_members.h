@@ -1,5 +1,5 @@
-// This room knows which spheres belong to which body of a fix rigid/small, ghosts included, and checks that
-// every rank sees its bodies whole.
+// This room knows which spheres belong to which body of a fix rigid/small, ghosts included, and
+// checks that every rank sees its bodies whole.
 
 #ifndef INELASTIC_BODY_MEMBERS_H
 #define INELASTIC_BODY_MEMBERS_H
@@ -29,12 +29,13 @@ class BodyMembers : protected Pointers {
   Fix *fix() const { return fix_; }
 
   // Puts the bodies into the step's problem, all particles of the group: to be called when atoms or
-  // ghosts have changed. Collective. Returns what is wrong on this rank, empty if nothing is: a body of
-  // which it sees a part only. Errors: a body that is not all in the group, or holds frozen spheres.
+  // ghosts have changed. Collective. Returns what is wrong on this rank, empty if nothing is: a
+  // body of which it sees a part only. Errors: a body that is not all in the group, or holds frozen
+  // spheres.
   std::string find();
 
-  // The first call of a run checks this when the bodies were measured. Errors: ghosts that do not reach far
-  // enough. Collective.
+  // The first call of a run checks this when the bodies were measured. Errors: ghosts that do not
+  // reach far enough. Collective.
   void check_reach() const;
 
   bool is_first_of_run() const { return first_of_run_; }

@@ -1,5 +1,5 @@
-// These are the momenta that the steps of bodies carry along, kept per atom so that they follow the atoms:
-// every atom of a body has a copy of its body's values.
+// These are the momenta that the steps of bodies carry along, kept per atom so that they follow the
+// atoms: every atom of a body has a copy of its body's values.
 
 #ifndef INELASTIC_CARRIED_MOMENTA_H
 #define INELASTIC_CARRIED_MOMENTA_H
@@ -46,8 +46,8 @@ class CarriedMomenta {
   void pack_held(int i, double *buffer) const;
   void unpack_held(int i, const double *buffer);
 
-  // By how much the steps of a run have magnified the round-off of a local atom's position: how fast a
-  // body turns, and where to, is known no better than its arms, which may be short.
+  // By how much the steps of a run have magnified the round-off of a local atom's position: how
+  // fast a body turns, and where to, is known no better than its arms, which may be short.
   double round_off_growth(int i) const
   {
     const double angle = carried_[i].angle;

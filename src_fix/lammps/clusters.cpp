@@ -44,9 +44,9 @@ void Clusters::join_local()
   }
 }
 
-// Three numbers per particle: the label, then minus one where another rank, or an image, has a part of the
-// cluster. Both fall to the least value that any of the cluster's particles has, round by round, in which a ghost
-// and its owned atom agree, and then what is connected on a rank.
+// Three numbers per particle: the label, then minus one where another rank, or an image, has a part
+// of the cluster. Both fall to the least value that any of the cluster's particles has, round by
+// round, in which a ghost and its owned atom agree, and then what is connected on a rank.
 void Clusters::agree_on_labels(std::vector<double> &labels)
 {
   const int count = step_.problem.particles;

@@ -1,5 +1,6 @@
-// Clusters: the particles that contacts with a force connect, through particles and bodies that can move. Walls and
-// frozen particles connect nothing. A cluster can be shared by ranks, and reach through periodic boundaries.
+// Clusters: the particles that contacts with a force connect, through particles and bodies that can
+// move. Walls and frozen particles connect nothing. A cluster can be shared by ranks, and reach
+// through periodic boundaries.
 
 #ifndef INELASTIC_CLUSTERS_H
 #define INELASTIC_CLUSTERS_H
@@ -37,8 +38,8 @@ class Clusters : protected Pointers {
                               : problem.inverse_mass[i] > 0.0;
   }
 
-  // Replaces numbers of every cluster, so many sums and so many maxima each, one cluster after the other, by those
-  // over all ranks. Collective.
+  // Replaces numbers of every cluster, so many sums and so many maxima each, one cluster after the
+  // other, by those over all ranks. Collective.
   void over_ranks(int number_of_sums, std::vector<double> &sums, int number_of_maxima,
                   std::vector<double> &maxima) const;
 

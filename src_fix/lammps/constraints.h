@@ -1,5 +1,5 @@
-// The constraints of a step, from pairs and from walls: those that matter from the start, and those that
-// a solution shows to matter (the core's ConstraintSource).
+// The constraints of a step, from pairs and from walls: those that matter from the start, and those
+// that a solution shows to matter (the core's ConstraintSource).
 
 #ifndef INELASTIC_CONSTRAINTS_H
 #define INELASTIC_CONSTRAINTS_H
@@ -37,25 +37,27 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   // At the start of a run: the margin is a part of the smallest radius [length].
   void begin_run(double smallest_radius);
 
-  // Takes the constraints that can matter with the predicted velocities. Collective. Errors: spheres
-  // that coincide, that meet their own image or that are beyond a wall, bodies that are not all seen.
+  // Takes the constraints that can matter with the predicted velocities. Collective. Errors:
+  // spheres that coincide, that meet their own image or that are beyond a wall, bodies that are not
+  // all seen.
   void collect();
 
-  // Adds what the velocities of the step violate, and follows the end of the step where bodies turn or
-  // walls curve. Returns how many constraints this rank added or changed. Collective, same errors.
+  // Adds what the velocities of the step violate, and follows the end of the step where bodies turn
+  // or walls curve. Returns how many constraints this rank added or changed. Collective, same
+  // errors.
   long refine(const std::vector<double> &velocity, inelastic::ContactProblem &problem) override;
 
-  // Adds what the velocities of the step violate. Returns how many constraints all ranks added. Collective, same
-  // errors.
+  // Adds what the velocities of the step violate. Returns how many constraints all ranks added.
+  // Collective, same errors.
   long add_violated();
 
-  // The first tells whether gaps were set by the end of the step, the second whether the last solve knew of
-  // such gaps.
+  // The first tells whether gaps were set by the end of the step, the second whether the last solve
+  // knew of such gaps.
   bool relinearised() const { return relinearised_; }
   bool solved_relinearised() const { return solved_relinearised_; }
 
-  // This is called after a step: it takes more pairs at once when the last projection had to come back
-  // for some, fewer otherwise. `reach` [length] is that of the neighbour list.
+  // This is called after a step: it takes more pairs at once when the last projection had to come
+  // back for some, fewer otherwise. `reach` [length] is that of the neighbour list.
   void adapt_margin(double reach);
 
  private:

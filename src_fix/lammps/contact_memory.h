@@ -1,6 +1,6 @@
-// What is known of contacts from the last step, kept per atom so that it follows the atoms through neighbour list
-// rebuilds and from rank to rank: their forces, the first guess of the next step, and the gaps at which they are
-// closed (gap_rules.h).
+// What is known of contacts from the last step, kept per atom so that it follows the atoms through
+// neighbour list rebuilds and from rank to rank: their forces, the first guess of the next step,
+// and the gaps at which they are closed (gap_rules.h).
 
 #ifndef INELASTIC_CONTACT_MEMORY_H
 #define INELASTIC_CONTACT_MEMORY_H
@@ -31,8 +31,9 @@ class ContactMemory {
 
   void remember(int atom, const Entry &entry) { remembered_[atom].push_back(entry); }
 
-  // An entry without force that is not closed where nothing is remembered. Of two contacts with one partner (in
-  // the tip of a cone, or through two periodic boundaries) nobody knows which is which, and both are the first one.
+  // An entry without force that is not closed where nothing is remembered. Of two contacts with one
+  // partner (in the tip of a cone, or through two periodic boundaries) nobody knows which is which,
+  // and both are the first one.
   Entry find(int atom, tagint partner) const
   {
     for (const Entry &entry : remembered_[atom])

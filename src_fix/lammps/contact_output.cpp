@@ -66,8 +66,8 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   vector_[HELD_CONTACTS] = sums[4];
 }
 
-// Contacts carry a force, or their law remembers something of them. Of several constraints that are one contact
-// only those with a force count.
+// Contacts carry a force, or their law remembers something of them. Of several constraints that are
+// one contact only those with a force count.
 bool ContactOutput::is_contact(std::size_t c) const
 {
   if (step_.problem.contacts.impulse[c] != 0.0) return true;
@@ -141,8 +141,8 @@ void ContactOutput::list_contact(std::size_t c, double strength, double to_point
     std::copy_n(step_.law_contact(side)->remembered.begin(), remembered_, out + LOCAL_COLUMNS);
 }
 
-// `weight` is the distance over which the force acts, times the force. Half goes to each side; a wall's
-// half goes to the sphere as well.
+// `weight` is the distance over which the force acts, times the force. Half goes to each side; a
+// wall's half goes to the sphere as well.
 void ContactOutput::add_virial(std::size_t c, double weight, const VirialTarget &virial)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;

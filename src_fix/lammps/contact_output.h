@@ -98,7 +98,8 @@ class ContactOutput : protected Pointers {
   double **local_ = nullptr;
   int local_rows_ = 0;
   int local_room_ = 0;
-  // Contacts of spheres, with walls; of these: pressed ones, and those of which the law remembers something.
+  // Contacts of spheres, with walls; of these: pressed ones, and those of which the law remembers
+  // something.
   double counts_[4] = {};
   std::vector<double> contact_force_, contact_count_;    // 3 per particle, and for the dummy
   std::vector<double> virial_diagonal_, virial_off_diagonal_;

@@ -1,7 +1,7 @@
-// Bodies that are deep in one another in a bad start. They overlap at several places, whose normals may
-// ask for opposite motions. Such bodies are pushed along the line between their centres instead, which
-// takes them apart whatever their shapes; the other constraints between them wait until they are less
-// entangled.
+// Bodies that are deep in one another in a bad start. They overlap at several places, whose normals
+// may ask for opposite motions. Such bodies are pushed along the line between their centres
+// instead, which takes them apart whatever their shapes; the other constraints between them wait
+// until they are less entangled.
 
 #ifndef INELASTIC_ENTANGLED_BODIES_H
 #define INELASTIC_ENTANGLED_BODIES_H
@@ -23,7 +23,8 @@ class EntangledBodies {
   // Finds them among the constraints of the step.
   void find();
 
-  // Tells whether particles i and j belong to two entangled bodies, in the phase in which these are pushed.
+  // Tells whether particles i and j belong to two entangled bodies, in the phase in which these are
+  // pushed.
   bool contains(int i, int j) const
   { return step_.phase == Phase::PUSH && !pairs_.empty() && pairs_.count(pair(i, j)); }
 

@@ -27,11 +27,12 @@ constexpr int MAX_ROUNDS = 100;    // of adding constraints; a handful is usual
 std::string first_word(const std::string &words)
 { return words.substr(0, words.find(' ')); }
 
-// Of what restart files hold. Files of version 0.1 begin with a time, those of its successors, before the
-// release of the next version, with the other number.
+// Of what restart files hold. Files of version 0.1 begin with a time, those of its successors,
+// before the release of the next version, with the other number.
 constexpr double LAYOUT = -3.0, EARLIER_LAYOUT = -2.0;
 
-// What LAMMPS has read from a restart file for fixes that are not yet defined is hidden in its class.
+// What LAMMPS has read from a restart file for fixes that are not yet defined is hidden in its
+// class.
 struct FromRestart : Modify {
   static char *id_of(const Modify *modify, int k)
   { return (modify->*(&FromRestart::id_restart_peratom))[k]; }
@@ -102,8 +103,8 @@ void FixInelastic::announce_to_lammps()
   restart_global = restart_peratom = laws_.has_law() ? 1 : 0;
 }
 
-// LAMMPS gives what a restart file holds to the fix with the same ID alone, and tells nobody before the end of
-// the first run. Without a law there is little to lose.
+// LAMMPS gives what a restart file holds to the fix with the same ID alone, and tells nobody before
+// the end of the first run. Without a law there is little to lose.
 void FixInelastic::find_lost_memory() const
 {
   if (!laws_.has_law()) return;
@@ -160,8 +161,8 @@ int FixInelastic::modify_param(int narg, char **arg)
    the start of a run
 ------------------------------------------------------------------------- */
 
-// LAMMPS calls this for write_restart, write_data and balance, too, after which `run pre no` goes on as if
-// nothing had been: what begins a run is in begin_run().
+// LAMMPS calls this for write_restart, write_data and balance, too, after which `run pre no` goes
+// on as if nothing had been: what begins a run is in begin_run().
 void FixInelastic::init()
 {
   check_run();
@@ -174,8 +175,8 @@ void FixInelastic::init()
   // needs them, whatever fixes need.
   if (!force->newton && force->pair)
     force->pair->comm_reverse_off = std::max(force->pair->comm_reverse_off, comm_reverse);
-  // With equal radii the pair style's own list serves, and no second one is built. A list that is of another
-  // kind than the last one is empty until a run is set up.
+  // With equal radii the pair style's own list serves, and no second one is built. A list that is
+  // of another kind than the last one is empty until a run is set up.
   constexpr int NO_RUN = 0;
   if (update->whichflag != NO_RUN) length_.choose_list();
   neighbor->add_request(this,
@@ -194,7 +195,8 @@ void FixInelastic::begin_run()
   begin_summary();
 }
 
-// What the fix was given when it was defined, and may be gone or changed since, also where no run is set up
+// What the fix was given when it was defined, and may be gone or changed since, also where no run
+// is set up
 // (`run pre no`). Collective.
 void FixInelastic::check_scene()
 {
@@ -393,7 +395,8 @@ inelastic::ProjectionResult FixInelastic::solve()
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
     constraints_.overlaps().share();
-    // Beside bad overlaps regular ones are kept where they cannot all be given back in one step, and from then on.
+    // Beside bad overlaps regular ones are kept where they cannot all be given back in one step,
+    // and from then on.
     const bool unsolved = result.status != inelastic::Status::CONVERGED;
     const bool keeps = step_.bad_start && (step_.keeps_overlaps || unsolved);
     if (keeps != step_.keeps_overlaps) {
@@ -410,7 +413,8 @@ inelastic::ProjectionResult FixInelastic::solve()
     if (result.status != inelastic::Status::CONVERGED) {
       const bool no_room = result.status == inelastic::Status::INFEASIBLE;
       if (no_room) unsolved_.note_no_room();
-      // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a shorter one.
+      // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
+      // shorter one.
       if (length_.may_shorten_unsolved() &&
           (no_room || constraints_.relinearised() || unsolved_.law_parts())) {
         length_.shorten(0.5, unsolved_.named());
@@ -454,7 +458,8 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   limits.least_length = std::numeric_limits<double>::epsilon() * length_.smallest_radius();
   // A push is no momentum.
   if (step_.phase == Phase::CONTACT) {
-    // Bodies turn: their constraints are linearised anew in many rounds, of which only the last ones matter.
+    // Bodies turn: their constraints are linearised anew in many rounds, of which only the last
+    // ones matter.
     constexpr double COARSE = 32.0;
     limits.accuracy = settings_.accuracy;
     if (step_.has_bodies) limits.coarseness = COARSE;
@@ -497,9 +502,9 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   constraints_.adapt_margin(length_.reach());
 }
 
-// A shortened time step stays until the next step, which `run pre no` takes with it, and restart files
-// tell the regular one. Restart files and the next run start from the momentum alone. (Of bodies the last
-// step has taken the push out, because fix rigid/small is out of reach here.)
+// A shortened time step stays until the next step, which `run pre no` takes with it, and restart
+// files tell the regular one. Restart files and the next run start from the momentum alone. (Of
+// bodies the last step has taken the push out, because fix rigid/small is out of reach here.)
 void FixInelastic::post_run()
 {
   check_.end_run(constraints_.overlaps().pushes_in_velocity());
@@ -567,8 +572,9 @@ int FixInelastic::size_restart(int i)
 int FixInelastic::maxsize_restart()
 { return state_.largest_restart_size(); }
 
-// A file that is written while a step is shortened holds its time step: the regular one goes along. One of a run
-// with a law names the law, whose memory goes along with the atoms. In other files there is nothing of this fix.
+// A file that is written while a step is shortened holds its time step: the regular one goes along.
+// One of a run with a law names the law, whose memory goes along with the atoms. In other files
+// there is nothing of this fix.
 void FixInelastic::write_restart(FILE *file)
 {
   if (comm->me != 0) return;

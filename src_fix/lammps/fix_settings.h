@@ -21,7 +21,8 @@ struct Settings {
   // EPS, the largest overlap allowed [length]. Too small, it is below the round-off of positions.
   // Velocities are bounded by the accuracy.
   double tolerance = 0.0;
-  // A, the fraction of what contacts change in a step to which the step is solved, where that is below EPS.
+  // A, the fraction of what contacts change in a step to which the step is solved, where that is
+  // below EPS.
   double accuracy = 1.0e-3;
   // The name that make_solver() of the core knows.
   std::string solver = "apgd";
@@ -55,8 +56,8 @@ struct Settings {
 // that are not allowed.
 Settings read_settings(LAMMPS *lmp, int narg, char **arg, int group_bit);
 
-// Reads EPS [length]. Errors: anything but a finite number greater than 0, which the error points to if
-// it knows the argument's index.
+// Reads EPS [length]. Errors: anything but a finite number greater than 0, which the error points
+// to if it knows the argument's index.
 double read_tolerance(LAMMPS *lmp, const char *text, int argument = NO_WORD);
 
 // Reads the accuracy in the same way. Errors: anything but a number greater than 0 and at most 1.

@@ -38,8 +38,8 @@ void GapRules::begin(Side &side, const ContactMemory::Entry &last, int i, int j,
   side.closed_gap = closed_gap(side, last.closed_gap, changes ? 0.0 : CLOSING * side.to_stop);
 }
 
-// The factors by which the loads of two particles have changed that were at rest in the last step, one of them twice
-// beside a wall or a frozen particle; nothing if one was not at rest.
+// The factors by which the loads of two particles have changed that were at rest in the last step,
+// one of them twice beside a wall or a frozen particle; nothing if one was not at rest.
 std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
 {
   const inelastic::ContactProblem &problem = step_.problem;
@@ -52,11 +52,12 @@ std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
   return std::array<double, 2>{one, other};
 }
 
-// [length] A gap under a force is closed where it is, up to half a tolerance: positions are not known better, and
-// what they would give or take in a step would be velocities that nothing gives. Where that adds up along a chain,
-// or differs from step to step, a bed would never be quiet. Beyond it the gap closes, so little that the force stays.
-// When the force goes, the contact is still closed at that gap until the two have parted: what lies on a contact that
-// loses its force for a step does not fall.
+// [length] A gap under a force is closed where it is, up to half a tolerance: positions are not
+// known better, and what they would give or take in a step would be velocities that nothing gives.
+// Where that adds up along a chain, or differs from step to step, a bed would never be quiet.
+// Beyond it the gap closes, so little that the force stays. When the force goes, the contact is
+// still closed at that gap until the two have parted: what lies on a contact that loses its force
+// for a step does not fall.
 double GapRules::closed_gap(const Side &side, double last, double most_closing) const
 {
   const double tolerance = step_.settings.tolerance;
@@ -69,8 +70,8 @@ double GapRules::closed_gap(const Side &side, double last, double most_closing) 
   return parted ? ContactMemory::NOT_CLOSED : std::min(gap, last);
 }
 
-// [length] By how much a contact may close. An overlap of up to half a tolerance counts as closed, too; beyond it
-// it is given back little by little.
+// [length] By how much a contact may close. An overlap of up to half a tolerance counts as closed,
+// too; beyond it it is given back little by little.
 double GapRules::contact_gap(const Side &side) const
 {
   const double gap = side.gap_now;
@@ -78,9 +79,10 @@ double GapRules::contact_gap(const Side &side) const
   return gap - std::max(0.0, side.closed_gap);
 }
 
-// [length] What is given back in the step of an overlap. It begins smoothly, with the accuracy's part of what the
-// contact has to stop where the overlap is 0.8 tolerances. What turning bodies and curved walls leave beyond the
-// tolerance is given back at once: with the next step's it could become a bad start.
+// [length] What is given back in the step of an overlap. It begins smoothly, with the accuracy's
+// part of what the contact has to stop where the overlap is 0.8 tolerances. What turning bodies and
+// curved walls leave beyond the tolerance is given back at once: with the next step's it could
+// become a bad start.
 double GapRules::given_back(const Side &side) const
 {
   constexpr double FULL = 0.8;    // tolerances
@@ -109,8 +111,9 @@ double GapRules::held_gap(const Side &side, double predicted_speed) const
   return std::min(open, most_closed(side, predicted_speed));
 }
 
-// [length] The surfaces of a held contact are brought back to one another by no more than velocities are resolved
-// to, or as fast as they would part: this adds nothing to the kinetic energy.
+// [length] The surfaces of a held contact are brought back to one another by no more than
+// velocities are resolved to, or as fast as they would part: this adds nothing to the kinetic
+// energy.
 double GapRules::most_closed(const Side &side, double predicted_speed) const
 {
   return std::max(step_.settings.accuracy * side.to_stop, step_.problem.timestep * predicted_speed);
@@ -151,7 +154,8 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   inelastic::ContactSet &contacts = step_.problem.contacts;
   constexpr double LEFT = 0.75;    // tolerances
   const double tolerance = step_.settings.tolerance;
-  // Where one has to change, those that are near to it change with it: in a chain each would be the next round's.
+  // Where one has to change, those that are near to it change with it: in a chain each would be the
+  // next round's.
   double allowed = tolerance;
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {

@@ -1,5 +1,5 @@
-// This room decides which gap a constraint asks for: at the start of a step, in a bad start, and where
-// the end of the step differs from the linearised gap because bodies turn or walls curve.
+// This room decides which gap a constraint asks for: at the start of a step, in a bad start, and
+// where the end of the step differs from the linearised gap because bodies turn or walls curve.
 
 #ifndef INELASTIC_GAP_RULES_H
 #define INELASTIC_GAP_RULES_H
@@ -17,52 +17,55 @@ class GapRules {
  public:
   GapRules(Step &step, OverlapWatch &overlaps) : step_(step), overlaps_(overlaps) {}
 
-  // Rounds of a step that may change the gaps of constraints. Each one squares the error where a body
-  // turns little; one that turns by a radian takes up to twenty.
+  // Rounds of a step that may change the gaps of constraints. Each one squares the error where a
+  // body turns little; one that turns by a radian takes up to twenty.
   static constexpr int MAX_RELINEARISATIONS = 40;
-  // The cosine of the angle, 60 degrees, by which a normal may turn in a step for its gap to be made exact.
+  // The cosine of the angle, 60 degrees, by which a normal may turn in a step for its gap to be
+  // made exact.
   static constexpr double LEAST_ALONG = 0.5;
 
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Side &side) const;
 
-  // Takes what is remembered of the contact of particles i and j, and finds the gap at which it is closed, and what
-  // it has to stop in this step: the length by which the two approach one another without contacts, or a tenth of
-  // that by which the force opens the gap, whichever is more. What a position error gives back in a
-  // step is at most the accuracy's part of it, so that it is no more than the errors of velocities.
+  // Takes what is remembered of the contact of particles i and j, and finds the gap at which it is
+  // closed, and what it has to stop in this step: the length by which the two approach one another
+  // without contacts, or a tenth of that by which the force opens the gap, whichever is more. What
+  // a position error gives back in a step is at most the accuracy's part of it, so that it is no
+  // more than the errors of velocities.
   void begin(Side &side, const ContactMemory::Entry &last, int i, int j,
              const double *normal) const;
 
   // The gap [length] of the constraint, the wall's motion in it (contact_set.h).
   double asked_gap(const Side &side) const { return effective_gap(side) - side.wall_motion; }
 
-  // The gap [length] at the end of the step for which the constraint is just met: negative where an overlap
-  // need not be given back in one step, of which at most half a tolerance may be left.
+  // The gap [length] at the end of the step for which the constraint is just met: negative where an
+  // overlap need not be given back in one step, of which at most half a tolerance may be left.
   double wanted_gap(const Side &side) const;
 
-  // Tells whether the end of the step is so deep that the constraint must change. The excess is noted as well:
-  // what starts with a bad overlap may keep it, but not get deeper. It is asked for more, which costs no
-  // shorter step where it is not to be had.
+  // Tells whether the end of the step is so deep that the constraint must change. The excess is
+  // noted as well: what starts with a bad overlap may keep it, but not get deeper. It is asked for
+  // more, which costs no shorter step where it is not to be had.
   bool ends_too_deep(const Side &side, double gap_at_end);
 
-  // Sets the gap of constraint c to one that is exact for the present velocity, or to the linearised one
-  // if that is smaller. One that was set for an earlier velocity is set again, so that no force keeps
-  // apart what has moved on meanwhile, and the step does not depend on how it was found. Returns how many
-  // constraints changed.
+  // Sets the gap of constraint c to one that is exact for the present velocity, or to the
+  // linearised one if that is smaller. One that was set for an earlier velocity is set again, so
+  // that no force keeps apart what has moved on meanwhile, and the step does not depend on how it
+  // was found. Returns how many constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
-  // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the step: the exact
-  // gap there is `gap_at_end`, the velocities open the linearised one by `opening` [length], and `along` is the
-  // cosine of the angle by which the normal turns. Surfaces that turn about one another part, though their
-  // linearised gap stays; they are closed by no more than most_closed(). Where they would overlap, at least the
-  // linearised gap is asked for, which is never more than that of two spheres. Not for bad starts. Returns how
-  // many constraints changed.
+  // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the
+  // step: the exact gap there is `gap_at_end`, the velocities open the linearised one by `opening`
+  // [length], and `along` is the cosine of the angle by which the normal turns. Surfaces that turn
+  // about one another part, though their linearised gap stays; they are closed by no more than
+  // most_closed(). Where they would overlap, at least the linearised gap is asked for, which is
+  // never more than that of two spheres. Not for bad starts. Returns how many constraints changed.
   long hold(std::size_t c, double gap_at_end, double opening, double along);
 
-  // Changes constraints of free spheres that these velocities leave beyond the tolerance, since gaps that count
-  // as closed may be open or overlap: they ask for their present gap, in the case of an overlap first for as much
-  // as leaves most of the tolerance. Returns how many. None where overlaps are kept: in a dense start the spheres
-  // jam for a moment, and cannot all be opened at once.
+  // Changes constraints of free spheres that these velocities leave beyond the tolerance, since
+  // gaps that count as closed may be open or overlap: they ask for their present gap, in the case
+  // of an overlap first for as much as leaves most of the tolerance. Returns how many. None where
+  // overlaps are kept: in a dense start the spheres jam for a moment, and cannot all be opened at
+  // once.
   long keep_within_tolerance(const std::vector<double> &velocity);
 
   OverlapWatch &overlaps() { return overlaps_; }

@@ -1,5 +1,5 @@
-// Ranks talk to one another here: the forward and reverse communication of ghosts that the core's solvers
-// need (host.h), global sums and maxima, and errors, which all ranks give together.
+// Ranks talk to one another here: the forward and reverse communication of ghosts that the core's
+// solvers need (host.h), global sums and maxima, and errors, which all ranks give together.
 
 #ifndef INELASTIC_GHOST_EXCHANGE_H
 #define INELASTIC_GHOST_EXCHANGE_H
@@ -43,7 +43,8 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override;
   bool has_ghosts() const override;
 
-  // Gives an owned atom and all its ghosts the least of their values, 3 numbers per particle. Collective.
+  // Gives an owned atom and all its ghosts the least of their values, 3 numbers per particle.
+  // Collective.
   void least_over_ghosts(double *per_particle);
 
   // Adds to each owned atom the contacts that its ghosts remember.
@@ -55,8 +56,8 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   int pack_reverse(int n, int first, double *buffer);
   void unpack_reverse(int n, const int *list, const double *buffer);
 
-  // Collective: an error of all ranks, with the message of the first rank that has one; nothing if all
-  // messages are empty.
+  // Collective: an error of all ranks, with the message of the first rank that has one; nothing if
+  // all messages are empty.
   void fail_together(const std::string &message);
 
   // Collective: the text of one of the ranks.

@@ -10,10 +10,11 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-// What moves was solved for: only what ends deeper by so many tolerances, because something is at rest, is to be
-// changed.
+// What moves was solved for: only what ends deeper by so many tolerances, because something is at
+// rest, is to be changed.
 constexpr double DEEPER = 0.1;
-// Where more iterations would be needed, what moves has no room beside what is at rest: nothing is stopped in the step.
+// Where more iterations would be needed, what moves has no room beside what is at rest: nothing is
+// stopped in the step.
 constexpr long MOST_ITERATIONS = 2000;
 
 }    // namespace
@@ -72,8 +73,8 @@ long HoldStill::run(const std::vector<char> &stopped, const std::function<long()
   return iterations;
 }
 
-// Projects the velocities of the step with the marked particles as obstacles; changes nothing if it does not
-// converge.
+// Projects the velocities of the step with the marked particles as obstacles; changes nothing if it
+// does not converge.
 inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
 {
   const inelastic::ContactProblem &problem = step_.problem;

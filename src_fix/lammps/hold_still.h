@@ -1,5 +1,6 @@
-// This room takes the velocities of particles at rest away (rest.h). What moves beside them was solved for with these
-// velocities: it is projected once more, with the particles at rest as obstacles, so that nothing moves into them.
+// This room takes the velocities of particles at rest away (rest.h). What moves beside them was
+// solved for with these velocities: it is projected once more, with the particles at rest as
+// obstacles, so that nothing moves into them.
 
 #ifndef INELASTIC_HOLD_STILL_H
 #define INELASTIC_HOLD_STILL_H
@@ -21,10 +22,11 @@ class HoldStill {
   // `bodies` is null in a scene of free spheres.
   HoldStill(Step &step, GhostExchange &ranks, RigidMotion *bodies);
 
-  // Changes velocities and impulses of the step, which is solved. The marks are one per particle, those of ghosts
-  // are not read; of a body any marked member will do. `add_violated` adds constraints that the step's velocities
-  // violate, and returns how many all ranks added. Returns the number of iterations that it took. Where what moves
-  // finds no room nothing is changed. Collective.
+  // Changes velocities and impulses of the step, which is solved. The marks are one per particle,
+  // those of ghosts are not read; of a body any marked member will do. `add_violated` adds
+  // constraints that the step's velocities violate, and returns how many all ranks added. Returns
+  // the number of iterations that it took. Where what moves finds no room nothing is changed.
+  // Collective.
   long run(const std::vector<char> &stopped, const std::function<long()> &add_violated);
 
  private:

@@ -45,7 +45,8 @@ __attribute__((visibility("default"))) void lammpsplugin_init(void *, void *, vo
 // LAMMPS's library has this function; a program without the library may not.
 __attribute__((weak)) int lammps_extract_setting(void *, const char *);
 
-// Plugins with contact laws find this function here: LAMMPS loads plugins so that they see one another.
+// Plugins with contact laws find this function here: LAMMPS loads plugins so that they see one
+// another.
 __attribute__((visibility("default"))) void
 inelastic_add_contact_law(void *lammps, int version, const char *name, inelastic::MakeLaw make)
 {
@@ -71,9 +72,10 @@ Fix *create_fix_random_force(LAMMPS *lmp, int narg, char **arg)
 Command *create_parameters(LAMMPS *lmp)
 { return new Parameters(lmp); }
 
-// What tells the LAMMPS that runs from the one for which the plugin was built; empty if they may be the
-// same. The classes that plugins share with LAMMPS change their layout even within a release: two updates
-// that both print one date do not fit together. The git descriptor tells them apart, where it is known.
+// What tells the LAMMPS that runs from the one for which the plugin was built; empty if they may be
+// the same. The classes that plugins share with LAMMPS change their layout even within a release:
+// two updates that both print one date do not fit together. The git descriptor tells them apart,
+// where it is known.
 std::string foreign_to(LAMMPS *lmp)
 {
   const char *const built = INELASTIC_LAMMPS_BUILD, *const date = INELASTIC_LAMMPS_DATE;

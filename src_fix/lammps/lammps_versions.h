@@ -1,5 +1,6 @@
-// What differs between the releases of LAMMPS for which these sources compile: errors that point to a word of
-// the input and the arguments of `minimum_image` are of 2025, a description of a variable is of 2024.
+// What differs between the releases of LAMMPS for which these sources compile: errors that point to
+// a word of the input and the arguments of `minimum_image` are of 2025, a description of a variable
+// is of 2024.
 
 #ifndef INELASTIC_LAMMPS_VERSIONS_H
 #define INELASTIC_LAMMPS_VERSIONS_H
@@ -15,8 +16,8 @@
 
 namespace LAMMPS_NS {
 
-// The places in the input to which an error may point beside the index of an argument: none, and not even
-// the last line that was read. `points` tells whether this release takes them.
+// The places in the input to which an error may point beside the index of an argument: none, and
+// not even the last line that was read. `points` tells whether this release takes them.
 template <typename E, typename = void> struct PlaceOfError {
   static constexpr bool points = false;
   static constexpr int nowhere = 0, no_line = 0;
@@ -29,7 +30,8 @@ struct PlaceOfError<E, std::void_t<decltype(E::NOPOINTER), decltype(E::NOLASTLIN
 constexpr int NO_WORD = PlaceOfError<Error>::nowhere;
 constexpr int NO_LINE = PlaceOfError<Error>::no_line;
 
-// Ends all ranks with an error that points to the place, where this release can. Call it with FLERR.
+// Ends all ranks with an error that points to the place, where this release can. Call it with
+// FLERR.
 template <typename E, typename... Values>
 [[noreturn]] void error_at(E *error, const char *file, int line, int place,
                            const std::string &format, Values &&...values)
@@ -60,8 +62,8 @@ struct Description<I, std::void_t<decltype(std::declval<I>().get_variable_info(0
   static std::string of_variable(I &info, int variable) { return info.get_variable_info(variable); }
 };
 
-// Returns the text about a variable that `info variables` prints: its name, "style = ...," and behind
-// "def =" its values. It is empty in releases that cannot tell.
+// Returns the text about a variable that `info variables` prints: its name, "style = ...," and
+// behind "def =" its values. It is empty in releases that cannot tell.
 inline std::string description_of_variable(LAMMPS *lmp, int variable)
 {
   Info info(lmp);

@@ -28,7 +28,8 @@ const LawMemory::Entry *LawContacts::find(int i, tagint partner, const double *n
                                           double size) const
 {
   constexpr double PARTED = 0.1;    // of the sum of radii
-  // Nothing has moved since the last step when a run starts, in which the surfaces may have collided from afar.
+  // Nothing has moved since the last step when a run starts, in which the surfaces may have
+  // collided from afar.
   if (step_.kick == Kick::WHOLE && gap > PARTED * size) return nullptr;
   return memory_.find(i, partner, normal);
 }
@@ -54,8 +55,8 @@ void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *no
   Demand &demand = contact.demand;
   demand = step_.settings.law->ask(state, contact.remembered.data());
   demand.least_impulse = std::min(0.0, demand.least_impulse + taken_before(contact));
-  // The velocities at the start of a run are half way through a collision of the last step, if they are
-  // those with which it ended. (Spheres of bodies turn a little.)
+  // The velocities at the start of a run are half way through a collision of the last step, if they
+  // are those with which it ended. (Spheres of bodies turn a little.)
   constexpr double SAME = 0.05;
   if (is_repeated(contact) && last->demand.parts &&
       std::abs(speed_before - last->speed) <= SAME * last->demand.parting_speed) {
@@ -78,8 +79,8 @@ void LawContacts::take_impulses()
                                                 contact.remembered.data());
 }
 
-// In the half kick with which a run starts velocities are at the end of the last step already; the next run
-// may start with the same half kick.
+// In the half kick with which a run starts velocities are at the end of the last step already; the
+// next run may start with the same half kick.
 LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawContact &contact,
                                        tagint partner) const
 {
@@ -110,7 +111,8 @@ bool LawContacts::is_pushed_apart(std::size_t c) const
   return gap > REGULAR_OVERLAP * step_.settings.tolerance;
 }
 
-// Both atoms of a contact remember it: a partner that remembers nothing is another one with the same ID.
+// Both atoms of a contact remember it: a partner that remembers nothing is another one with the
+// same ID.
 void LawContacts::follow_ids(const Atom *atom, MPI_Comm world)
 {
   std::vector<tagint> mine;    // the IDs then and now of each atom, one after the other

@@ -1,6 +1,6 @@
-// What the contact law remembers of contacts, kept per atom so that it follows the atoms through neighbour
-// list rebuilds, from rank to rank and into restart files. It is physics and must not be lost, unlike the
-// first guesses of contact_memory.h. Both atoms of a contact have a copy.
+// What the contact law remembers of contacts, kept per atom so that it follows the atoms through
+// neighbour list rebuilds, from rank to rank and into restart files. It is physics and must not be
+// lost, unlike the first guesses of contact_memory.h. Both atoms of a contact have a copy.
 
 #ifndef INELASTIC_LAW_MEMORY_H
 #define INELASTIC_LAW_MEMORY_H
@@ -22,8 +22,8 @@ class LawMemory {
     std::array<double, 3> normal;    // unit vector from the partner to this atom
     inelastic::Demand demand;        // in the last step
     double impulse;                  // [mass length / time] in the last step, as of a whole kick
-    // [length / time] with which the surfaces part at the end of that step, where LAMMPS's velocities are the
-    // mean of those before and after; without that of a wall
+    // [length / time] with which the surfaces part at the end of that step, where LAMMPS's
+    // velocities are the mean of those before and after; without that of a wall
     double speed;
     std::array<double, inelastic::ContactLaw::MOST_REMEMBERED> remembered;
   };
@@ -37,18 +37,18 @@ class LawMemory {
     owner_[to] = owner_[from];
   }
 
-  // Partners are known by the IDs that atoms have when they remember: commands between runs can give them
-  // others (delete_atoms does). Therefore an atom keeps the one that it had.
+  // Partners are known by the IDs that atoms have when they remember: commands between runs can
+  // give them others (delete_atoms does). Therefore an atom keeps the one that it had.
   void set_owner(int atom, tagint id) { owner_[atom] = id; }
   tagint owner(int atom) const { return owner_[atom]; }
 
-  // Gives the partners of an atom the IDs that they have now. What is remembered of partners that are not
-  // there is forgotten.
+  // Gives the partners of an atom the IDs that they have now. What is remembered of partners that
+  // are not there is forgotten.
   void rename_partners(int atom, const std::unordered_map<tagint, tagint> &id_now);
 
-  // Returns the contact with a partner that lies on the side of the normal; nullptr if there is none. (Two
-  // contacts with one partner are on different sides: through two periodic boundaries, or in the tip of a
-  // cone.)
+  // Returns the contact with a partner that lies on the side of the normal; nullptr if there is
+  // none. (Two contacts with one partner are on different sides: through two periodic boundaries,
+  // or in the tip of a cone.)
   const Entry *find(int atom, tagint partner, const double *normal) const;
 
   // Tells whether something is remembered of a wall.

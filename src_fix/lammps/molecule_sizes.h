@@ -1,5 +1,5 @@
-// A MoleculeSizes knows how many spheres the body of each molecule has, over all ranks. Every rank knows
-// all molecules; what that costs depends on their number, not on how large their IDs are.
+// A MoleculeSizes knows how many spheres the body of each molecule has, over all ranks. Every rank
+// knows all molecules; what that costs depends on their number, not on how large their IDs are.
 
 #ifndef INELASTIC_MOLECULE_SIZES_H
 #define INELASTIC_MOLECULE_SIZES_H

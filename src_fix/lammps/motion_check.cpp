@@ -97,8 +97,9 @@ std::string MotionCheck::not_finite() const
   return "";
 }
 
-// Without a setup the next step follows from the last one's forces: it lacks what the end of the run has
-// taken out of the velocities, or what somebody has changed since. Empty if that is nothing.
+// Without a setup the next step follows from the last one's forces: it lacks what the end of the
+// run has taken out of the velocities, or what somebody has changed since. Empty if that is
+// nothing.
 std::string MotionCheck::break_in_run()
 {
   first_without_setup_ = false;

@@ -30,18 +30,19 @@ class MotionCheck : protected Pointers {
   void begin_run();
   // At the start of a run, when its box is set up.
   void set_up();
-  // `pushing`: the last step pushed spheres apart, and the run's end has taken that out of velocities.
+  // `pushing`: the last step pushed spheres apart, and the run's end has taken that out of
+  // velocities.
   void end_run(bool pushing);
 
   // Tells whether the next step is the first of a run that is not set up (`run pre no`).
   bool goes_on_without_setup() const { return step_.continues && !goes_on_; }
 
-  // Before a step. Errors: velocities or forces that are no numbers, a box that has changed, atoms that
-  // did not move as predicted. Collective.
+  // Before a step. Errors: velocities or forces that are no numbers, a box that has changed, atoms
+  // that did not move as predicted. Collective.
   void before_step();
 
-  // This is called after a step: it notes which atoms are in the group, and how large, and that there is
-  // a prediction. The largest change [velocity] is that which one of the contacts made.
+  // This is called after a step: it notes which atoms are in the group, and how large, and that
+  // there is a prediction. The largest change [velocity] is that which one of the contacts made.
   void after_step(double largest_change);
 
  private:

@@ -7,12 +7,12 @@ namespace LAMMPS_NS {
 
 class Mover {
  public:
-  // Sets the predicted velocities of the step's problem, ghosts included: those that the step would end
-  // with if there were no contacts. Collective.
+  // Sets the predicted velocities of the step's problem, ghosts included: those that the step would
+  // end with if there were no contacts. Collective.
   virtual void predict() = 0;
 
-  // Adds forces to LAMMPS's, so that the next move is the projected one, and keeps what the next step and
-  // its check need. `contact_force` is 3 per particle.
+  // Adds forces to LAMMPS's, so that the next move is the projected one, and keeps what the next
+  // step and its check need. `contact_force` is 3 per particle.
   virtual void apply(const double *contact_force) = 0;
 
  protected:

@@ -23,15 +23,17 @@ using inelastic::norm;
 
 namespace {
 
-// A particle may move farther in a round than was allowed for by half of this part of the largest radius,
-// before the list is searched again. (With a fifth of it spheres that are shaken do so in most steps.)
+// A particle may move farther in a round than was allowed for by half of this part of the largest
+// radius, before the list is searched again. (With a fifth of it spheres that are shaken do so in
+// most steps.)
 constexpr double NEAR = 1.0;
 
 // A coordinate in single precision is off by at most this part of it; so are sums of a few.
 constexpr float SINGLE = 4.0f * std::numeric_limits<float>::epsilon();
 
-// Tells whether the distance at the end of the step, linearised, |a| + h a.o / |a|, is more than `reach` > 0,
-// for a = `away` and o = `opening`, the relative velocity. It takes no root for pairs of the list.
+// Tells whether the distance at the end of the step, linearised, |a| + h a.o / |a|, is more than
+// `reach` > 0, for a = `away` and o = `opening`, the relative velocity. It takes no root for pairs
+// of the list.
 bool ends_beyond(double reach, const double *away, double h, const double *opening)
 {
   const double square = dot(away, away);
@@ -57,9 +59,10 @@ void PairConstraints::note_motion(const std::vector<double> &velocity)
     motion_[i] = std::max(motion_[i], h * norm(&velocity[3 * i]));
 }
 
-// Two particles whose distance is above the sum of their ranges can neither touch at the end of the step
-// nor be nearer than `widest_`, though they may move by half of `widest_` more than was known. The ranges
-// are in single precision so that a particle takes 16 bytes: the search is bound by the memory.
+// Two particles whose distance is above the sum of their ranges can neither touch at the end of the
+// step nor be nearer than `widest_`, though they may move by half of `widest_` more than was known.
+// The ranges are in single precision so that a particle takes 16 bytes: the search is bound by the
+// memory.
 void PairConstraints::search_list()
 {
   const double *const *const x = atom->x;
@@ -184,7 +187,8 @@ void PairConstraints::take(std::size_t slot, int i, int j)
   step_.sides.push_back(side);
 }
 
-// A pair that the contact law remembers is in the problem even if it is farther apart than others in it.
+// A pair that the contact law remembers is in the problem even if it is farther apart than others
+// in it.
 bool PairConstraints::is_remembered(int i, int j) const
 {
   const double *const xi = atom->x[i];
@@ -270,8 +274,8 @@ long PairConstraints::relinearise()
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
     const bool too_deep = rules_.ends_too_deep(side, gap);
-    // A push is to move no contact, but it may turn a held pair back, and the gap that made room for its turning
-    // would be an overlap.
+    // A push is to move no contact, but it may turn a held pair back, and the gap that made room
+    // for its turning would be an overlap.
     const bool follows = step_.phase == Phase::CONTACT || gap < -step_.settings.tolerance;
     if (may_hold && follows && !rules_.overlaps().is_bad(side.gap_now)) {
       const double along = dot(&contacts.normal[3 * c], away) / norm(away);

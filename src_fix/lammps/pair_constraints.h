@@ -1,5 +1,6 @@
-// The constraints between pairs of spheres: which pairs of the neighbour list are in the problem, from
-// the start or because a solution would let them overlap, and how turning bodies change their gaps.
+// The constraints between pairs of spheres: which pairs of the neighbour list are in the problem,
+// from the start or because a solution would let them overlap, and how turning bodies change their
+// gaps.
 
 #ifndef INELASTIC_PAIR_CONSTRAINTS_H
 #define INELASTIC_PAIR_CONSTRAINTS_H
@@ -31,16 +32,17 @@ class PairConstraints : protected Pointers {
   // Takes the pairs that come nearer than `margin` [length] with the predicted velocities.
   void collect(double margin);
 
-  // Takes more pairs, those that overlap by more than the tolerance at the end of the step. Returns how
-  // many.
+  // Takes more pairs, those that overlap by more than the tolerance at the end of the step. Returns
+  // how many.
   long add_violated();
 
-  // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The distance
-  // between turning bodies is not convex. The length that the end of the step lacks beside the linearised
-  // gap is put into the gap of the constraint; where the end has more, nothing changes. The normal stays
-  // that of the positions from which the force acts: along any other, two opposite forces would be a
-  // couple, and angular momentum would not be kept. The lacking length is made up along the normal, hence
-  // the division by a cosine. Returns how many constraints changed.
+  // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The
+  // distance between turning bodies is not convex. The length that the end of the step lacks beside
+  // the linearised gap is put into the gap of the constraint; where the end has more, nothing
+  // changes. The normal stays that of the positions from which the force acts: along any other, two
+  // opposite forces would be a couple, and angular momentum would not be kept. The lacking length
+  // is made up along the normal, hence the division by a cosine. Returns how many constraints
+  // changed.
   long relinearise();
 
  private:
@@ -67,9 +69,9 @@ class PairConstraints : protected Pointers {
   const RigidMotion *bodies_;
   NeighList *list_ = nullptr;
   std::vector<char> taken_;    // per pair of the neighbour list: whether it is in the problem
-  // The list reaches as far as the fastest particles go, so that most of its pairs are far apart. One
-  // search of a step finds those that may meet; later rounds look at these alone, as long as no particle
-  // goes much farther.
+  // The list reaches as far as the fastest particles go, so that most of its pairs are far apart.
+  // One search of a step finds those that may meet; later rounds look at these alone, as long as no
+  // particle goes much farther.
   std::vector<Candidate> candidates_;    // in the order of the list
   double widest_ = 0.0;    // [length] between surfaces at the end of the step: no farther ones
   std::vector<double>

@@ -30,8 +30,8 @@ constexpr char LIST[] = "parameters";
 constexpr char IS_FILE[] = "_is_file";
 constexpr std::size_t LONGEST_SHOWN = 100;
 
-// Dumps and restart files give * and % a meaning, the functions of variables the comma, input scripts and
-// the shell the others.
+// Dumps and restart files give * and % a meaning, the functions of variables the comma, input
+// scripts and the shell the others.
 constexpr char NOT_IN_FILES[] = "\"'`$&#";
 constexpr char NOT_IN_FOLDERS[] = "\"'`$&#*?%{}()[]~;<>|\\!,";
 
@@ -56,7 +56,8 @@ bool is_integer(const std::string &text)
   return are_digits(at) && !*at;
 }
 
-// A number is what LAMMPS understands everywhere as one: `if` knows neither a leading + nor hexadecimals.
+// A number is what LAMMPS understands everywhere as one: `if` knows neither a leading + nor
+// hexadecimals.
 bool is_number(const std::string &text)
 {
   const char *at = text.c_str();

@@ -1,4 +1,5 @@
-// This clock tells where the time of the projections goes, phase by phase, for the summary of a run.
+// This clock tells where the time of the projections goes, phase by phase, for the summary of a
+// run.
 
 #ifndef INELASTIC_PHASE_CLOCK_H
 #define INELASTIC_PHASE_CLOCK_H

@@ -1,5 +1,5 @@
-// The keyword record: the contact problem of a step, as it was solved, in a file of NumPy's. The page
-// docs/reference/record.md lists the arrays.
+// The keyword record: the contact problem of a step, as it was solved, in a file of NumPy's. The
+// page docs/reference/record.md lists the arrays.
 
 #ifndef INELASTIC_PROBLEM_RECORD_H
 #define INELASTIC_PROBLEM_RECORD_H

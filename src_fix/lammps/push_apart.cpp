@@ -10,7 +10,8 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-// All overlaps may not be had opened at once: spheres jam for a moment. Then so much less is asked for.
+// All overlaps may not be had opened at once: spheres jam for a moment. Then so much less is asked
+// for.
 constexpr double LESS = 0.25;
 
 // Both projections of a step as one result.
@@ -26,8 +27,8 @@ void add(inelastic::ProjectionResult &result, const inelastic::ProjectionResult 
 
 }    // namespace
 
-// Sets the contacts back to those of the first projection. What earlier trials have found stays: it is known to be in
-// the problem, and nobody would find it again.
+// Sets the contacts back to those of the first projection. What earlier trials have found stays: it
+// is known to be in the problem, and nobody would find it again.
 void PushApart::begin_trial(const inelastic::ContactSet &contacts)
 {
   inelastic::ContactSet &present = step_.problem.contacts;

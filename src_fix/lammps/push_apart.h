@@ -1,5 +1,5 @@
-// The way out of a bad start, overlaps beyond the regular ones: the smallest motion, added to the step's
-// but not kept as momentum, that takes the spheres apart at a bounded speed.
+// The way out of a bad start, overlaps beyond the regular ones: the smallest motion, added to the
+// step's but not kept as momentum, that takes the spheres apart at a bounded speed.
 
 #ifndef INELASTIC_PUSH_APART_H
 #define INELASTIC_PUSH_APART_H
@@ -26,8 +26,9 @@ class PushApart {
   {
   }
 
-  // Changes the velocities of the step, which were projected with bad overlaps counted as touching. The
-  // predicted velocities become those without the push. Adds the second projection to the result.
+  // Changes the velocities of the step, which were projected with bad overlaps counted as touching.
+  // The predicted velocities become those without the push. Adds the second projection to the
+  // result.
   void run(const Atom *atom, inelastic::ProjectionResult &result, const Project &project);
 
  private:

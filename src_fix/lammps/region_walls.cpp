@@ -20,8 +20,8 @@ namespace {
 constexpr double OFF_AXIS[3] = {1.0e-12, 0.7e-12, 0.4e-12};
 constexpr double EVERYTHING = 1.0e300;    // a reach that no wall exceeds
 
-// LAMMPS marks a union of parts that rotate as rotating itself, by an angle and about a point that it
-// never sets.
+// LAMMPS marks a union of parts that rotate as rotating itself, by an angle and about a point that
+// it never sets.
 void let_only_parts_move(Region *region)
 {
   if (!region->reglist) return;
@@ -117,9 +117,9 @@ void RegionWalls::view(const std::vector<Viewpoint> &viewpoints, bool inexact_on
   }
 }
 
-// What LAMMPS shows of a region from a point, and within reach of it. To points outside a cone whose
-// radius is a variable it shows nothing beyond the largest radius at first and the reach: it is given
-// a longer one.
+// What LAMMPS shows of a region from a point, and within reach of it. To points outside a cone
+// whose radius is a variable it shows nothing beyond the largest radius at first and the reach: it
+// is given a longer one.
 void RegionWalls::look(Region *region, const double *x, double reach, Contacts &found) const
 {
   found.clear();
@@ -138,8 +138,8 @@ void RegionWalls::look(Region *region, const double *x, double reach, Contacts &
     for (Contact &contact : found) correct_cap(region, x, contact);
 }
 
-// The walls of the parts of a union or an intersection, as LAMMPS chooses and numbers them. It would
-// choose by the uncorrected vectors to the caps of cones.
+// The walls of the parts of a union or an intersection, as LAMMPS chooses and numbers them. It
+// would choose by the uncorrected vectors to the caps of cones.
 void RegionWalls::look_at_parts(Region *joined, const double *x, double reach,
                                 Contacts &found) const
 {

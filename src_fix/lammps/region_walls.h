@@ -30,8 +30,8 @@ class RegionWalls : protected Pointers {
  public:
   RegionWalls(class LAMMPS *lmp, std::vector<std::string> region_ids);
 
-  // Finds the regions and numbers their walls. Errors: a region that does not exist, or one of which
-  // LAMMPS shows walls wrong.
+  // Finds the regions and numbers their walls. Errors: a region that does not exist, or one of
+  // which LAMMPS shows walls wrong.
   void init();
 
   bool empty() const { return ids_.empty(); }
@@ -51,21 +51,21 @@ class RegionWalls : protected Pointers {
     int atom;
     double where[3];
     double reach;
-    // Add this [length] to `where` for the place itself: across a periodic boundary the walls of the
-    // other side are seen, from there.
+    // Add this [length] to `where` for the place itself: across a periodic boundary the walls of
+    // the other side are seen, from there.
     double image[3] = {};
   };
 
   // Calls found(viewpoint, view) for every wall within reach. outside(viewpoint, region) is called
   // instead for a centre that lies on the wrong side of a region, from where LAMMPS sees no wall.
-  // `inexact_only` leaves out the regions whose constraints are exact. Collective (variables of moving
-  // regions).
+  // `inexact_only` leaves out the regions whose constraints are exact. Collective (variables of
+  // moving regions).
   void view(const std::vector<Viewpoint> &viewpoints, bool inexact_only,
             const std::function<void(const Viewpoint &, const WallView &)> &found,
             const std::function<void(const Viewpoint &, const std::string &region)> &outside);
 
-  // Calls `found` for every wall of a moving region within reach where the wall stands now, whatever
-  // it does in the step. Collective.
+  // Calls `found` for every wall of a moving region within reach where the wall stands now,
+  // whatever it does in the step. Collective.
   void view_moving_now(const std::vector<Viewpoint> &viewpoints,
                        const std::function<void(const Viewpoint &, const WallView &)> &found);
 

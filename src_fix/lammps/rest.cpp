@@ -18,27 +18,30 @@ namespace {
 
 // A particle is held if contacts resist its motion by this part of its unit.
 constexpr double HELD = 0.1;
-// A cluster is quiet if the root mean square of its held particles' speeds is at most this part of the mean speed
-// that they would have without contacts, and its motion as a whole this part of what resists it.
+// A cluster is quiet if the root mean square of its held particles' speeds is at most this part of
+// the mean speed that they would have without contacts, and its motion as a whole this part of what
+// resists it.
 constexpr double QUIET = 0.1;
 // So many quiet steps come first: a force that nothing balances would show.
 constexpr double PATIENCE = 8.0;
-// For so many steps held particles are stopped and contacts are solved more accurately. In the last of them
-// velocities are what forces make that do not balance.
+// For so many steps held particles are stopped and contacts are solved more accurately. In the last
+// of them velocities are what forces make that do not balance.
 constexpr double TRIAL = 4.0;
-// The part of the accuracy to which they are solved then. The residuals of a bed, which is isostatic, make
-// velocities of some fifty times their size.
+// The part of the accuracy to which they are solved then. The residuals of a bed, which is
+// isostatic, make velocities of some fifty times their size.
 constexpr double REFINED = 1.0 / 4.0;
 // After a trial in which something held moved the next one comes so many quiet steps later.
 constexpr double PAUSE = 50.0;
-// What is at rest is no faster than so many accuracies, of a finer one where the accuracy is coarse.
+// What is at rest is no faster than so many accuracies, of a finer one where the accuracy is
+// coarse.
 constexpr double AT_REST = 5.0;
 constexpr double COARSEST_ACCURACY = 1.0e-3;
-// A cluster moves if it is faster than this part of what it would be without contacts, whatever resists it.
+// A cluster moves if it is faster than this part of what it would be without contacts, whatever
+// resists it.
 constexpr double ROUND_OFF = 1.0e-12;
 
-// Solves A x = b for a symmetric matrix A >= 0, given as xx yy zz xy xz yz, that has no inverse where particles
-// lie in a line or are one: what is below `size` times round-off counts as none.
+// Solves A x = b for a symmetric matrix A >= 0, given as xx yy zz xy xz yz, that has no inverse
+// where particles lie in a line or are one: what is below `size` times round-off counts as none.
 void solve_symmetric(const double *a, double size, const double *b, double *x)
 {
   constexpr double ROUNDED = 1.0e-10;
@@ -83,8 +86,9 @@ void Rest::compare_loads()
 
 bool Rest::look(const inelastic::ProjectionResult &result)
 {
-  // What a shortened step, or one that pushes spheres apart, ends with is no rest. Uzawa starts every step from no
-  // forces at all: rest would save it nothing. Without atoms there are no bodies, either.
+  // What a shortened step, or one that pushes spheres apart, ends with is no rest. Uzawa starts
+  // every step from no forces at all: rest would save it nothing. Without atoms there are no
+  // bodies, either.
   looks_ = step_.settings.rest && step_.settings.solver != "uzawa" && step_.largest_radius > 0.0 &&
       step_.problem.timestep == step_.regular_timestep && !step_.bad_start &&
       result.status == inelastic::Status::CONVERGED;
@@ -130,8 +134,8 @@ double Rest::limit() const
 bool Rest::counts(int i) const
 { return step_.in_group(atom, i) && clusters_.of(i) != Clusters::NONE; }
 
-// Adds up what contacts resist of the motion of each particle, and counts the gaps that they have still to close,
-// ghosts included.
+// Adds up what contacts resist of the motion of each particle, and counts the gaps that they have
+// still to close, ghosts included.
 void Rest::measure_resistance()
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
@@ -183,7 +187,8 @@ Rest::Motion Rest::motion_of(int i) const
 double Rest::unit(int i, const Motion &motion) const
 { return std::min(motion.taken, motions_[clusters_.of(i)].without_contacts); }
 
-// What does not move is held as far as it is pressed. What still closes a gap is not: a force would stay across it.
+// What does not move is held as far as it is pressed. What still closes a gap is not: a force would
+// stay across it.
 bool Rest::is_held(int i, const Motion &motion) const
 { return !motion.closes && (motion.speed == 0.0 || motion.resisted >= HELD * unit(i, motion)); }
 
@@ -233,7 +238,8 @@ void Rest::measure_clusters()
     if (!(s[MASS] > 0.0)) continue;
     cluster.mass = s[MASS];
     cluster.without_contacts = s[SPEEDS] / s[NUMBER];
-    // Of most of its particles: single ones that come to it, and have not been quiet, do not begin the count anew.
+    // Of most of its particles: single ones that come to it, and have not been quiet, do not begin
+    // the count anew.
     cluster.quiet_steps = std::round(s[STEPS] / s[NUMBER]);
     cluster.supported = m[SUPPORTED] > 0.0;
     cluster.driven = m[DRIVEN] > 0.0;
@@ -262,7 +268,8 @@ void Rest::measure_clusters()
   }
 }
 
-// What needs the motion of the clusters: what resists it, and how fast held particles are beside it.
+// What needs the motion of the clusters: what resists it, and how fast held particles are beside
+// it.
 void Rest::measure_clusters_by_motion()
 {
   const inelastic::ContactProblem &problem = step_.problem;

@@ -1,22 +1,25 @@
-// This room tells which particles are at rest: those that their own contacts hold, in a cluster (clusters.h) whose
-// motion is nothing but errors of the solver. Their velocities are taken away, the contact forces of one step
-// solve the next one without an iteration, and this lasts until something changes.
+// This room tells which particles are at rest: those that their own contacts hold, in a cluster
+// (clusters.h) whose motion is nothing but errors of the solver. Their velocities are taken away,
+// the contact forces of one step solve the next one without an iteration, and this lasts until
+// something changes.
 //
 // A velocity of particle i [length / time] is small if it is small beside
 //
-//   u_i = min(what contacts change of its velocity, the mean speed that the particles of the cluster would have
-//         without contacts)
+//   u_i = min(what contacts change of its velocity, w)
 //
-// The particle is held if contacts resist its motion: if the sum of lambda (n . v)^2 over its contacts is at least
-// a tenth of u_i m v^2, and if none of them has still to close a gap. Others, which slide, roll or fly, keep their
-// velocities. A cluster is quiet if it is supported by something that does not move, its held particles move little,
-// and contacts with walls and frozen particles resist its motion as a whole: its velocity and angular velocity, as if
-// it were one rigid body.
+// w is the mean speed that the particles of the cluster would have without contacts.
+// The particle is held if contacts resist its motion: if the sum of lambda (n . v)^2 over its
+// contacts is at least a tenth of u_i m v^2, and if none of them has still to close a gap. Others,
+// which slide, roll or fly, keep their velocities. A cluster is quiet if it is supported by
+// something that does not move, its held particles move little, and contacts with walls and frozen
+// particles resist its motion as a whole: its velocity and angular velocity, as if it were one
+// rigid body.
 //
-// After some quiet steps, those of most of its particles, the held particles are stopped, and some steps are solved more accurately. If nothing held
-// then moves, the forces balance and the cluster is at rest; if not it goes on, and is looked at again later. A
-// cluster at rest in which something would move is solved more accurately, too, before it is let go. Where the loads
-// of a cluster at rest all change by one factor, its contact forces do.
+// After some quiet steps, those of most of its particles, the held particles are stopped, and some
+// steps are solved more accurately. If nothing held then moves, the forces balance and the cluster
+// is at rest; if not it goes on, and is looked at again later. A cluster at rest in which something
+// would move is solved more accurately, too, before it is let go. Where the loads of a cluster at
+// rest all change by one factor, its contact forces do.
 
 #ifndef INELASTIC_REST_H
 #define INELASTIC_REST_H
@@ -39,16 +42,18 @@ class Rest : protected Pointers {
  public:
   Rest(class LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state);
 
-  // Looks at a step that is predicted: finds by what factors the loads of particles at rest have changed. Collective.
+  // Looks at a step that is predicted: finds by what factors the loads of particles at rest have
+  // changed. Collective.
   void compare_loads();
 
-  // Looks at a step that is solved. Returns whether it is to be solved once more, with refined contacts, which are
-  // marked in the problem; it is then looked at again. Collective.
+  // Looks at a step that is solved. Returns whether it is to be solved once more, with refined
+  // contacts, which are marked in the problem; it is then looked at again. Collective.
   bool look(const inelastic::ProjectionResult &result);
   void look_again();
 
-  // Decides after that which particles are stopped in the step, one mark per particle. Returns whether any is, on
-  // any rank, and notes in the step whether the whole scene is at rest. Collective.
+  // Decides after that which particles are stopped in the step, one mark per particle. Returns
+  // whether any is, on any rank, and notes in the step whether the whole scene is at rest.
+  // Collective.
   bool decide(std::vector<char> &stopped);
 
  private:
@@ -93,8 +98,8 @@ class Rest : protected Pointers {
   GhostExchange &ranks_;
   AtomState &state_;
   Clusters clusters_;
-  std::vector<double>
-      resistance_;    // 3 per particle: the sum of lambda (n . v)^2, the number of gaps to close, and nothing
+  std::vector<double> resistance_;    // 3 per particle: the sum of lambda (n . v)^2, the number of
+                                      // gaps to close, and nothing
   std::vector<ClusterMotion> motions_;
   bool looks_ = false;          // in this step
   bool any_stopped_ = false;    // in the last step, on any rank

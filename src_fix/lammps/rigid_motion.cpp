@@ -47,8 +47,8 @@ void RigidMotion::predict()
   pushing_ = stopping_ = false;
 }
 
-// Sets the velocities of members (3 per particle) after forces have acted for a time, in units that turn a
-// force into a momentum.
+// Sets the velocities of members (3 per particle) after forces have acted for a time, in units that
+// turn a force into a momentum.
 void RigidMotion::predict_bodies(double kick, std::vector<double> &velocity)
 {
   gather_momenta(kick);
@@ -87,8 +87,8 @@ void RigidMotion::gather_momenta(double kick)
   ranks_.share_with_ghosts(carried_part_.data());
 }
 
-// The angular momentum that a body has beside that of forces at its members' arms: the first member holds
-// it for all, and solid spheres each hold their own at the start of a run.
+// The angular momentum that a body has beside that of forces at its members' arms: the first member
+// holds it for all, and solid spheres each hold their own at the start of a run.
 void RigidMotion::take_carried(int i)
 {
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
@@ -145,8 +145,8 @@ void RigidMotion::predict_body(std::size_t b, std::vector<double> &velocity)
    the step
 ------------------------------------------------------------------------- */
 
-// The momenta that a body has beyond a reference, both given by the velocities of its spheres. They do
-// not show a spin about a line through all of them, which contacts cannot change.
+// The momenta that a body has beyond a reference, both given by the velocities of its spheres. They
+// do not show a spin about a line through all of them, which contacts cannot change.
 Push RigidMotion::difference(const inelastic::RigidBodies &bodies, std::size_t b,
                              const double *velocity, const double *reference) const
 {
@@ -259,8 +259,8 @@ void RigidMotion::apply(const double *contact_force)
   }
 }
 
-// Adds to the force on an owned member what replaces the last step's push by this one's, which it returns,
-// and what stops its body.
+// Adds to the force on an owned member what replaces the last step's push by this one's, which it
+// returns, and what stops its body.
 Push RigidMotion::replace_push(int i, double *force)
 {
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
@@ -269,8 +269,8 @@ Push RigidMotion::replace_push(int i, double *force)
   Carried &of_body = state_.momenta()[i];
   const bool whole = step_.kick == Kick::WHOLE;
   Push push = pushing_ ? bodies_[b].push : Push{};
-  // In the last step of a run no push may stay in the velocities. Whole-step velocities hold the mean of
-  // two pushes: this makes it vanish.
+  // In the last step of a run no push may stay in the velocities. Whole-step velocities hold the
+  // mean of two pushes: this makes it vanish.
   if (whole && update->ntimestep == update->laststep)
     for (int d = 0; d < 3; ++d) {
       push.velocity[d] = -of_body.next.velocity[d];
@@ -298,8 +298,8 @@ Push RigidMotion::replace_push(int i, double *force)
   return push;
 }
 
-// Keeps the push and the angular momentum after the last turn(). The contact forces only tell how large
-// the moments were.
+// Keeps the push and the angular momentum after the last turn(). The contact forces only tell how
+// large the moments were.
 void RigidMotion::keep(int i, const Push &push, const double *contact_force)
 {
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
@@ -329,9 +329,9 @@ void RigidMotion::keep(int i, const Push &push, const double *contact_force)
   std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
 }
 
-// At the start of a run LAMMPS takes the angular momentum of a body from velocities that hold the common
-// one, and its centre of mass is rounded as coordinates are: to about M |dx| |v|. This is the angle whose
-// square magnifies the round-off of positions as much as that does.
+// At the start of a run LAMMPS takes the angular momentum of a body from velocities that hold the
+// common one, and its centre of mass is rounded as coordinates are: to about M |dx| |v|. This is
+// the angle whose square magnifies the round-off of positions as much as that does.
 double RigidMotion::angle_of_first_momentum(int b) const
 {
   // Ten times the machine epsilon, of the part of coordinates that is allowed for round-off.

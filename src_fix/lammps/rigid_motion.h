@@ -1,15 +1,15 @@
-// The bodies of a fix rigid/small, as the projection needs them: their momenta with all forces that are not
-// contacts, and where exactly a step takes them.
+// The bodies of a fix rigid/small, as the projection needs them: their momenta with all forces that
+// are not contacts, and where exactly a step takes them.
 //
 // LAMMPS's fix moves the bodies. Here its step is computed beforehand: angular momentum L in the
-// space frame, angular velocity w = I^-1 L at the present orientation, and the orientation after the
-// step by LAMMPS's Richardson iteration,
+// space frame, angular velocity w = I^-1 L at the present orientation, and the orientation after
+// the step by LAMMPS's Richardson iteration,
 //
 //   u_1 = |1 + h/2 w|,   u_2 = |1 + h/4 w'| |1 + h/4 w|,   turn = |2 u_2 - u_1|      (quaternions)
 //
 // where |.| normalises and w' = I^-1 L at the half turn |1 + h/4 w|. After the step LAMMPS's atoms
-// have the velocity v + w' x r, so that L cannot be read from them when the three moments differ: it
-// is carried along from step to step.
+// have the velocity v + w' x r, so that L cannot be read from them when the three moments differ:
+// it is carried along from step to step.
 
 #ifndef INELASTIC_RIGID_MOTION_H
 #define INELASTIC_RIGID_MOTION_H
@@ -38,8 +38,8 @@ class RigidMotion final : public Mover, protected Pointers {
   void begin_run() { members_.begin_run(); }
   Fix *fix() const { return members_.fix(); }
 
-  // Finds the bodies after atoms or ghosts have changed. Returns what is wrong on this rank. Collective.
-  // See body_members.h for the errors.
+  // Finds the bodies after atoms or ghosts have changed. Returns what is wrong on this rank.
+  // Collective. See body_members.h for the errors.
   std::string find_bodies();
 
   // Arms and inertia at the present positions.
@@ -56,8 +56,8 @@ class RigidMotion final : public Mover, protected Pointers {
   void predict() override;
   void apply(const double *contact_force) override;
 
-  // Follows the particles to where the velocities (3 per particle) that solve the problem take them:
-  // `motion` becomes their mean velocities during the step.
+  // Follows the particles to where the velocities (3 per particle) that solve the problem take
+  // them: `motion` becomes their mean velocities during the step.
   void turn(const inelastic::ContactProblem &problem, const std::vector<double> &velocity,
             std::vector<double> &motion);
 
@@ -103,8 +103,8 @@ class RigidMotion final : public Mover, protected Pointers {
   BodyMembers members_;
   BodyInertias inertias_;
   std::vector<Body> bodies_;    // beside those of the problem
-  // 3 per particle: momentum, the part of the angular momentum that acts at the particle's arm, and the
-  // part that its body carries along.
+  // 3 per particle: momentum, the part of the angular momentum that acts at the particle's arm, and
+  // the part that its body carries along.
   std::vector<double> linear_, change_, carried_part_;
   std::vector<double> predicted_;    // 3 per particle
   bool pushing_ = false;

@@ -44,8 +44,8 @@ inline void rotate(const double *q, double sign, const double *x, double *rotate
   for (int d = 0; d < 3; ++d) rotated[d] = x[d] + displaced[d];
 }
 
-// The angular velocity for an angular momentum after a turn from the orientation that the inverse inertia
-// belongs to.
+// The angular velocity for an angular momentum after a turn from the orientation that the inverse
+// inertia belongs to.
 inline void angular_velocity_turned(const double *q, const double *inverse_inertia,
                                     const double *momentum, double *angular_velocity)
 {

@@ -33,7 +33,8 @@ class RunSummary : protected Pointers {
   const Step &step_;
   PhaseClock &clock_;
   long steps_ = 0, unconverged_ = 0, shortened_before_ = 0;
-  // Bad starts were pushed apart in so many steps: in those with which the run began, and in later ones.
+  // Bad starts were pushed apart in so many steps: in those with which the run began, and in later
+  // ones.
   long pushed_at_start_ = 0, pushed_later_ = 0;
   long at_rest_ = 0;
   double iterations_ = 0.0;

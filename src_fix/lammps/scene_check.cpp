@@ -20,7 +20,8 @@ bool SceneCheck::changes_periods(const Fix *fix) const
 
 void SceneCheck::check(bool shorten) const
 {
-  // LAMMPS accepts neigh_modify include and comm_modify group for the group of atom_modify first alone.
+  // LAMMPS accepts neigh_modify include and comm_modify group for the group of atom_modify first
+  // alone.
   if (neighbor->includegroup)
     error->all(
         FLERR,
@@ -64,8 +65,8 @@ bool SceneCheck::any(bool here) const
   return all != 0;
 }
 
-// Tells whether pairs between spheres of two sides are hidden from the fix, other than pairs of two frozen
-// spheres. Collective.
+// Tells whether pairs between spheres of two sides are hidden from the fix, other than pairs of two
+// frozen spheres. Collective.
 template <typename One, typename Other>
 bool SceneCheck::hides(const Group &group, One &&on_one_side, Other &&on_the_other) const
 {
@@ -144,8 +145,8 @@ bool SceneCheck::sets_forces(const Fix *fix)
   return false;
 }
 
-// These fixes replace the forces of spheres by others. They do it before the contacts are known, which then move the
-// spheres all the same; behind this fix they would take contact forces away.
+// These fixes replace the forces of spheres by others. They do it before the contacts are known,
+// which then move the spheres all the same; behind this fix they would take contact forces away.
 void SceneCheck::check_held(const Group &group) const
 {
   for (const Fix *fix : modify->get_fix_list()) {

@@ -1,5 +1,6 @@
-// This room refuses what other commands and fixes of a deck must not do, because fix inelastic would not
-// see it: hide spheres or pairs from it, hold spheres, or change the box or the radii while a run lasts.
+// This room refuses what other commands and fixes of a deck must not do, because fix inelastic
+// would not see it: hide spheres or pairs from it, hold spheres, or change the box or the radii
+// while a run lasts.
 
 #ifndef INELASTIC_SCENE_CHECK_H
 #define INELASTIC_SCENE_CHECK_H
@@ -23,12 +24,12 @@ class SceneCheck : protected Pointers {
     bool bodies;       // the keyword rigid is given
   };
 
-  // Errors: settings that keep spheres out of the neighbour list or ghosts away, and fixes that will change
-  // the box or radii, or do not bear that the time step is shortened.
+  // Errors: settings that keep spheres out of the neighbour list or ghosts away, and fixes that
+  // will change the box or radii, or do not bear that the time step is shortened.
   void check(bool shorten) const;
 
-  // At the start of a run. Errors: fixes that are to hold or guide spheres of the group that are not frozen.
-  // Collective.
+  // At the start of a run. Errors: fixes that are to hold or guide spheres of the group that are
+  // not frozen. Collective.
   void check_held(const Group &group) const;
 
   // At the start of a run. Warnings: settings that keep pairs apart. Collective.

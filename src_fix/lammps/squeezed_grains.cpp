@@ -20,7 +20,8 @@ SqueezedGrains::SqueezedGrains(LAMMPS *lmp, const Step &step, GhostExchange &ran
 {
 }
 
-// [length / time] Of walls and of spheres without contacts. Positions are known to the tolerance, and so are speeds.
+// [length / time] Of walls and of spheres without contacts. Positions are known to the tolerance,
+// and so are speeds.
 double SqueezedGrains::fastest_before() const
 {
   const inelastic::ContactProblem &problem = step_.problem;

@@ -1,6 +1,7 @@
-// Grains that walls squeeze out from between them. Two walls that close at a small angle to one another leave a
-// sphere that fills the room between them one way out, along which it moves as many times faster than they as the angle
-// is small. That is where it goes, and it is told, for no grain would.
+// Grains that walls squeeze out from between them. Two walls that close at a small angle to one
+// another leave a sphere that fills the room between them one way out, along which it moves as many
+// times faster than they as the angle is small. That is where it goes, and it is told, for no grain
+// would.
 
 #ifndef INELASTIC_SQUEEZED_GRAINS_H
 #define INELASTIC_SQUEEZED_GRAINS_H
@@ -21,7 +22,8 @@ class SqueezedGrains : protected Pointers {
 
   void begin_run() { told_ = false; }
 
-  // Looks for the sphere at a closing wall that a projection makes most times as fast as anything moved before. Collective.
+  // Looks for the sphere at a closing wall that a projection makes most times as fast as anything
+  // moved before. Collective.
   void look();
   // Nothing was looked for.
   void skip() { said_.clear(); }

@@ -1,5 +1,5 @@
-// One time step as all rooms of the fix know it: the contact problem, what stands on the other side of
-// each constraint, and where the step takes the particles.
+// One time step as all rooms of the fix know it: the contact problem, what stands on the other side
+// of each constraint, and where the step takes the particles.
 
 #ifndef INELASTIC_STEP_H
 #define INELASTIC_STEP_H
@@ -18,16 +18,16 @@
 
 namespace LAMMPS_NS {
 
-// LAMMPS applies half a kick (the change of velocities by the forces) before the first move of a run,
-// and a whole one before every other move.
+// LAMMPS applies half a kick (the change of velocities by the forces) before the first move of a
+// run, and a whole one before every other move.
 enum class Kick { HALF, WHOLE };
 
 // A bad start, an overlap beyond the regular ones, counts as touching in the first phase, and is
 // pushed apart in a second one.
 enum class Phase { CONTACT, PUSH };
 
-// An overlap of up to this many tolerances is regular: a step may leave it behind. A larger one is a
-// bad start.
+// An overlap of up to this many tolerances is regular: a step may leave it behind. A larger one is
+// a bad start.
 constexpr double REGULAR_OVERLAP = 2.0;
 // The largest push out of a bad start in a step of regular length, as a part of the sum of radii.
 constexpr double PUSH_LIMIT = 0.05;
@@ -86,8 +86,8 @@ struct Step {
   // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
   std::vector<double> motion_of_bodies;
 
-  // 3 per particle, of which the first is the factor by which the forces on one that is at rest have changed since
-  // the last step; 0 where this is not known. Empty if nothing is at rest.
+  // 3 per particle, of which the first is the factor by which the forces on one that is at rest
+  // have changed since the last step; 0 where this is not known. Empty if nothing is at rest.
   std::vector<double> load_change;
 
   // This is known after constraints were collected.
@@ -117,8 +117,9 @@ struct Step {
   double least_impulse(const Side &side) const
   { return side.law_contact < 0 ? 0.0 : law_contacts[side.law_contact].demand.least_impulse; }
 
-  // By this a constraint is solved more accurately than others (contact_set.h). A law asks for a speed with which
-  // surfaces part where they collide, maybe hundreds of times: errors of it add up.
+  // By this a constraint is solved more accurately than others (contact_set.h). A law asks for a
+  // speed with which surfaces part where they collide, maybe hundreds of times: errors of it add
+  // up.
   double refinement(const Side &side) const
   {
     constexpr double PARTING = 1.0 / 16.0;

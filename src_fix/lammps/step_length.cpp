@@ -30,13 +30,14 @@ constexpr double BELOW_ONE = 1.0 - 1.0e-12;    // by the round-off of a sum of a
 constexpr double ABOVE_ONE = 1.0 + 1.0e-12;    // by that of a quotient
 constexpr double SHORTEST_STEP = 1.0e-6;       // of the regular one: below, something else is wrong
 constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
-// An overlap of two spheres is not known better than this part of the largest coordinate. Each of the
-// three coordinates of either is rounded by up to half of the machine epsilon.
+// An overlap of two spheres is not known better than this part of the largest coordinate. Each of
+// the three coordinates of either is rounded by up to half of the machine epsilon.
 constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon();
-// An atom may stray by this part of what its rank owns of the box: LAMMPS brings it back from the next part
-// alone.
+// An atom may stray by this part of what its rank owns of the box: LAMMPS brings it back from the
+// next part alone.
 constexpr double MOST_STRAYED = 0.5;
-// Of the smallest radius: a tolerance that serves nearly every packing, and one beyond which there is little of one.
+// Of the smallest radius: a tolerance that serves nearly every packing, and one beyond which there
+// is little of one.
 constexpr double USUAL_TOLERANCE = 0.001, COARSE_TOLERANCE = 0.1;
 
 }    // namespace
@@ -174,9 +175,9 @@ void StepLength::check_reach_of_types() const
     }
 }
 
-// A motion that all share costs no reach, but takes atoms away from their rank and their box. LAMMPS
-// brings an atom back into a periodic box from the next image alone, and hands it to the next rank alone
-// (with two ranks in a direction, the other one is the next on both sides).
+// A motion that all share costs no reach, but takes atoms away from their rank and their box.
+// LAMMPS brings an atom back into a periodic box from the next image alone, and hands it to the
+// next rank alone (with two ranks in a direction, the other one is the next on both sides).
 void StepLength::measure_farthest()
 {
   const Periods periods(lmp);
@@ -215,8 +216,8 @@ double StepLength::part_of_farthest()
   return part;
 }
 
-// The largest difference between two of the vectors (3 doubles each) of the group's atoms, from above:
-// the diagonal of their bounding box, or the diameter of a ball about its centre.
+// The largest difference between two of the vectors (3 doubles each) of the group's atoms, from
+// above: the diagonal of their bounding box, or the diameter of a ball about its centre.
 double StepLength::spread(const double *values)
 {
   double maxima[6];
@@ -243,7 +244,8 @@ double StepLength::spread(const double *values)
   return std::min(norm(extent), 2.0 * std::sqrt(farthest));
 }
 
-// The spread of the displacements since the list was built: at present, or after a motion (null = none).
+// The spread of the displacements since the list was built: at present, or after a motion (null =
+// none).
 double StepLength::spread_since_build(const double *motion)
 {
   displacement_.resize(3 * static_cast<std::size_t>(atom->nlocal));
@@ -264,8 +266,8 @@ double StepLength::spread_since_build(const double *motion)
   return spread(displacement_.data()) + 2.0 * growth_;
 }
 
-// The spread of the velocities after so many kicks (0, 0.5 or 1) by the forces alone. Bodies turn in
-// other ways: for them this is about it.
+// The spread of the velocities after so many kicks (0, 0.5 or 1) by the forces alone. Bodies turn
+// in other ways: for them this is about it.
 double StepLength::unhindered_spread(double kicks)
 {
   unhindered_.resize(3 * static_cast<std::size_t>(atom->nlocal));
@@ -278,9 +280,9 @@ double StepLength::unhindered_spread(double kicks)
   return spread(unhindered_.data());
 }
 
-// The part of the time step for which the list would reach, with some reserve, where velocities have
-// the spread `whole` in the whole step and `none` before its forces: in a part s, whose kick is
-// smaller, they have at most (1 - s) none + s whole.
+// The part of the time step for which the list would reach, with some reserve, where velocities
+// have the spread `whole` in the whole step and `none` before its forces: in a part s, whose kick
+// is smaller, they have at most (1 - s) none + s whole.
 double StepLength::room_in_list(double none, double whole) const
 {
   constexpr double RESERVE = 0.9;

@@ -1,6 +1,6 @@
-// This room decides how long a step may be. Pairs that the neighbour list lacks must not meet during it,
-// LAMMPS must be able to follow every atom, and, with the keyword shorten, no overlap may be left at its
-// end.
+// This room decides how long a step may be. Pairs that the neighbour list lacks must not meet
+// during it, LAMMPS must be able to follow every atom, and, with the keyword shorten, no overlap
+// may be left at its end.
 
 #ifndef INELASTIC_STEP_LENGTH_H
 #define INELASTIC_STEP_LENGTH_H
@@ -20,12 +20,12 @@ class StepLength : protected Pointers {
  public:
   StepLength(class LAMMPS *lmp, Step &step, GhostExchange &ranks);
 
-  // Finds the largest and smallest radius of the group. Errors: no radius, or one within the tolerance.
-  // Collective.
+  // Finds the largest and smallest radius of the group. Errors: no radius, or one within the
+  // tolerance. Collective.
   void measure_radii();
   double smallest_radius() const { return smallest_radius_; }    // [length]
-  // Chooses the kind of neighbour list for a run: by one cutoff for all pairs, if radii are so similar that this
-  // wastes little, or by the radii of each pair.
+  // Chooses the kind of neighbour list for a run: by one cutoff for all pairs, if radii are so
+  // similar that this wastes little, or by the radii of each pair.
   void choose_list();
   bool has_one_cutoff() const { return one_cutoff_; }
 
@@ -33,20 +33,20 @@ class StepLength : protected Pointers {
   void begin_run();
 
   // The neighbour list is new: takes the positions, and how far the list reaches. Errors: those of
-  // measure_radii(), a tolerance below the round-off of positions, and a list that is too short for the
-  // spheres. Collective.
+  // measure_radii(), a tolerance below the round-off of positions, and a list that is too short for
+  // the spheres. Collective.
   void list_built();
 
   // At the start of a step: a time step that was shortened is the regular one again. Collective.
   void begin_step();
 
-  // Shortens the step where the list cannot reach as far as atoms would move without contacts: there is
-  // no use in solving first. Collective.
+  // Shortens the step where the list cannot reach as far as atoms would move without contacts:
+  // there is no use in solving first. Collective.
   void fit_to_list();
 
-  // Tells whether the step, solved, may be made. Otherwise it is shorter now, or there is an error. `named`
-  // tells of the constraint that is farthest from being met, if any, `squeezed` of what walls throw (squeezed_grains.h).
-  // Collective.
+  // Tells whether the step, solved, may be made. Otherwise it is shorter now, or there is an error.
+  // `named` tells of the constraint that is farthest from being met, if any, `squeezed` of what
+  // walls throw (squeezed_grains.h). Collective.
   bool accepts(const std::string &named, const std::string &squeezed);
 
   // Makes the time step shorter. Errors: it is so short already that something else is wrong.
@@ -55,7 +55,8 @@ class StepLength : protected Pointers {
   // Tells whether the keyword allows a shorter step for one that could not be solved.
   bool may_shorten_unsolved() const;
 
-  // Tells whether the list must be built before the next step, which may be half as fast again. Collective.
+  // Tells whether the list must be built before the next step, which may be half as fast again.
+  // Collective.
   bool needs_new_list();
 
   void restore();
@@ -91,7 +92,8 @@ class StepLength : protected Pointers {
   double strayed_ = 0.0;    // largest displacement since then, of the width that a rank owns
   // [length] The part of the box that this rank owns; no limit where nothing is beyond.
   double own_width_[3] = {EXTREME, EXTREME, EXTREME};
-  // LAMMPS loses an atom that goes further than this part of the box, in one direction, between two lists.
+  // LAMMPS loses an atom that goes further than this part of the box, in one direction, between two
+  // lists.
   double farthest_[3] = {EXTREME, EXTREME, EXTREME};
   std::vector<double> position_at_build_, radius_at_build_;
   std::vector<double> displacement_, unhindered_;    // room

@@ -111,7 +111,8 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
 {
   // Up to here a residual can come down, but need not.
   constexpr double NEAR_ROUND_OFF = 10.0;
-  // In half of the iterations or more; without room it stays, and otherwise falls by half or faster.
+  // In half of the iterations or more; without room it stays, and otherwise falls by half or
+  // faster.
   constexpr double STILL_FALLS = 0.7;
   constexpr double UNSEEN = 100.0;
   // Up to such a part of a radius a tolerance may be raised.

@@ -1,5 +1,5 @@
-// A step that could not be solved: which constraint is farthest from being met, what is the cause, and
-// what the user can do.
+// A step that could not be solved: which constraint is farthest from being met, what is the cause,
+// and what the user can do.
 
 #ifndef INELASTIC_UNSOLVED_STEP_H
 #define INELASTIC_UNSOLVED_STEP_H
@@ -31,14 +31,16 @@ class UnsolvedStep : protected Pointers {
     worst_ = -1.0;
   }
 
-  // Notes the constraint of all ranks that is farthest from being met, in any projection of the trial. Collective.
+  // Notes the constraint of all ranks that is farthest from being met, in any projection of the
+  // trial. Collective.
   void note_worst(const inelastic::ProjectionResult &result);
   const std::string &named() const { return named_; }
 
   // Notes that it is certain that there are no velocities for the step as long as it was.
   void note_no_room() { no_room_ = true; }
 
-  // Tells whether the contact law asks surfaces to part that cannot all do so, perhaps, in a step so long. Collective.
+  // Tells whether the contact law asks surfaces to part that cannot all do so, perhaps, in a step
+  // so long. Collective.
   bool law_parts() const;
 
   // Stops the run, or warns where the keyword maxiter allows it. Collective.

@@ -54,8 +54,8 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
   return viewpoints_;
 }
 
-// Moves a point beyond a periodic boundary to the other side. Tells whether it was beyond one. (LAMMPS
-// shows the walls of a region only at that side of the boundary where they are.)
+// Moves a point beyond a periodic boundary to the other side. Tells whether it was beyond one.
+// (LAMMPS shows the walls of a region only at that side of the boundary where they are.)
 bool WallConstraints::wrap(RegionWalls::Viewpoint &from) const
 { return periods_.wrap(from.where, from.image); }
 
@@ -93,8 +93,8 @@ void WallConstraints::collect(double margin)
   constraint_.clear();
   if (walls_.empty()) return;
   const double *const velocity = step_.problem.predicted_velocity.data();
-  // A look further than needed tells for most atoms that no other is, in this step. (Not where parts
-  // of a region hide others.)
+  // A look further than needed tells for most atoms that no other is, in this step. (Not where
+  // parts of a region hide others.)
   const double further = walls_.exact() ? 2.0 * step_.largest_radius : 0.0;
   clear_of_walls_.assign(atom->nlocal, 0.0);
   const Viewpoints &far = viewpoints(velocity, margin + further);
@@ -188,8 +188,9 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   const double gap_there = view.distance - atom->radius[i];
   const double gap_here = gap_there - dot(n, from_here);
   const double wall_motion = view.distance_now - view.distance;
-  // A region can show a wall late: from inside one part of a union the others are not seen. An obstacle
-  // that is overlapped is seen; its plane at the end of the step may lie beyond where the sphere is now.
+  // A region can show a wall late: from inside one part of a union the others are not seen. An
+  // obstacle that is overlapped is seen; its plane at the end of the step may lie beyond where the
+  // sphere is now.
   const double to_plane = gap_here + wall_motion;
   Side side = {view.wall, view.convex ? std::max(0.0, to_plane) : to_plane, atom->radius[i],
                wall_motion};
@@ -209,8 +210,8 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   if (known && is_same_plane(existing->second, n))
     return rules_.follow(existing->second, gap, too_deep);
   if (!too_deep) return 0;
-  // Behind a periodic boundary a sphere that passes an obstacle in one step sees its far side: a plane
-  // there would throw it on. The step is too long.
+  // Behind a periodic boundary a sphere that passes an obstacle in one step sees its far side: a
+  // plane there would throw it on. The step is too long.
   if (is_image(from) && view.convex && to_plane < -step_.settings.tolerance) {
     step_.excess = std::max(step_.excess, -gap_there);
     return 0;
@@ -255,8 +256,8 @@ long WallConstraints::relinearise(double margin)
   return changed + add_planes_within(beyond);
 }
 
-// Tells whether a constraint is that of a contact which the law may hold, not in a bad start, and where the
-// wall at the end of the step does not face another way.
+// Tells whether a constraint is that of a contact which the law may hold, not in a bad start, and
+// where the wall at the end of the step does not face another way.
 bool WallConstraints::may_hold(std::size_t c, const double *normal_at_end) const
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
@@ -273,8 +274,8 @@ long WallConstraints::hold(std::size_t c, double gap_at_end, const double *norma
   return rules_.hold(c, gap_at_end, step_.problem.timestep * speed, dot(normal, normal_at_end));
 }
 
-// From where a body ends, a part of an intersection of regions may not show the wall that a constraint
-// was set for: the plane tells how far it is.
+// From where a body ends, a part of an intersection of regions may not show the wall that a
+// constraint was set for: the plane tells how far it is.
 long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
                                     const Viewpoints &beyond)
 {

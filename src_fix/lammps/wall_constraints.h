@@ -1,5 +1,6 @@
-// The constraints between spheres and walls: which walls are in the problem, from the start or because a
-// solution would let a sphere overlap them, and how curved walls and turning bodies change their gaps.
+// The constraints between spheres and walls: which walls are in the problem, from the start or
+// because a solution would let a sphere overlap them, and how curved walls and turning bodies
+// change their gaps.
 
 #ifndef INELASTIC_WALL_CONSTRAINTS_H
 #define INELASTIC_WALL_CONSTRAINTS_H
@@ -30,8 +31,8 @@ class WallConstraints : protected Pointers {
                   RegionWalls &walls, GhostExchange &ranks, const ContactMemory &memory,
                   const RigidMotion *bodies);
 
-  // Tells whether the end of a step must be looked at: bodies turn, walls curve, or a law may hold spheres to
-  // an obstacle, about which they turn.
+  // Tells whether the end of a step must be looked at: bodies turn, walls curve, or a law may hold
+  // spheres to an obstacle, about which they turn.
   bool need_relinearising() const { return !walls_.empty() && !(walls_.exact() && only_inexact()); }
 
   // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
@@ -41,10 +42,10 @@ class WallConstraints : protected Pointers {
   // Returns how many.
   long add_violated();
 
-  // Adds tangent planes, or moves them. Inside a concave wall the distance is not convex: where a sphere
-  // ends up overlapping, the wall's tangent plane at that end is added. The planes from before stay: all
-  // of them bound the container from outside, and at the tip of a cone a sphere rests on several.
-  // Returns how many constraints were added or changed. Collective.
+  // Adds tangent planes, or moves them. Inside a concave wall the distance is not convex: where a
+  // sphere ends up overlapping, the wall's tangent plane at that end is added. The planes from
+  // before stay: all of them bound the container from outside, and at the tip of a cone a sphere
+  // rests on several. Returns how many constraints were added or changed. Collective.
   long relinearise(double margin);
 
  private:

@@ -52,8 +52,8 @@ class OtherFaces {
   OpenFaces faces_;
 };
 
-// Calls do(part, from_outside) for each basic region that a region consists of. Of what is seen from
-// outside LAMMPS turns the sides of the parts over.
+// Calls do(part, from_outside) for each basic region that a region consists of. Of what is seen
+// from outside LAMMPS turns the sides of the parts over.
 template <typename F> void for_each_part(Region *region, bool turned, const F &do_with)
 {
   const bool outside = (region->interior == 0) != turned;
@@ -64,9 +64,9 @@ template <typename F> void for_each_part(Region *region, bool turned, const F &d
   for (int k = 0; k < region->nregion; ++k) for_each_part(region->reglist[k], outside, do_with);
 }
 
-// The corners of a cube, none of which is inside the region, or of the largest one tried: LAMMPS takes
-// 1e20 for the square of an infinite distance. The sides of the cube differ a little, so that no corner
-// lies on an axis.
+// The corners of a cube, none of which is inside the region, or of the largest one tried: LAMMPS
+// takes 1e20 for the square of an infinite distance. The sides of the cube differ a little, so that
+// no corner lies on an axis.
 std::array<Point, 8> corners_outside(Region *region, double size)
 {
   constexpr double LARGEST = 1.0e9;
@@ -82,8 +82,8 @@ std::array<Point, 8> corners_outside(Region *region, double size)
   }
 }
 
-// A face that is farther away than this is at infinity: LAMMPS writes 1e20, and loses in its round-off
-// where along that face a sphere is.
+// A face that is farther away than this is at infinity: LAMMPS writes 1e20, and loses in its
+// round-off where along that face a sphere is.
 double far_away(double size_of_box)
 { return std::min(1.0e8 * size_of_box, 1.0e9); }
 
@@ -110,8 +110,9 @@ Endless ends_of_block(Region *block, double size)
   return ends;
 }
 
-// Of a cone or a prism, which are convex: the mean of places on its surface is inside. Places on the
-// side of a cone are right even where an end is at infinity, but for the coordinate along its axis.
+// Of a cone or a prism, which are convex: the mean of places on its surface is inside. Places on
+// the side of a cone are right even where an end is at infinity, but for the coordinate along its
+// axis.
 Endless ends_of_convex(Region *region, double size)
 {
   const bool cone = has_style(region, "cone");
@@ -159,8 +160,8 @@ bool all_faces_open(const Region *region)
          });
 }
 
-// An open block is seen face by face. A face without an end in one of its directions is misplaced there;
-// one at infinity is nowhere near.
+// An open block is seen face by face. A face without an end in one of its directions is misplaced
+// there; one at infinity is nowhere near.
 bool loses_faces(Region *block, double size)
 {
   const Endless ends = ends_of_block(block, size);
@@ -171,8 +172,8 @@ bool loses_faces(Region *block, double size)
   return false;
 }
 
-// From outside LAMMPS looks for the edges of a prism between corners at infinity; from inside for the
-// upper faces, beginning at the lower ones.
+// From outside LAMMPS looks for the edges of a prism between corners at infinity; from inside for
+// the upper faces, beginning at the lower ones.
 bool loses_corners(Region *prism, bool from_outside, double size)
 {
   const Endless ends = ends_of_convex(prism, size);
@@ -207,8 +208,8 @@ void WrongRegions::open_tips(Region *region) const
   });
 }
 
-// `region` is `used` or a part of it. LAMMPS turns the sides of the parts over where it looks at a union or
-// an intersection from outside.
+// `region` is `used` or a part of it. LAMMPS turns the sides of the parts over where it looks at a
+// union or an intersection from outside.
 void WrongRegions::refuse(Region *region, const Region *used, bool turned) const
 {
   const std::string what = region == used

@@ -1,5 +1,5 @@
-// What LAMMPS shows wrong of a region's walls (up to update 4 of 22 Jul 2025), and the region is refused for,
-// or a flag of it mends. What the way of looking at it mends is in RegionWalls::look.
+// What LAMMPS shows wrong of a region's walls (up to update 4 of 22 Jul 2025), and the region is
+// refused for, or a flag of it mends. What the way of looking at it mends is in RegionWalls::look.
 
 #ifndef INELASTIC_WRONG_REGIONS_H
 #define INELASTIC_WRONG_REGIONS_H
@@ -16,12 +16,12 @@ class WrongRegions : protected Pointers {
  public:
   using Pointers::Pointers;
 
-  // Ends with an error if LAMMPS shows walls of a region, or of one of its parts, at wrong places, too
-  // late or not at all.
+  // Ends with an error if LAMMPS shows walls of a region, or of one of its parts, at wrong places,
+  // too late or not at all.
   void refuse(Region *region) const { refuse(region, region, false); }
 
-  // Opens the caps without extent of cones, beside which LAMMPS shows no other wall to points outside;
-  // and closes them again where the radius, a variable, has become another one.
+  // Opens the caps without extent of cones, beside which LAMMPS shows no other wall to points
+  // outside; and closes them again where the radius, a variable, has become another one.
   void open_tips(Region *region) const;
 
  private:

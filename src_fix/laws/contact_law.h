@@ -1,18 +1,20 @@
-// The interface of a contact law: what a contact asks of the velocities at the end of a step, which impulse
-// it may carry, and what it remembers from step to step.
+// The interface of a contact law: what a contact asks of the velocities at the end of a step, which
+// impulse it may carry, and what it remembers from step to step.
 //
-// A contact has a unit normal n from side 2 to side 1, a gap D between the surfaces, and the velocity u of
-// side 1 against side 2 (that of a wall included). Its impulse is lambda n on side 1 and -lambda n on side
-// 2. Every step minimises 1/2 (V - V*)^T M (V - V*) under what all contacts ask, and the impulses are the
-// duals (../core/contact_problem.h):
+// A contact has a unit normal n from side 2 to side 1, a gap D between the surfaces, and the
+// velocity u of side 1 against side 2 (that of a wall included). Its impulse is lambda n on side 1
+// and -lambda n on side
+// 2. Every step minimises 1/2 (V - V*)^T M (V - V*) under what all contacts ask, and the impulses
+// are the duals (../core/contact_problem.h):
 //
 //   w = D + h n.u >= 0   or   w = h (n.u - s) >= 0,      lambda >= l,      (lambda - l) w = 0
 //
-// A law chooses s, the speed with which the surfaces must part at least, and l <= 0, the least impulse. With
-// l = 0 a contact only pushes. With l < 0 it is held: it pulls by up to -l, and opens only where it pulls by
-// as much.
+// A law chooses s, the speed with which the surfaces must part at least, and l <= 0, the least
+// impulse. With l = 0 a contact only pushes. With l < 0 it is held: it pulls by up to -l, and opens
+// only where it pulls by as much.
 //
-// The inelastic law (no s, l = 0) is none of these classes: a scene that names no other law asks nobody.
+// The inelastic law (no s, l = 0) is none of these classes: a scene that names no other law asks
+// nobody.
 
 #pragma once
 
@@ -50,22 +52,23 @@ class ContactLaw {
   // The largest number of values that a law may remember of a contact.
   static constexpr int MOST_REMEMBERED = 4;
 
-  // Returns how many values the law remembers of each contact. They are zero when a contact begins, stay
-  // with the contact when its particles change ranks, and are in restart files.
+  // Returns how many values the law remembers of each contact. They are zero when a contact begins,
+  // stay with the contact when its particles change ranks, and are in restart files.
   virtual int remembers() const { return 0; }
 
   // Returns what a contact asks for in a step. `remembered` has remembers() values.
   virtual Demand ask(const ContactState &contact, const double *remembered) const = 0;
 
-  // Takes the impulse [mass length / time] that a contact has carried in a step that is solved, and sets
-  // what is remembered of it. Returns whether that must be kept: such a contact belongs to the next step
-  // whether it touches or not, and is in the output; one that need not be kept begins anew. Where a run
-  // begins, half of the last step is made again, and this takes the difference to what it took before.
+  // Takes the impulse [mass length / time] that a contact has carried in a step that is solved, and
+  // sets what is remembered of it. Returns whether that must be kept: such a contact belongs to the
+  // next step whether it touches or not, and is in the output; one that need not be kept begins
+  // anew. Where a run begins, half of the last step is made again, and this takes the difference to
+  // what it took before.
   virtual bool remember(double /*impulse*/, double * /*remembered*/) const { return false; }
 };
 
-// Makes a law of the words that follow its name in `law NAME ...`. Returns nullptr, and says in `error`
-// what is allowed, if it does not like them.
+// Makes a law of the words that follow its name in `law NAME ...`. Returns nullptr, and says in
+// `error` what is allowed, if it does not like them.
 using MakeLaw = std::unique_ptr<ContactLaw> (*)(const std::vector<std::string> &words,
                                                 std::string &error);
 

@@ -1,17 +1,18 @@
-// A contact law of one's own, in a file of its own that is built as a LAMMPS plugin (docs/reference/laws.md).
+// A contact law of one's own, in a file of its own that is built as a LAMMPS plugin
+// (docs/reference/laws.md).
 //
 //   INELASTIC_CONTACT_LAW("name", &make)
 //
-// makes `law name ...` known to fix inelastic when a deck loads the file with `plugin load`. `make` is a
-// MakeLaw (contact_law.h).
+// makes `law name ...` known to fix inelastic when a deck loads the file with `plugin load`. `make`
+// is a MakeLaw (contact_law.h).
 
 #pragma once
 
 #include "contact_law.h"
 
 extern "C" {
-// The plugin of fix inelastic has this function. `version` must be that of its own header; otherwise, and for a
-// name that another law has, it ends LAMMPS with an error.
+// The plugin of fix inelastic has this function. `version` must be that of its own header;
+// otherwise, and for a name that another law has, it ends LAMMPS with an error.
 void inelastic_add_contact_law(void *lammps, int version, const char *name,
                                inelastic::MakeLaw make);
 }

@@ -1232,9 +1232,9 @@ void complete(const RigidBodies &bodies, std::vector<Share> &shares)
 }
 
 // One exchange and one reduction for every iteration; in each round one more exchange and two more
-// reductions, of the residual and of its part of the targets, for the first guess and, unless that is
-// good enough, for the verdict, and a reduction of what the source added. Where the verdict finds that
-// a constraint was idle for too long, there is a second one.
+// reductions, of the residual and of its part of the targets, for the first guess and, unless that
+// is good enough, for the verdict, and a reduction of what the source added. Where the verdict
+// finds that a constraint was idle for too long, there is a second one.
 constexpr long EXCHANGES_PER_ROUND = 2;
 constexpr long REDUCTIONS_PER_ROUND = 5;
 
