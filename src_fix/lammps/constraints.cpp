@@ -1,7 +1,7 @@
 #include "constraints.h"
 
 #include "ghost_exchange.h"
-#include "rigid_motion.h"
+#include "mover.h"
 
 #include <algorithm>
 
@@ -14,11 +14,11 @@ constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
 }    // namespace
 
 Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
-                         const ContactMemory &memory, LawContacts &laws, RigidMotion *bodies) :
-    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), laws_(laws), bodies_(bodies),
+                         const ContactMemory &memory, LawContacts &laws, Movers &movers) :
+    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), laws_(laws), movers_(movers),
     walls_(lmp, step.settings.regions), overlaps_(lmp, step, ranks), rules_(step, overlaps_),
-    entangled_(step), pairs_(lmp, step, rules_, laws, entangled_, memory, bodies),
-    wall_constraints_(lmp, step, rules_, laws, walls_, ranks, memory, bodies)
+    entangled_(step), pairs_(lmp, step, rules_, laws, entangled_, memory, movers),
+    wall_constraints_(lmp, step, rules_, laws, walls_, ranks, memory, movers)
 {
 }
 
@@ -51,14 +51,14 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   step_.problem_found.clear();
   solved_relinearised_ = relinearised_;
-  if (bodies_) bodies_->turn(problem, velocity, step_.motion_of_bodies);
+  movers_.turn(problem, velocity, step_.motion_of_bodies);
   const long added = pairs_.add_violated() + wall_constraints_.add_violated();
   const long changed = step_.phase == Phase::CONTACT ? rules_.keep_within_tolerance(velocity) : 0;
   long relinearised = 0;
   step_.excess = 0.0;
-  if (bodies_ || laws_.has_law() || wall_constraints_.need_relinearising()) {
+  if (movers_.any_turns() || laws_.has_law() || wall_constraints_.need_relinearising()) {
     ++step_.relinearisations;
-    if (bodies_ || laws_.has_law()) relinearised += pairs_.relinearise();
+    if (movers_.any_turns() || laws_.has_law()) relinearised += pairs_.relinearise();
     if (wall_constraints_.need_relinearising())
       relinearised += wall_constraints_.relinearise(margin_);
   }

@@ -22,9 +22,8 @@ namespace LAMMPS_NS {
 
 class Constraints final : public inelastic::ConstraintSource, protected Pointers {
  public:
-  // `bodies` is null in a scene of free spheres.
   Constraints(class LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
-              const ContactMemory &memory, LawContacts &laws, RigidMotion *bodies);
+              const ContactMemory &memory, LawContacts &laws, Movers &movers);
 
   RegionWalls &walls() { return walls_; }
   bool walls_move() const { return walls_.any_moves(); }
@@ -65,7 +64,7 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   GhostExchange &ranks_;
   PhaseClock &clock_;
   LawContacts &laws_;
-  RigidMotion *bodies_;
+  Movers &movers_;
   RegionWalls walls_;
   OverlapWatch overlaps_;
   GapRules rules_;

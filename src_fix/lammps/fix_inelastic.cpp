@@ -46,16 +46,16 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), settings_(read_settings(lmp, narg, arg, groupbit)), step_(settings_),
     ranks_(lmp, this, clock_), state_(lmp, step_), laws_(step_, state_.law_memory()),
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
-    spheres_(lmp, step_, ranks_, state_), movers_{&spheres_},
-    constraints_(lmp, step_, ranks_, clock_, state_.contact_memory(), laws_, bodies_.get()),
-    solver_(inelastic::make_solver(settings_.solver)),
-    push_apart_(step_, constraints_, bodies_.get()), length_(lmp, step_, ranks_),
-    rest_(lmp, step_, ranks_, state_), hold_still_(step_, ranks_, bodies_.get()),
-    check_(lmp, this, step_, ranks_, state_, bodies_.get()),
-    unsolved_(lmp, step_, constraints_, ranks_, bodies_.get()), squeezed_(lmp, step_, ranks_),
+    spheres_(lmp, step_, ranks_, state_),
+    constraints_(lmp, step_, ranks_, clock_, state_.contact_memory(), laws_, movers_),
+    solver_(inelastic::make_solver(settings_.solver)), push_apart_(step_, constraints_, movers_),
+    length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_),
+    hold_still_(step_, ranks_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
+    unsolved_(lmp, step_, constraints_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
-  if (bodies_) movers_.push_back(bodies_.get());
+  movers_.add(&spheres_);
+  if (bodies_) movers_.add(bodies_.get());
   constraints_.walls().init();
   output_.set_walls(constraints_.walls().number_of_walls());
   if (!atom->radius_flag)
@@ -270,14 +270,14 @@ void FixInelastic::init_list(int, NeighList *list)
 void FixInelastic::setup_post_neighbor()
 {
   begin_run();
-  if (bodies_) bodies_->begin_run();
+  movers_.begin_run();
   post_neighbor();
 }
 
 void FixInelastic::post_neighbor()
 {
   length_.list_built();
-  if (bodies_) ranks_.fail_together(bodies_->find_bodies());
+  if (movers_.any_turns()) ranks_.fail_together(movers_.find());
 }
 
 // In setup LAMMPS has whole-step velocities and applies only half a kick before the next move.
@@ -287,19 +287,16 @@ void FixInelastic::setup(int vflag)
 {
   check_.set_up();
   // Without diameters `run 0` sets up bodies of point masses, and does no more.
-  if (bodies_ && step_.largest_radius == 0.0 && update->nsteps == 0) return;
-  if (bodies_) {
-    bodies_->measure();
-    ranks_.fail_together(bodies_->disagreement());
-  }
+  if (movers_.any_turns() && step_.largest_radius == 0.0 && update->nsteps == 0) return;
+  if (movers_.any_turns()) ranks_.fail_together(movers_.measure());
   check_volume();
   advance(vflag, Kick::HALF);
-  if (!bodies_) return;
+  if (!movers_.fix()) return;
   // Fix rigid/small takes the forces of its first half kick in its own setup. Where it is defined
   // before this fix it has taken them without the contacts, and is asked again.
   for (Fix *fix : modify->get_fix_list()) {
     if (fix == this) return;
-    if (fix == bodies_->fix()) return fix->setup(vflag);
+    if (fix == movers_.fix()) return fix->setup(vflag);
   }
 }
 
@@ -445,7 +442,7 @@ void FixInelastic::predict()
   if (laws_.has_law()) step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
   for (int i = 0; i < nall; ++i)
     problem.inverse_mass[i] = step_.is_mobile(atom, i) ? 1.0 / mass_of(atom, i) : 0.0;
-  for (Mover *mover : movers_) mover->predict();
+  movers_.predict();
 }
 
 inelastic::ProjectionResult FixInelastic::project(long max_iterations)
@@ -485,7 +482,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
     array_local = output_.local();
     size_local_rows = output_.local_rows();
     summary_.add_step(result);
-    for (Mover *mover : movers_) mover->apply(output_.contact_force());
+    movers_.apply(output_.contact_force());
     check_.after_step(output_.largest_change());
   }
   const bool solved = result.status == inelastic::Status::CONVERGED;

@@ -92,7 +92,7 @@ class FixInelastic : public Fix {
   LawContacts laws_;
   std::unique_ptr<RigidMotion> bodies_;    // null in a scene of free spheres
   SphereMotion spheres_;
-  std::vector<Mover *> movers_;    // the free spheres, then the bodies
+  Movers movers_;    // the free spheres, then the bodies
   Constraints constraints_;
   std::unique_ptr<inelastic::Solver> solver_;
   PushApart push_apart_;

@@ -2,7 +2,7 @@
 
 #include "ghost_exchange.h"
 #include "make_solver.h"
-#include "rigid_motion.h"
+#include "mover.h"
 
 #include <algorithm>
 
@@ -19,8 +19,8 @@ constexpr long MOST_ITERATIONS = 2000;
 
 }    // namespace
 
-HoldStill::HoldStill(Step &step, GhostExchange &ranks, RigidMotion *bodies) :
-    step_(step), ranks_(ranks), bodies_(bodies), solver_(inelastic::make_solver("apgd"))
+HoldStill::HoldStill(Step &step, GhostExchange &ranks, Movers &movers) :
+    step_(step), ranks_(ranks), movers_(movers), solver_(inelastic::make_solver("apgd"))
 {
 }
 
@@ -120,19 +120,17 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
 }
 
 void HoldStill::turn_bodies()
-{
-  if (bodies_) bodies_->turn(step_.problem, step_.velocity, step_.motion_of_bodies);
-}
+{ movers_.turn(step_.problem, step_.velocity, step_.motion_of_bodies); }
 
 // Bodies at rest are to have other velocities than the contact forces give them.
 void HoldStill::note_stop()
 {
-  if (!bodies_) return;
+  if (!movers_.any_turns()) return;
   const inelastic::ContactProblem &problem = step_.problem;
   std::vector<double> by_contacts(step_.velocity.size());
   inelastic::GapOperator gap_operator;
   gap_operator.prepare(problem);
   gap_operator.velocity(problem, problem.contacts.impulse.data(), by_contacts.data(), ranks_);
-  bodies_->note_stop(problem, by_contacts, step_.velocity);
+  movers_.note_stop(problem, by_contacts, step_.velocity);
   turn_bodies();
 }

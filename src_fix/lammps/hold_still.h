@@ -15,12 +15,11 @@
 namespace LAMMPS_NS {
 
 class GhostExchange;
-class RigidMotion;
+class Movers;
 
 class HoldStill {
  public:
-  // `bodies` is null in a scene of free spheres.
-  HoldStill(Step &step, GhostExchange &ranks, RigidMotion *bodies);
+  HoldStill(Step &step, GhostExchange &ranks, Movers &movers);
 
   // Changes velocities and impulses of the step, which is solved. The marks are one per particle,
   // those of ghosts are not read; of a body any marked member will do. `add_violated` adds
@@ -37,7 +36,7 @@ class HoldStill {
 
   Step &step_;
   GhostExchange &ranks_;
-  RigidMotion *bodies_;
+  Movers &movers_;
   std::unique_ptr<inelastic::Solver>
       solver_;    // apart from that of the steps, which learns from them
   inelastic::ContactProblem moving_;

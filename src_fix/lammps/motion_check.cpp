@@ -2,8 +2,8 @@
 
 #include "atom_state.h"
 #include "ghost_exchange.h"
+#include "mover.h"
 #include "periods.h"
-#include "rigid_motion.h"
 
 #include "atom.h"
 #include "fix.h"
@@ -28,8 +28,8 @@ constexpr double EXPECTED_RELATIVE = 1.0e-12;    // ... beside the round-off of 
 }    // namespace
 
 MotionCheck::MotionCheck(LAMMPS *lmp, const Fix *fix, Step &step, GhostExchange &ranks,
-                         AtomState &state, RigidMotion *bodies) :
-    Pointers(lmp), fix_(fix), step_(step), ranks_(ranks), state_(state), bodies_(bodies),
+                         AtomState &state, Movers &movers) :
+    Pointers(lmp), fix_(fix), step_(step), ranks_(ranks), state_(state), movers_(movers),
     scene_(lmp)
 {
 }
@@ -40,7 +40,7 @@ void MotionCheck::check_other_fixes() const
 void MotionCheck::begin_run()
 {
   const SceneCheck::Group group = {step_.settings.group_bit, step_.settings.frozen_bit,
-                                   bodies_ != nullptr};
+                                   movers_.any_turns()};
   scene_.check_held(group);
   scene_.warn_of_hidden_pairs(group);
   step_.continues = false;
@@ -70,8 +70,9 @@ void MotionCheck::before_step()
 void MotionCheck::after_step(double largest_change)
 {
   // The angular momentum of a body is carried along: so is its round-off.
-  largest_change_ = bodies_ && step_.continues ? std::max(largest_change_, largest_change)
-                                               : largest_change;
+  largest_change_ = movers_.any_turns() && step_.continues
+      ? std::max(largest_change_, largest_change)
+      : largest_change;
   for (int i = 0; i < atom->nlocal; ++i)
     state_.expected_radius(i) = step_.in_group(atom, i) ? atom->radius[i] : AtomState::OUTSIDE;
   step_.continues = true;
@@ -121,16 +122,15 @@ void MotionCheck::compare_all()
   std::string message;
   for (int i = 0; i < atom->nlocal && message.empty(); ++i)
     if (step_.in_group(atom, i)) message = compare(i);
-  if (bodies_) {
+  if (movers_.any_turns()) {
     double failed = message.empty() ? 0.0 : 1.0;
     ranks_.reduce(nullptr, 0, &failed, 1);
     // Masses and moments agreed when the run began.
     if (failed > 0.0) {
-      bodies_->measure();
-      if (!bodies_->disagreement().empty())
+      if (!movers_.measure().empty())
         message = fmt::format("the spheres of a body have moved against one another: another fix "
                               "moves them beside fix {}",
-                              bodies_->fix()->id);
+                              movers_.fix()->id);
     }
   }
   ranks_.fail_together(message);
@@ -151,7 +151,7 @@ std::string MotionCheck::compare(int i) const
   const bool frozen = (atom->mask[i] & step_.settings.frozen_bit) != 0;
   const double round_off = EXPECTED_RELATIVE *
       (norm(atom->x[i]) + step_.largest_radius + h * (norm(expected_v) + largest_change_)) *
-      (bodies_ ? state_.momenta().round_off_growth(i) : 1.0);
+      (movers_.any_turns() ? state_.momenta().round_off_growth(i) : 1.0);
   const double allowed = (frozen ? 1.0 : EXPECTED_IN_EPS) * step_.settings.tolerance + round_off;
   const double position_error = norm(off);
   const double velocity_error = frozen ? 0.0 : h * norm(faster);
@@ -203,7 +203,7 @@ std::string MotionCheck::moved_otherwise(int i, double position_error, double ve
   const std::string mover = !step_.is_member(i)
       ? "nve or nve/sphere"
       : fmt::format("{} (without its keywords gravity and langevin, forces not taken early)",
-                    bodies_->fix()->id);
+                    movers_.fix()->id);
   const std::string later = other_fixes();
   const bool misplaced = position_error > velocity_error;
   return fmt::format("atom {} did not move as predicted: its {} is off by {:.3g}. Move it "

@@ -16,13 +16,12 @@ namespace LAMMPS_NS {
 class AtomState;
 class Fix;
 class GhostExchange;
-class RigidMotion;
+class Movers;
 
 class MotionCheck : protected Pointers {
  public:
-  // `bodies` is null in a scene of free spheres.
   MotionCheck(class LAMMPS *lmp, const Fix *fix, Step &step, GhostExchange &ranks, AtomState &state,
-              RigidMotion *bodies);
+              Movers &movers);
 
   // Errors of scene_check.h.
   void check_other_fixes() const;
@@ -59,7 +58,7 @@ class MotionCheck : protected Pointers {
   Step &step_;
   GhostExchange &ranks_;
   AtomState &state_;
-  RigidMotion *bodies_;
+  Movers &movers_;
   SceneCheck scene_;
   bool goes_on_ = false;                // between setup and the end of the run
   bool first_without_setup_ = false;    // the step is the first of a run that is not set up

@@ -4,7 +4,7 @@
 #include "entangled_bodies.h"
 #include "gap_rules.h"
 #include "law_contacts.h"
-#include "rigid_motion.h"
+#include "mover.h"
 
 #include "atom.h"
 #include "force.h"
@@ -45,9 +45,9 @@ bool ends_beyond(double reach, const double *away, double h, const double *openi
 
 PairConstraints::PairConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
                                  const EntangledBodies &entangled, const ContactMemory &memory,
-                                 const RigidMotion *bodies) :
+                                 const Movers &movers) :
     Pointers(lmp), step_(step), rules_(rules), laws_(laws), entangled_(entangled), memory_(memory),
-    bodies_(bodies)
+    movers_(movers)
 {
 }
 
@@ -112,7 +112,7 @@ void PairConstraints::search_list()
       if (!(mask[j] & group_bit)) continue;
       // Without newton a pair across ranks is on both lists: one of them takes it.
       if (j >= nlocal && !force->newton_pair && tag[i] > tag[j]) continue;
-      if (bodies_ && body[i] >= 0 && body[i] == body[j]) continue;
+      if (movers_.any_turns() && body[i] >= 0 && body[i] == body[j]) continue;
       candidates_.push_back({slot + row_[k], i, j});
     }
   }
@@ -166,7 +166,7 @@ void PairConstraints::take(std::size_t slot, int i, int j)
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
   const double gap = distance - size;
   rules_.overlaps().note(gap, i, atom->tag[j]);
-  if (bodies_ && (bodies_->is_incomplete(i) || bodies_->is_incomplete(j))) {
+  if (movers_.any_turns() && (movers_.is_incomplete(i) || movers_.is_incomplete(j))) {
     step_.problem_found =
         fmt::format("atoms {} and {} meet where a rank does not see all of their bodies: "
                     "raise comm_modify cutoff",
@@ -228,11 +228,11 @@ long PairConstraints::add_violated()
                                velocity[3 * i + 1] - velocity[3 * j + 1],
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
     return ends_beyond(distance, away, h, opening) &&
-        !(bodies_ && square_at_end(i, j) < distance * distance);
+        !(movers_.any_turns() && square_at_end(i, j) < distance * distance);
   };
   const std::size_t before = step_.problem.contacts.size();
   note_motion(velocity);
-  if (bodies_) note_motion(step_.motion());
+  if (movers_.any_turns()) note_motion(step_.motion());
   if (!std::equal(motion_.begin(), motion_.end(), allowed_.begin(), std::less_equal<>()))
     search_list();
   for (const Candidate &pair : candidates_) {

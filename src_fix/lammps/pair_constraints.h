@@ -18,14 +18,13 @@ class EntangledBodies;
 class GapRules;
 class LawContacts;
 class NeighList;
-class RigidMotion;
+class Movers;
 
 class PairConstraints : protected Pointers {
  public:
-  // `bodies` is null in a scene of free spheres.
   PairConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
                   const EntangledBodies &entangled, const ContactMemory &memory,
-                  const RigidMotion *bodies);
+                  const Movers &movers);
 
   void use(NeighList *list) { list_ = list; }
 
@@ -66,7 +65,7 @@ class PairConstraints : protected Pointers {
   LawContacts &laws_;
   const EntangledBodies &entangled_;
   const ContactMemory &memory_;
-  const RigidMotion *bodies_;
+  const Movers &movers_;
   NeighList *list_ = nullptr;
   std::vector<char> taken_;    // per pair of the neighbour list: whether it is in the problem
   // The list reaches as far as the fastest particles go, so that most of its pairs are far apart.

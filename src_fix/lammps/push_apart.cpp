@@ -1,7 +1,7 @@
 #include "push_apart.h"
 
 #include "constraints.h"
-#include "rigid_motion.h"
+#include "mover.h"
 #include "step.h"
 
 #include <algorithm>
@@ -72,7 +72,7 @@ void PushApart::ask_for(double part, const Atom *atom)
           side.wall_motion;
     contacts.impulse[c] = 0.0;
   }
-  if (bodies_) constraints_.entangled().disentangle(atom, constraints_.overlaps());
+  if (movers_.any_turns()) constraints_.entangled().disentangle(atom, constraints_.overlaps());
 }
 
 // The next step begins with what was to be had, and now and then asks for more.
@@ -95,7 +95,7 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
               problem.predicted_velocity.begin());
   step_.phase = Phase::PUSH;
   step_.relinearisations = 0;
-  if (bodies_) constraints_.entangled().find();
+  if (movers_.any_turns()) constraints_.entangled().find();
   if (!constraints_.overlaps().pushed_before()) begin_push();
   look_for_progress();
   // Iterations of a trial. Thousands of spheres that have room for what is asked take far fewer.
@@ -119,5 +119,5 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
 
   problem.contacts = contacts;
   step_.sides.resize(contacts.size());
-  if (bodies_) bodies_->note_push(problem, step_.velocity);
+  movers_.note_push(problem, step_.velocity);
 }

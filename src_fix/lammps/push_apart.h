@@ -12,7 +12,7 @@ namespace LAMMPS_NS {
 
 class Atom;
 class Constraints;
-class RigidMotion;
+class Movers;
 struct Step;
 
 class PushApart {
@@ -20,9 +20,8 @@ class PushApart {
   // Projects the step's predicted velocities with at most so many iterations.
   using Project = std::function<inelastic::ProjectionResult(long max_iterations)>;
 
-  // `bodies` is null in a scene of free spheres.
-  PushApart(Step &step, Constraints &constraints, RigidMotion *bodies) :
-      step_(step), constraints_(constraints), bodies_(bodies)
+  PushApart(Step &step, Constraints &constraints, Movers &movers) :
+      step_(step), constraints_(constraints), movers_(movers)
   {
   }
 
@@ -40,7 +39,7 @@ class PushApart {
 
   Step &step_;
   Constraints &constraints_;
-  RigidMotion *bodies_;
+  Movers &movers_;
 
   double part_ = 1.0;    // of what overlaps are opened by, as the last step could
   int easy_ = 0;         // steps in a row that could at once

@@ -22,16 +22,22 @@ RigidMotion::RigidMotion(LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomStat
 {
 }
 
-std::string RigidMotion::find_bodies()
+std::string RigidMotion::find()
 {
   const std::string message = members_.find();
   bodies_.resize(step_.problem.bodies.size());
   if (members_.is_first_of_run()) {
-    measure();
+    measure_inertia();
     members_.check_reach();
     members_.begin_steps();
   }
   return message;
+}
+
+std::string RigidMotion::measure()
+{
+  measure_inertia();
+  return inertias_.disagreement(step_.problem, step_.settings.rigid_fix);
 }
 
 /* ----------------------------------------------------------------------
@@ -40,7 +46,7 @@ std::string RigidMotion::find_bodies()
 
 void RigidMotion::predict()
 {
-  measure();
+  measure_inertia();
   if (step_.settings.law) predict_bodies(0.0, step_.velocity_before);
   predict_bodies(step_.impulse_per_force, step_.problem.predicted_velocity);
   predicted_ = step_.problem.predicted_velocity;
@@ -177,7 +183,6 @@ void RigidMotion::turn(const inelastic::ContactProblem &problem,
 {
   const inelastic::RigidBodies &bodies = problem.bodies;
   const double h = problem.timestep;
-  motion = velocity;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body &body = bodies_[b];
     const Push gained = difference(bodies, b, velocity.data(), predicted_.data());
@@ -206,11 +211,15 @@ void RigidMotion::turn(const inelastic::ContactProblem &problem,
 }
 
 double RigidMotion::angle_turned(const inelastic::ContactProblem &problem, int i) const
-{ return problem.timestep * norm(bodies_[problem.bodies.body[i]].angular_velocity_end); }
+{
+  const int b = problem.bodies.body[i];
+  return b < 0 ? 0.0 : problem.timestep * norm(bodies_[b].angular_velocity_end);
+}
 
 double RigidMotion::angle_predicted(const inelastic::ContactProblem &problem, int i) const
 {
   const int b = problem.bodies.body[i];
+  if (b < 0) return 0.0;
   double spin[3];
   multiply(&problem.bodies.inverse_inertia[6 * b], bodies_[b].angular_momentum, spin);
   return problem.timestep * norm(spin);

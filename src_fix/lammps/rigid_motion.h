@@ -35,44 +35,35 @@ class RigidMotion final : public Mover, protected Pointers {
   RigidMotion(class LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state);
 
   void find_fix() { members_.find_fix(); }
-  void begin_run() { members_.begin_run(); }
-  Fix *fix() const { return members_.fix(); }
 
-  // Finds the bodies after atoms or ghosts have changed. Returns what is wrong on this rank.
-  // Collective. See body_members.h for the errors.
-  std::string find_bodies();
+  bool turns() const override { return true; }
+  void begin_run() override { members_.begin_run(); }
+  Fix *fix() const override { return members_.fix(); }
 
-  // Arms and inertia at the present positions.
-  void measure() { inertias_.measure(step_.problem, members_.original_of()); }
+  // Finds the bodies. See body_members.h for the errors.
+  std::string find() override;
 
-  // Says which of LAMMPS's bodies have other masses or moments; empty if none of this rank's have.
-  std::string disagreement()
-  { return inertias_.disagreement(step_.problem, step_.settings.rigid_fix); }
+  // Measures arms and inertia at the present positions. Says which of LAMMPS's bodies have other
+  // masses or moments.
+  std::string measure() override;
 
-  // Tells whether a particle belongs to a body of which this rank sees a part only.
-  bool is_incomplete(int i) const { return members_.is_incomplete(i); }
+  bool is_incomplete(int i) const override { return members_.is_incomplete(i); }
 
   // At the start of a run (the step does not continue one) momenta are the atoms'.
   void predict() override;
   void apply(const double *contact_force) override;
 
-  // Follows the particles to where the velocities (3 per particle) that solve the problem take
-  // them: `motion` becomes their mean velocities during the step.
   void turn(const inelastic::ContactProblem &problem, const std::vector<double> &velocity,
-            std::vector<double> &motion);
+            std::vector<double> &motion) override;
 
-  // [radians] By how much the step of the last turn() turns the body of a member.
-  double angle_turned(const inelastic::ContactProblem &problem, int i) const;
-  // The same without the contacts, after predict().
-  double angle_predicted(const inelastic::ContactProblem &problem, int i) const;
+  // 0 for a free particle.
+  double angle_turned(const inelastic::ContactProblem &problem, int i) const override;
+  double angle_predicted(const inelastic::ContactProblem &problem, int i) const override;
 
-  // Takes the part of the members' velocities beyond the predicted ones as a push, which is no
-  // momentum.
-  void note_push(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
-
-  // The members are to have other velocities than contact forces give them (hold_still.h).
+  void note_push(const inelastic::ContactProblem &problem,
+                 const std::vector<double> &velocity) override;
   void note_stop(const inelastic::ContactProblem &problem, const std::vector<double> &by_contacts,
-                 const std::vector<double> &wanted);
+                 const std::vector<double> &wanted) override;
 
  private:
   struct Body {
@@ -86,6 +77,7 @@ class RigidMotion final : public Mover, protected Pointers {
     Push stop;    // beyond what contacts do; see note_stop()
   };
 
+  void measure_inertia() { inertias_.measure(step_.problem, members_.original_of()); }
   void gather_momenta(double kick);
   void take_carried(int i);
   void predict_bodies(double kick, std::vector<double> &velocity);

@@ -2,7 +2,7 @@
 
 #include "constraints.h"
 #include "ghost_exchange.h"
-#include "rigid_motion.h"
+#include "mover.h"
 
 #include "atom.h"
 #include "comm.h"
@@ -18,8 +18,8 @@
 using namespace LAMMPS_NS;
 
 UnsolvedStep::UnsolvedStep(LAMMPS *lmp, const Step &step, const Constraints &constraints,
-                           GhostExchange &ranks, const RigidMotion *bodies) :
-    Pointers(lmp), step_(step), constraints_(constraints), ranks_(ranks), bodies_(bodies)
+                           GhostExchange &ranks, const Movers &movers) :
+    Pointers(lmp), step_(step), constraints_(constraints), ranks_(ranks), movers_(movers)
 {
 }
 
@@ -52,7 +52,7 @@ double UnsolvedStep::largest_angle() const
 {
   double angle = 0.0;
   for (int i = 0; i < atom->nlocal; ++i)
-    if (step_.is_member(i)) angle = std::max(angle, bodies_->angle_predicted(step_.problem, i));
+    if (step_.is_member(i)) angle = std::max(angle, movers_.angle_predicted(step_.problem, i));
   ranks_.reduce(nullptr, 0, &angle, 1);
   return angle;
 }
@@ -72,7 +72,7 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
   std::string cause;
   const std::string message = no_room_ ? no_room(result, cause) : out_of_iterations(result, cause);
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
-  const double angle = bodies_ && constraints_.relinearised() ? largest_angle() : 0.0;
+  const double angle = movers_.any_turns() && constraints_.relinearised() ? largest_angle() : 0.0;
   const char *const or_shorter = step_.settings.shorten ? "" : ", or use shorten yes";
   if (angle > LONG_ARC)
     cause = fmt::format("Bodies spin by up to {:.3g} radians in this step: lower the timestep{}",
@@ -97,7 +97,7 @@ std::string UnsolvedStep::no_room(const inelastic::ProjectionResult &result,
   cause = at_end_alone
       ? fmt::format("There are some for the gaps as they change at first, and none for those at "
                     "the end of the step, until which {}: lower the timestep, or use shorten yes{}",
-                    bodies_ ? "bodies turn" : "walls curve",
+                    movers_.any_turns() ? "bodies turn" : "walls curve",
                     constraints_.walls_move() ? ". Or walls that move leave no room" : "")
       : "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
         "are too many spheres";
@@ -132,7 +132,8 @@ std::string UnsolvedStep::out_of_iterations(const inelastic::ProjectionResult &r
   else if (constraints_.solved_relinearised() && !step_.settings.shorten)
     cause = fmt::format("The gaps at the end of the step, until which {}, may not all be had "
                         "together: lower the timestep, use shorten yes, or raise maxiter ({})",
-                        bodies_ ? "bodies turn" : "walls curve", step_.settings.max_iterations);
+                        movers_.any_turns() ? "bodies turn" : "walls curve",
+                        step_.settings.max_iterations);
   // (Of a step that is shortened already the residual falls where there is no room, too.)
   else if (falls && update->dt == step_.regular_timestep)
     cause = fmt::format("The residual is still coming down, as it does where there is room "

@@ -15,13 +15,12 @@ namespace LAMMPS_NS {
 
 class Constraints;
 class GhostExchange;
-class RigidMotion;
+class Movers;
 
 class UnsolvedStep : protected Pointers {
  public:
-  // `bodies` is null in a scene of free spheres.
   UnsolvedStep(class LAMMPS *lmp, const Step &step, const Constraints &constraints,
-               GhostExchange &ranks, const RigidMotion *bodies);
+               GhostExchange &ranks, const Movers &movers);
 
   // At the start of a step, and of every trial of it with another time step.
   void begin_step() { no_room_ = false; }
@@ -55,7 +54,7 @@ class UnsolvedStep : protected Pointers {
   const Step &step_;
   const Constraints &constraints_;
   GhostExchange &ranks_;
-  const RigidMotion *bodies_;
+  const Movers &movers_;
   double worst_ = -1.0;    // [length] what the named one leaves
   std::string named_;
   bool no_room_ = false;

@@ -4,7 +4,6 @@
 #include "gap_rules.h"
 #include "ghost_exchange.h"
 #include "law_contacts.h"
-#include "rigid_motion.h"
 
 #include "atom.h"
 
@@ -29,9 +28,9 @@ bool is_image(const RegionWalls::Viewpoint &from)
 
 WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
                                  RegionWalls &walls, GhostExchange &ranks,
-                                 const ContactMemory &memory, const RigidMotion *bodies) :
+                                 const ContactMemory &memory, const Movers &movers) :
     Pointers(lmp), step_(step), rules_(rules), laws_(laws), walls_(walls), ranks_(ranks),
-    memory_(memory), bodies_(bodies), periods_(lmp)
+    memory_(memory), movers_(movers), periods_(lmp)
 {
 }
 
@@ -72,14 +71,15 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
     const Side &side = step_.sides[c];
     const bool may_hold = step_.may_hold(c);
     if (side.wall == 0 || !(side.followed || may_hold)) continue;
-    if (!step_.is_member(i) || bodies_->angle_turned(step_.problem, i) < HALF_A_TURN)
+    if (!step_.is_member(i) || movers_.angle_turned(step_.problem, i) < HALF_A_TURN)
       followed.insert(i);
   }
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
-    const double reach = followed.count(i) ? EXTREME : atom->radius[i] + (bodies_ ? margin : 0.0);
+    const double reach = followed.count(i) ? EXTREME
+                                           : atom->radius[i] + (movers_.any_turns() ? margin : 0.0);
     RegionWalls::Viewpoint end = {i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach};
     const bool may_differ = !walls_.exact() || step_.is_member(i) || followed.count(i) != 0;
     if (may_differ && reach + h * norm(v) >= clear_of_walls_[i]) viewpoints_.push_back(end);
@@ -252,7 +252,7 @@ long WallConstraints::relinearise(double margin)
       [&](const RegionWalls::Viewpoint &from, const std::string &) {
         beyond.push_back(from);
       });
-  if (bodies_) changed += follow_unseen(seen, beyond);
+  if (movers_.any_turns()) changed += follow_unseen(seen, beyond);
   return changed + add_planes_within(beyond);
 }
 
@@ -286,7 +286,7 @@ long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
     const Side &side = step_.sides[c];
     const int i = step_.problem.contacts.first[c];
     if (!side.followed || seen.count(c) || skipped.count(i) ||
-        bodies_->angle_turned(step_.problem, i) >= HALF_A_TURN)
+        movers_.angle_turned(step_.problem, i) >= HALF_A_TURN)
       continue;
     const double *const n = &step_.problem.contacts.normal[3 * c];
     const double turning =

@@ -5,6 +5,7 @@
 #ifndef INELASTIC_WALL_CONSTRAINTS_H
 #define INELASTIC_WALL_CONSTRAINTS_H
 
+#include "mover.h"
 #include "periods.h"
 #include "region_walls.h"
 #include "step.h"
@@ -22,14 +23,12 @@ class ContactMemory;
 class GapRules;
 class GhostExchange;
 class LawContacts;
-class RigidMotion;
 
 class WallConstraints : protected Pointers {
  public:
-  // `bodies` is null in a scene of free spheres.
   WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
                   RegionWalls &walls, GhostExchange &ranks, const ContactMemory &memory,
-                  const RigidMotion *bodies);
+                  const Movers &movers);
 
   // Tells whether the end of a step must be looked at: bodies turn, walls curve, or a law may hold
   // spheres to an obstacle, about which they turn.
@@ -55,7 +54,8 @@ class WallConstraints : protected Pointers {
   { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
 
   // Tells whether only walls without exact constraints can be met at the end of a step.
-  bool only_inexact() const { return !bodies_ && !periods_.any() && !step_.settings.law; }
+  bool only_inexact() const
+  { return !movers_.any_turns() && !periods_.any() && !step_.settings.law; }
   bool wrap(RegionWalls::Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
@@ -75,7 +75,7 @@ class WallConstraints : protected Pointers {
   RegionWalls &walls_;
   GhostExchange &ranks_;
   const ContactMemory &memory_;
-  const RigidMotion *bodies_;
+  const Movers &movers_;
   const Periods periods_;
   std::unordered_map<std::uint64_t, std::size_t> constraint_;    // atom and wall -> the latest one
   Viewpoints viewpoints_;                                        // room for them
