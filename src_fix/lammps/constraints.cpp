@@ -15,10 +15,11 @@ constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
 
 Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
                          const ContactMemory &memory, LawContacts &laws, Movers &movers) :
-    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), laws_(laws), movers_(movers),
+    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), movers_(movers),
     walls_(lmp, step.settings.regions), overlaps_(lmp, step, ranks), rules_(step, overlaps_),
-    entangled_(step), pairs_(lmp, step, rules_, laws, entangled_, memory, movers),
-    wall_constraints_(lmp, step, rules_, laws, walls_, ranks, memory, movers)
+    rows_(step, rules_, laws, memory), entangled_(step),
+    pairs_(lmp, step, rules_, rows_, entangled_, movers),
+    wall_constraints_(lmp, step, rules_, rows_, walls_, ranks, movers)
 {
 }
 
@@ -31,9 +32,7 @@ void Constraints::collect()
 {
   const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   step_.phase = Phase::CONTACT;
-  step_.problem.contacts.clear();
-  step_.sides.clear();
-  laws_.begin_step();
+  rows_.begin_step();
   step_.problem_found.clear();
   step_.excess = 0.0;
   step_.relinearisations = 0;
@@ -56,9 +55,9 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   const long changed = step_.phase == Phase::CONTACT ? rules_.keep_within_tolerance(velocity) : 0;
   long relinearised = 0;
   step_.excess = 0.0;
-  if (movers_.any_turns() || laws_.has_law() || wall_constraints_.need_relinearising()) {
+  if (movers_.any_turns() || rows_.may_hold() || wall_constraints_.need_relinearising()) {
     ++step_.relinearisations;
-    if (movers_.any_turns() || laws_.has_law()) relinearised += pairs_.relinearise();
+    if (movers_.any_turns() || rows_.may_hold()) relinearised += pairs_.relinearise();
     if (wall_constraints_.need_relinearising())
       relinearised += wall_constraints_.relinearise(margin_);
   }

@@ -4,9 +4,9 @@
 #ifndef INELASTIC_CONSTRAINTS_H
 #define INELASTIC_CONSTRAINTS_H
 
+#include "contact_rows.h"
 #include "entangled_bodies.h"
 #include "gap_rules.h"
-#include "law_contacts.h"
 #include "overlap_watch.h"
 #include "pair_constraints.h"
 #include "phase_clock.h"
@@ -63,11 +63,11 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   Step &step_;
   GhostExchange &ranks_;
   PhaseClock &clock_;
-  LawContacts &laws_;
   Movers &movers_;
   RegionWalls walls_;
   OverlapWatch overlaps_;
   GapRules rules_;
+  ContactRows rows_;
   EntangledBodies entangled_;
   PairConstraints pairs_;
   WallConstraints wall_constraints_;

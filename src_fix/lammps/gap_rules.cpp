@@ -94,29 +94,21 @@ double GapRules::given_back(const Side &side) const
   return std::min(beyond, std::max(softly, -side.gap_now - tolerance));
 }
 
-double GapRules::gap_by_law(const Side &side, const LawContact &contact) const
-{
-  if (contact.demand.least_impulse < 0.0) return held_gap(side, contact.predicted_speed);
-  const double gap = contact_gap(side);
-  return contact.demand.parts
-      ? std::min(gap, -step_.problem.timestep * contact.demand.parting_speed)
-      : gap;
-}
-
 // A held contact is under a force, push or pull, whatever the force was.
-double GapRules::held_gap(const Side &side, double predicted_speed) const
+double GapRules::held_gap(const Side &side) const
 {
   if (side.gap_now <= 0.0) return -given_back(side);
   const double open = std::max(0.0, side.gap_now - CLOSED * step_.settings.tolerance);
-  return std::min(open, most_closed(side, predicted_speed));
+  return std::min(open, most_closed(side));
 }
 
 // [length] The surfaces of a held contact are brought back to one another by no more than
 // velocities are resolved to, or as fast as they would part: this adds nothing to the kinetic
 // energy.
-double GapRules::most_closed(const Side &side, double predicted_speed) const
+double GapRules::most_closed(const Side &side) const
 {
-  return std::max(step_.settings.accuracy * side.to_stop, step_.problem.timestep * predicted_speed);
+  return std::max(step_.settings.accuracy * side.to_stop,
+                  step_.problem.timestep * side.asked.predicted_speed);
 }
 
 double GapRules::effective_gap(const Side &side) const
@@ -124,8 +116,10 @@ double GapRules::effective_gap(const Side &side) const
   const double gap = side.gap_now;
   if (step_.phase == Phase::CONTACT) {
     if (overlaps_.is_bad(gap)) return 0.0;
-    const LawContact *const law = step_.law_contact(side);
-    return law ? gap_by_law(side, *law) : contact_gap(side);
+    if (side.asked.least_impulse < 0.0) return held_gap(side);
+    const double closed = contact_gap(side);
+    const double parted = -step_.problem.timestep * side.asked.parting_speed;
+    return side.asked.parts ? std::min(closed, parted) : closed;
   }
   const double limit = PUSH_LIMIT * side.size * step_.problem.timestep / step_.regular_timestep;
   return std::max(gap, -std::max(limit, REGULAR_OVERLAP * step_.settings.tolerance));
@@ -167,8 +161,7 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     if (contacts.gap[c] == linear_gap || overlaps_.is_bad(side.gap_now)) continue;
     if (step_.is_member(contacts.first[c])) continue;
     if (side.wall == 0 && step_.is_member(contacts.second[c])) continue;
-    const LawContact *const law = step_.law_contact(side);
-    if (law && law->demand.parts) continue;
+    if (side.asked.parts) continue;
     const double at_end = gap_at_end(c, velocity);
     // A held contact is closed no faster than its gap asks for.
     const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
@@ -201,8 +194,7 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
       // What approaches across a gap needs no pull, and no push before it touches.
       contacts.least[c] = 0.0;
     } else {
-      gap = std::min(
-          gap, most_closed(side, step_.law_contact(side)->predicted_speed) - side.wall_motion);
+      gap = std::min(gap, most_closed(side) - side.wall_motion);
       if (gap <= contacts.gap[c]) return 0;
     }
   }

@@ -75,9 +75,8 @@ class GapRules {
   double closed_gap(const Side &side, double last, double most_closing) const;
   double contact_gap(const Side &side) const;
   double given_back(const Side &side) const;
-  double gap_by_law(const Side &side, const LawContact &contact) const;
-  double held_gap(const Side &side, double predicted_speed) const;
-  double most_closed(const Side &side, double predicted_speed) const;
+  double held_gap(const Side &side) const;
+  double most_closed(const Side &side) const;
   // [length] of constraint c with these velocities, along a straight line.
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 

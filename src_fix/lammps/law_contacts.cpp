@@ -42,7 +42,7 @@ void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *no
   const double speed_of_wall = side.wall_motion / h;
   const double speed_before = parting_speed(step_.velocity_before, problem.particles, i, j, normal);
   LawContact contact{};
-  contact.predicted_speed =
+  const double predicted_speed =
       parting_speed(problem.predicted_velocity, problem.particles, i, j, normal) - speed_of_wall;
   const LawMemory::Entry *const last = find(i, partner, normal, side.gap_now, side.size);
   if (last) {
@@ -51,7 +51,7 @@ void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *no
     contact.last_impulse = last->impulse;
   }
   const inelastic::ContactState state = {h, side.gap_now, speed_before - speed_of_wall,
-                                         contact.predicted_speed};
+                                         predicted_speed};
   Demand &demand = contact.demand;
   demand = step_.settings.law->ask(state, contact.remembered.data());
   demand.least_impulse = std::min(0.0, demand.least_impulse + taken_before(contact));
@@ -64,6 +64,7 @@ void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *no
     demand.parting_speed = last->demand.parting_speed;
   }
   if (bad_start) demand.parts = false;
+  side.asked = {demand.least_impulse, demand.parts, demand.parting_speed, predicted_speed};
   side.law_contact = static_cast<int>(step_.law_contacts.size());
   step_.law_contacts.push_back(contact);
 }

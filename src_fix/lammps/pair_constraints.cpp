@@ -1,9 +1,8 @@
 #include "pair_constraints.h"
 
-#include "contact_memory.h"
+#include "contact_rows.h"
 #include "entangled_bodies.h"
 #include "gap_rules.h"
-#include "law_contacts.h"
 #include "mover.h"
 
 #include "atom.h"
@@ -43,11 +42,9 @@ bool ends_beyond(double reach, const double *away, double h, const double *openi
 
 }    // namespace
 
-PairConstraints::PairConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
-                                 const EntangledBodies &entangled, const ContactMemory &memory,
-                                 const Movers &movers) :
-    Pointers(lmp), step_(step), rules_(rules), laws_(laws), entangled_(entangled), memory_(memory),
-    movers_(movers)
+PairConstraints::PairConstraints(LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows,
+                                 const EntangledBodies &entangled, const Movers &movers) :
+    Pointers(lmp), step_(step), rules_(rules), rows_(rows), entangled_(entangled), movers_(movers)
 {
 }
 
@@ -83,7 +80,7 @@ void PairConstraints::search_list()
   const int nlocal = atom->nlocal;
   const int group_bit = step_.settings.group_bit;
   const std::vector<int> &body = step_.problem.bodies.body;
-  const bool has_law = laws_.has_law();
+  const bool may_hold = rows_.may_hold();
   candidates_.clear();
   std::size_t first_slot = 0;
   for (int ii = 0; ii < list_->inum; ++ii) {
@@ -105,7 +102,7 @@ void PairConstraints::search_list()
       const float square = away[0] * away[0] + away[1] * away[1] + away[2] * away[2];
       row_[found] = jj;
       // What is not a number is not beyond the reach.
-      found += !(square > reach * reach) || (has_law && is_remembered(i, j));
+      found += !(square > reach * reach) || (may_hold && is_remembered(i, j));
     }
     for (int k = 0; k < found; ++k) {
       const int j = neighbours[row_[k]] & NEIGHMASK;
@@ -125,7 +122,7 @@ void PairConstraints::collect(double margin)
   const double h = step_.problem.timestep;
   const std::vector<double> &predicted = step_.problem.predicted_velocity;
   const double *const velocity = predicted.data();
-  const bool has_law = laws_.has_law();
+  const bool may_hold = rows_.may_hold();
   std::size_t slots = 0;
   for (int ii = 0; ii < list_->inum; ++ii) slots += list_->numneigh[list_->ilist[ii]];
   taken_.assign(slots, 0);
@@ -142,7 +139,7 @@ void PairConstraints::collect(double margin)
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
     const double reach = radius[i] + radius[j] + margin;
     if (dot(away, away) > reach * reach && ends_beyond(reach, away, h, opening) &&
-        !(has_law && is_remembered(i, j)))
+        !(may_hold && is_remembered(i, j)))
       continue;
     take(pair.slot, i, j);
   }
@@ -179,15 +176,10 @@ void PairConstraints::take(std::size_t slot, int i, int j)
           "atom {} overlaps its own periodic image: the box is too small", atom->tag[i]);
     return;
   }
-  Side side = {0, gap, size, 0.0};
-  if (laws_.has_law()) laws_.ask(side, i, j, atom->tag[j], normal, rules_.overlaps().is_bad(gap));
-  rules_.begin(side, memory_.find(i, atom->tag[j]), i, j, normal);
-  problem.contacts.add(i, j, normal, rules_.asked_gap(side), step_.impulse_per_force * side.force,
-                       0.0, step_.least_impulse(side), step_.refinement(side));
-  step_.sides.push_back(side);
+  rows_.add({0, gap, size, 0.0}, i, j, atom->tag[j], normal);
 }
 
-// A pair that the contact law remembers is in the problem even if it is farther apart than others
+// A pair of which something is remembered is in the problem even if it is farther apart than others
 // in it.
 bool PairConstraints::is_remembered(int i, int j) const
 {
@@ -197,7 +189,7 @@ bool PairConstraints::is_remembered(int i, int j) const
   const double distance = norm(away);
   const double normal[3] = {away[0] / distance, away[1] / distance, away[2] / distance};
   const double size = atom->radius[i] + atom->radius[j];
-  return laws_.remembers(i, atom->tag[j], normal, distance - size, size);
+  return rows_.remembers(i, atom->tag[j], normal, distance - size, size);
 }
 
 double PairConstraints::gap_at_end(int i, int j, double *away) const

@@ -13,18 +13,16 @@
 
 namespace LAMMPS_NS {
 
-class ContactMemory;
+class ContactRows;
 class EntangledBodies;
 class GapRules;
-class LawContacts;
 class NeighList;
 class Movers;
 
 class PairConstraints : protected Pointers {
  public:
-  PairConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
-                  const EntangledBodies &entangled, const ContactMemory &memory,
-                  const Movers &movers);
+  PairConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows,
+                  const EntangledBodies &entangled, const Movers &movers);
 
   void use(NeighList *list) { list_ = list; }
 
@@ -62,9 +60,8 @@ class PairConstraints : protected Pointers {
 
   Step &step_;
   GapRules &rules_;
-  LawContacts &laws_;
+  ContactRows &rows_;
   const EntangledBodies &entangled_;
-  const ContactMemory &memory_;
   const Movers &movers_;
   NeighList *list_ = nullptr;
   std::vector<char> taken_;    // per pair of the neighbour list: whether it is in the problem

@@ -36,6 +36,18 @@ constexpr double COINCIDENT = 1.0e-10;
 // This value is below (with a minus sign) or above every value that is compared with it.
 constexpr double EXTREME = 1.0e300;
 
+// What a contact asks for beside that its surfaces stay apart. An inelastic one asks for nothing.
+struct Asked {
+  double least_impulse = 0.0;      // [mass length / time] <= 0: it may pull by so much
+  bool parts = false;              // its surfaces are to part, at least
+  double parting_speed = 0.0;      // with this speed [length / time]
+  double predicted_speed = 0.0;    // [length / time] with which they part without contacts
+
+  // By this the contact is solved more accurately than others (contact_set.h). A speed with which
+  // surfaces part is asked for where they collide, maybe hundreds of times: errors of it add up.
+  double refinement() const { return parts ? 1.0 / 16.0 : 1.0; }
+};
+
 // The row beside each constraint of the problem.
 struct Side {
   int wall;              // the wall's number; 0 = the second side is a particle
@@ -47,14 +59,14 @@ struct Side {
   double to_stop = 0.0;       // [length] what the contact has to stop (gap_rules.h)
   bool as_at_start = true;    // the constraint asks for what it asked for at the start of the step
   bool followed = false;      // the gap was set by where an earlier solution of the step ends
-  int law_contact = -1;       // in Step::law_contacts; -1: there is no law
+  Asked asked = {};
+  int law_contact = -1;    // in Step::law_contacts; -1: there is no law
 };
 
 // A contact as the contact law sees it (law_contacts.h).
 struct LawContact {
   inelastic::Demand demand;
   std::array<double, inelastic::ContactLaw::MOST_REMEMBERED> remembered;
-  double predicted_speed = 0.0;    // [length / time] with which the surfaces part, without contacts
   double impulse = 0.0;    // [mass length / time] over its constraints, when the step is solved
   double last_impulse = 0.0;    // [mass length / time] in the last step
   bool known = false;           // something was remembered of it
@@ -113,21 +125,8 @@ struct Step {
   const LawContact *law_contact(const Side &side) const
   { return side.law_contact < 0 ? nullptr : &law_contacts[side.law_contact]; }
 
-  // [mass length / time] See contact_set.h.
-  double least_impulse(const Side &side) const
-  { return side.law_contact < 0 ? 0.0 : law_contacts[side.law_contact].demand.least_impulse; }
-
-  // By this a constraint is solved more accurately than others (contact_set.h). A law asks for a
-  // speed with which surfaces part where they collide, maybe hundreds of times: errors of it add
-  // up.
-  double refinement(const Side &side) const
-  {
-    constexpr double PARTING = 1.0 / 16.0;
-    return side.law_contact >= 0 && law_contacts[side.law_contact].demand.parts ? PARTING : 1.0;
-  }
-
-  // Tells whether the law lets a constraint pull.
-  bool may_hold(std::size_t c) const { return least_impulse(sides[c]) < 0.0; }
+  // Tells whether a constraint may pull.
+  bool may_hold(std::size_t c) const { return sides[c].asked.least_impulse < 0.0; }
 
   // Tells whether a constraint holds: it may pull, and with the present impulse it does not open.
   bool holds(std::size_t c) const

@@ -1,9 +1,7 @@
 #include "wall_constraints.h"
 
-#include "contact_memory.h"
 #include "gap_rules.h"
 #include "ghost_exchange.h"
-#include "law_contacts.h"
 
 #include "atom.h"
 
@@ -26,11 +24,10 @@ bool is_image(const RegionWalls::Viewpoint &from)
 
 }    // namespace
 
-WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
-                                 RegionWalls &walls, GhostExchange &ranks,
-                                 const ContactMemory &memory, const Movers &movers) :
-    Pointers(lmp), step_(step), rules_(rules), laws_(laws), walls_(walls), ranks_(ranks),
-    memory_(memory), movers_(movers), periods_(lmp)
+WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows,
+                                 RegionWalls &walls, GhostExchange &ranks, const Movers &movers) :
+    Pointers(lmp), step_(step), rules_(rules), rows_(rows), walls_(walls), ranks_(ranks),
+    movers_(movers), periods_(lmp)
 {
 }
 
@@ -41,13 +38,13 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
   viewpoints_.clear();
   const double h = step_.problem.timestep;
   // A wall that moves away from a sphere that it holds may be far at the end of the step.
-  const bool may_be_far = laws_.has_law() && walls_.any_moves();
+  const bool may_be_far = rows_.may_hold() && walls_.any_moves();
   const double anywhere = periods_.widest();
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
     const double near = atom->radius[i] + beyond + h * norm(velocity + 3 * i);
-    const double reach = may_be_far && laws_.remembers_wall(i) ? std::max(near, anywhere) : near;
+    const double reach = may_be_far && rows_.remembers_wall(i) ? std::max(near, anywhere) : near;
     if (reach >= clear_of_walls_[i]) viewpoints_.push_back({i, {x[0], x[1], x[2]}, reach});
   }
   return viewpoints_;
@@ -109,7 +106,7 @@ void WallConstraints::collect(double margin)
         rules_.overlaps().note(gap_now, from.atom, -view.wall);
         const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
         if (gap + std::min(0.0, opening) <= margin ||
-            laws_.remembers(from.atom, -view.wall, view.normal, gap_now, atom->radius[from.atom]))
+            rows_.remembers(from.atom, -view.wall, view.normal, gap_now, atom->radius[from.atom]))
           take(from, view);
       },
       [&](const RegionWalls::Viewpoint &from, const std::string &region) {
@@ -131,21 +128,13 @@ void WallConstraints::note_overlaps_with_moving_walls()
 
 void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &view)
 {
-  inelastic::ContactProblem &problem = step_.problem;
   const int i = from.atom;
   const double size = atom->radius[i];
   const double gap_now = view.distance_now - size;
   const double motion = view.distance_now - view.distance;
-  constraint_[key(i, view.wall)] = problem.contacts.size();
-  Side side = {view.wall, gap_now, size, motion};
-  if (laws_.has_law())
-    laws_.ask(side, i, problem.particles, -view.wall, view.normal,
-              rules_.overlaps().is_bad(gap_now));
-  rules_.begin(side, memory_.find(i, -view.wall), i, problem.particles, view.normal);
-  problem.contacts.add(i, problem.particles, view.normal, rules_.asked_gap(side),
-                       step_.impulse_per_force * side.force, 0.0, step_.least_impulse(side),
-                       step_.refinement(side));
-  step_.sides.push_back(side);
+  constraint_[key(i, view.wall)] = step_.problem.contacts.size();
+  rows_.add({view.wall, gap_now, size, motion}, i, step_.problem.particles, -view.wall,
+            view.normal);
 }
 
 long WallConstraints::add_violated()
@@ -200,6 +189,7 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   if (known) side.force = step_.sides[existing->second].force;
   if (known) side.closed_gap = step_.sides[existing->second].closed_gap;
   if (known) side.to_stop = step_.sides[existing->second].to_stop;
+  if (known) side.asked = step_.sides[existing->second].asked;
   if (known) side.law_contact = step_.sides[existing->second].law_contact;
   rules_.overlaps().note(side.gap_now, i, -view.wall);
   // This makes it exact for this motion, also where a body turns.
@@ -216,13 +206,8 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
     step_.excess = std::max(step_.excess, -gap_there);
     return 0;
   }
-  inelastic::ContactProblem &problem = step_.problem;
-  // A wall that is seen late only pushes in this step.
-  if (!known && laws_.has_law())
-    laws_.ask(side, i, problem.particles, -view.wall, view.normal, true);
-  constraint_[key(i, view.wall)] = problem.contacts.size();
-  problem.contacts.add(i, problem.particles, view.normal, gap, 0.0);
-  step_.sides.push_back(side);
+  constraint_[key(i, view.wall)] = step_.problem.contacts.size();
+  rows_.add_plane(side, i, view.normal, gap, known);
   return 1;
 }
 
@@ -256,7 +241,7 @@ long WallConstraints::relinearise(double margin)
   return changed + add_planes_within(beyond);
 }
 
-// Tells whether a constraint is that of a contact which the law may hold, not in a bad start, and
+// Tells whether a constraint is that of a contact which may be held, not in a bad start, and
 // where the wall at the end of the step does not face another way.
 bool WallConstraints::may_hold(std::size_t c, const double *normal_at_end) const
 {

@@ -5,6 +5,7 @@
 #ifndef INELASTIC_WALL_CONSTRAINTS_H
 #define INELASTIC_WALL_CONSTRAINTS_H
 
+#include "contact_rows.h"
 #include "mover.h"
 #include "periods.h"
 #include "region_walls.h"
@@ -19,19 +20,16 @@
 
 namespace LAMMPS_NS {
 
-class ContactMemory;
 class GapRules;
 class GhostExchange;
-class LawContacts;
 
 class WallConstraints : protected Pointers {
  public:
-  WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, LawContacts &laws,
-                  RegionWalls &walls, GhostExchange &ranks, const ContactMemory &memory,
-                  const Movers &movers);
+  WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows,
+                  RegionWalls &walls, GhostExchange &ranks, const Movers &movers);
 
-  // Tells whether the end of a step must be looked at: bodies turn, walls curve, or a law may hold
-  // spheres to an obstacle, about which they turn.
+  // Tells whether the end of a step must be looked at: bodies turn, walls curve, or contacts may
+  // hold spheres to an obstacle, about which they turn.
   bool need_relinearising() const { return !walls_.empty() && !(walls_.exact() && only_inexact()); }
 
   // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
@@ -54,8 +52,7 @@ class WallConstraints : protected Pointers {
   { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
 
   // Tells whether only walls without exact constraints can be met at the end of a step.
-  bool only_inexact() const
-  { return !movers_.any_turns() && !periods_.any() && !step_.settings.law; }
+  bool only_inexact() const { return !movers_.any_turns() && !periods_.any() && !rows_.may_hold(); }
   bool wrap(RegionWalls::Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
@@ -71,10 +68,9 @@ class WallConstraints : protected Pointers {
 
   Step &step_;
   GapRules &rules_;
-  LawContacts &laws_;
+  ContactRows &rows_;
   RegionWalls &walls_;
   GhostExchange &ranks_;
-  const ContactMemory &memory_;
   const Movers &movers_;
   const Periods periods_;
   std::unordered_map<std::uint64_t, std::size_t> constraint_;    // atom and wall -> the latest one
