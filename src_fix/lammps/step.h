@@ -79,38 +79,58 @@ struct Step {
   const Settings &settings;
   const bool has_bodies;    // of the settings: asked for every particle
 
+  // Of the run. The room that writes a field stands behind it.
+
   // A step of this run came before, so that momenta are carried along and its prediction can be
-  // compared with what moved.
+  // compared with what moved. (motion_check)
   bool continues = false;
-  Kick kick = Kick::WHOLE;
+  // [time] as the deck sets it; problem.timestep may be shorter (step_length)
+  double regular_timestep = 0.0;
+  double largest_radius = 0.0;    // [length] in the group, on all ranks (step_length)
+
+  // Of the step: where forces act.
+
+  Kick kick = Kick::WHOLE;    // (fix_inelastic)
   // The time for which forces act before the next move, in units that turn a force into a momentum.
+  // (fix_inelastic)
   double impulse_per_force = 0.0;
-  double regular_timestep = 0.0;    // [time] as the deck sets it; problem.timestep may be shorter
-  double largest_radius = 0.0;      // [length] in the group, on all ranks
 
-  // The problem. Particles are the owned atoms, then the ghosts.
+  // The problem. Particles are the owned atoms, then the ghosts. (sizes: fix_inelastic; velocities
+  // and masses: the movers; bodies: body_members, body_inertia; contacts: contact_rows, and their
+  // gaps gap_rules and push_apart; impulses: the solver)
   inelastic::ContactProblem problem;
-  std::vector<Side> sides;                 // one per constraint
-  std::vector<LawContact> law_contacts;    // empty without a contact law
-  std::vector<double>
-      velocity_before;             // 3 per particle and 3 zeros, before forces; only with a law
-  std::vector<double> velocity;    // 3 per particle, the projection
-  // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn.
-  std::vector<double> motion_of_bodies;
-
+  std::vector<Side> sides;                 // one per constraint (contact_rows, gap_rules)
+  std::vector<LawContact> law_contacts;    // empty without a contact law (law_contacts)
+  // 3 per particle and 3 zeros, before forces; only with a law (the movers)
+  std::vector<double> velocity_before;
   // 3 per particle, of which the first is the factor by which the forces on one that is at rest
   // have changed since the last step; 0 where this is not known. Empty if nothing is at rest.
+  // (rest)
   std::vector<double> load_change;
 
-  // This is known after constraints were collected.
-  Phase phase = Phase::CONTACT;
-  bool bad_start = false;          // some overlap at the start is beyond the regular ones
-  bool keeps_overlaps = false;     // regular ones are given back by the push out of bad ones alone
-  double largest_overlap = 0.0;    // [length] at the start
-  double excess = 0.0;             // [length] the overlap at the end beyond the regular ones
-  int relinearisations = 0;        // rounds that have looked at the end of the step
-  bool at_rest = false;            // nothing moves in this step (rest.h)
-  std::string problem_found;    // what went wrong on this rank while collecting; empty if nothing
+  // Of the step: what solves it.
+
+  std::vector<double> velocity;    // 3 per particle, the projection (the core, hold_still)
+  // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn (the
+  // movers)
+  std::vector<double> motion_of_bodies;
+
+  // Of the step, known after constraints were collected.
+
+  Phase phase = Phase::CONTACT;    // (constraints, push_apart)
+  bool bad_start = false;    // some overlap at the start is beyond the regular ones (overlap_watch)
+  // Regular overlaps are given back by the push out of bad ones alone. (fix_inelastic)
+  bool keeps_overlaps = false;
+  double largest_overlap = 0.0;    // [length] at the start (overlap_watch)
+  // [length] the overlap at the end beyond the regular ones (constraints; gap_rules,
+  // wall_constraints)
+  double excess = 0.0;
+  // Rounds that have looked at the end of the step. (constraints, push_apart)
+  int relinearisations = 0;
+  bool at_rest = false;    // nothing moves in this step (rest)
+  // What went wrong on this rank while collecting; empty if nothing. (pair_constraints,
+  // wall_constraints)
+  std::string problem_found;
 
   // The part of a whole kick for which the forces act.
   double kicks() const { return kick == Kick::WHOLE ? 1.0 : 0.5; }
