@@ -11,7 +11,7 @@
 
 Everything gets its name by a rename when it is complete: whatever is cut off, at any moment, leaves
 nothing behind that looks finished. A case's folder name is unique to its variables, and studies in
-one folder share their cases.
+one folder share their cases. What version 0.2 has left under a longer name stays under that.
 """
 
 from __future__ import annotations
@@ -61,15 +61,15 @@ class Folder:
 
     def case(self, case: Case) -> Path:
         """Return where a finished run is."""
-        return self.root / "cases" / case.name
+        return place_of(self.root / "cases", case)
 
     def part(self, case: Case) -> Path:
         """Return where a run is under way."""
-        return self.case(case).with_name(f"{case.name}.part")
+        return place_of(self.root / "cases", case, ".part")
 
     def failure(self, case: Case) -> Path:
         """Return where the last failed run is."""
-        return self.case(case).with_name(f"{case.name}.failed")
+        return place_of(self.root / "cases", case, ".failed")
 
     def check_there(self) -> None:
         """See that the folder is there; raise WorkflowError with one line if it is not."""
@@ -78,7 +78,7 @@ class Folder:
 
     def result(self, study: Study, case: Case) -> Path:
         """Return where the measurements of a case are."""
-        return self.result_folder(study) / f"{case.name}.h5"
+        return place_of(self.result_folder(study), case, ".h5")
 
     def result_folder(self, study: Study) -> Path:
         """Return where all measurements of a study are."""
@@ -276,6 +276,20 @@ class Folder:
     def _of_failure(self, case: Case, what: str) -> str:
         said = (json_of(self.failure(case) / FAILED) or {}).get(what, UNKNOWN)
         return " ".join(str(said).split()) or UNKNOWN
+
+
+def place_of(folder: Path, case: Case, ending: str = "") -> Path:
+    """Return where something of a case is or would be: what version 0.2 has left, or else its own.
+
+    Parameters
+    ----------
+    folder : folder that holds something of each case, under its name
+    case : the case
+    ending : what follows the name, such as `.h5`
+    """
+    path = folder / f"{case.name}{ending}"
+    before = folder / f"{case.name_before}{ending}"
+    return before if os.path.lexists(before) and not os.path.lexists(path) else path
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from pathlib import Path
 from .errors import WorkflowError
 from .files import whole
 from .finished import other_run
-from .folder import Folder
+from .folder import Folder, place_of
 from .provenance import differs
 from .same_runs import same_runs
 from .store import StoredStudy, origin_of, read_result
@@ -58,7 +58,8 @@ def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool 
     count = other = 0
     same = same_runs(source)
     for case in study.cases:
-        kept, target = source / study.name / f"{case.name}.h5", folder.result(study, case)
+        kept = place_of(source / study.name, case, ".h5")
+        target = folder.result(study, case)
         if folder.is_measured(study, case) or not kept.is_file():
             continue
         try:

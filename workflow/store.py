@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from .errors import WorkflowError
 from .files import whole
 from .schema import PICTURES, SCHEMA, VERSION
+from .study.case_name import name_in
 
 Array = NDArray[Any]
 
@@ -60,7 +61,7 @@ class Result:
     @property
     def case(self) -> str:
         """The name of the case."""
-        return str(self.record["case"])
+        return name_in(self.record)
 
     @property
     def variables(self) -> dict[str, Any]:

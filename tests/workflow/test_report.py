@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import csv
+import hashlib
 import io
 import itertools
 import math
@@ -113,7 +114,7 @@ def result(
     values.setdefault("numbers/resolution", np.asarray(0.005))
     words = "_".join(f"{name}={value}" for name, value in variables.items())
     record = {
-        "case": f"{deck}_{words}",
+        "case": f"{deck}_{hashlib.sha256(words.encode()).hexdigest()[:8]}",
         "deck": deck,
         "fingerprint": "0",
         "stages": [

@@ -72,7 +72,8 @@ def _chosen(study: Study, wanted: Iterable[str] | None) -> list[Case]:
     """Return the cases that are asked for, each once; all if none is."""
     if wanted is None:
         return list(study.cases)
-    cases = {case.name: case for case in study.cases}
+    # Scripts may hold names that version 0.2 has shown.
+    cases = {name: case for case in study.cases for name in (case.name_before, case.name)}
     cases |= {str(number): case for number, case in enumerate(study.cases, 1)}
     chosen = []
     for name in wanted:

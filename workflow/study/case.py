@@ -13,13 +13,8 @@ from typing import Any
 
 from ..decks import OUT, PACKING, Deck, Value
 from ..files import digest_of
+from .case_name import DIGEST_LENGTH, as_word, name_before, name_of, unused_in
 from .file_format import Outputs
-
-LONGEST_NAME = 160
-# The files that decks read have a folder of their own in a case's, so that they may have any name.
-INPUTS = "inputs"
-# The name of a case shows these variables even at their defaults, and others where they differ.
-ALWAYS_SHOWN = ("particles", "aspect_ratio", "change", "seed")
 
 
 @dataclass(frozen=True)
@@ -62,8 +57,7 @@ class Stage:
     @property
     def unused(self) -> frozenset[str]:
         """The variables that mean nothing: a start from a file has particles of its own."""
-        from_file = str(self.variables.get("start")).startswith(f"{INPUTS}/")
-        return frozenset({"particles"} if from_file else ())
+        return unused_in(self.variables)
 
 
 @dataclass(frozen=True)
@@ -91,17 +85,27 @@ class Case:
 
     @cached_property
     def name(self) -> str:
-        """The name of the case's folder: what tells it from others, and a hash of all that is set.
+        """The name of the case's folder and result, which depends on this case alone.
 
-        It depends on nothing else in the study, so that a study can be extended.
+        So a study can be extended.
         """
-        shown = {
-            name: value
+        return name_of(self._stages_set, self._digest)
+
+    @cached_property
+    def name_before(self) -> str:
+        """The name that version 0.2 gave the case, which is another one where it is long."""
+        return name_before(self._stages_set, self._digest)
+
+    @property
+    def _stages_set(self) -> list[dict[str, Any]]:
+        return [
+            {"deck": stage.deck.name, "values": stage.values, "variables": stage.variables}
             for stage in self.stages
-            for name, value in stage.variables.items()
-            if name in stage.values or (name in ALWAYS_SHOWN and name not in stage.unused)
-        }
-        words = [self.deck, *(f"{name}={_as_word(v)}" for name, v in shown.items())]
+        ]
+
+    @cached_property
+    def identity(self) -> str:
+        """All that is set, as JSON: two cases are the same where it is."""
         # Defaults are left out, as a deck may get a new variable; `is_of` sees when one changes.
         identity = {
             "stages": [
@@ -111,10 +115,11 @@ class Case:
             ],
             "inputs": {name: file.digest for name, file in self.inputs.items()},
         }
-        text = json.dumps(identity, sort_keys=True)
-        digest = hashlib.sha256(text.encode()).hexdigest()[:8]
-        readable = re.sub(r"[^\w.=+-]", "-", "_".join(words), flags=re.ASCII)
-        return f"{readable[:LONGEST_NAME]}_{digest}"
+        return json.dumps(identity, sort_keys=True)
+
+    @property
+    def _digest(self) -> str:
+        return hashlib.sha256(self.identity.encode()).hexdigest()[:DIGEST_LENGTH]
 
     @property
     def fingerprint(self) -> str:
@@ -160,7 +165,7 @@ class Case:
                 values[PACKING] = f"{before}/packing.restart"
             command = ["lmp", "-nonbuf", "-in", f"{stage.deck.name}.in"]
             for name, value in values.items():
-                command += ["-var", name, _as_word(value)]
+                command += ["-var", name, as_word(value)]
             if ranks > 1:
                 command = ["mpiexec", "-bind-to", "core", "-n", str(ranks), *command]
             commands.append(command)
@@ -211,7 +216,3 @@ def takes_out(deck: Deck) -> bool:
 def is_word(text: str) -> bool:
     """Say whether LAMMPS takes a text as one word wherever a deck may put it."""
     return text.isprintable() and not re.search(r"[\s$\"'&]|^$", text)
-
-
-def _as_word(value: Value) -> str:
-    return value if isinstance(value, str) else repr(value)

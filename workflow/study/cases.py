@@ -12,7 +12,8 @@ from ..decks import Deck, Value, file_of, find_deck
 from ..errors import WorkflowError, meant
 from ..files import is_file, read_regular
 from ..shipped import DECKS
-from .case import INPUTS, Case, Input, is_word, stage_of
+from .case import Case, Input, is_word, stage_of
+from .case_name import INPUTS
 from .file_format import StudyFile
 from .stages import misfit
 from .values import MOST_CASES, values_of
@@ -37,7 +38,7 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
     mistakes : list to which one line for each mistake is added
     """
     known: set[str] = set()
-    seen: set[str] = set()
+    seen: dict[str, str] = {}
     files: dict[Path, Input] = {}
     missing = False
     rows = file.rows or [{}]
@@ -83,8 +84,13 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
             if wrong := misfit(case.stages):
                 mistakes.append(f"{keys.get(wrong[0], keys['deck'])}: {wrong[1]}")
             elif case.name not in seen:
-                seen.add(case.name)
+                seen[case.name] = case.identity
                 yield case
+            elif seen[case.name] != case.identity:
+                mistakes.append(
+                    f"{where}: two cases have the name {case.name}, whose hash is the same by "
+                    "chance; leave out one of them"
+                )
     if missing:
         # The variables of a deck that was not found are not known.
         return
