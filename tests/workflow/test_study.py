@@ -85,9 +85,12 @@ def mistakes_of(path: Path) -> list[str]:
             HEAD + "[outputs]\nboxx = 1",
             "outputs.boxx: no such key (did you mean box?); allowed are box, points",
         ),
-        (HEAD + "[outputs]\nbox = 'big'", "outputs.box: it must be six numbers"),
-        (HEAD + "[outputs]\nbox = [0, 1, 0, 1]", "outputs.box: it must be six numbers"),
-        (HEAD + "[outputs]\nbox = [0, 1, 0, 1, 0, 1, 2]", "outputs.box: it must be six numbers"),
+        (HEAD + "[outputs]\nbox = 'big'", "outputs.box: it must be six numbers or cell"),
+        (HEAD + "[outputs]\nbox = [0, 1, 0, 1]", "outputs.box: it must be six numbers or cell"),
+        (
+            HEAD + "[outputs]\nbox = [0, 1, 0, 1, 0, 1, 2]",
+            "outputs.box: it must be six numbers or cell",
+        ),
         (HEAD + "[outputs]\nbox = [1, 0, 0, 1, 0, 1]", "each lower bound the lesser"),
         (HEAD + "[outputs]\nbox = [0, inf, 0, 1, 0, 1]", "each lower bound the lesser"),
         (HEAD + "[outputs]\npoints = 0", "outputs.points: 0 is not allowed"),
@@ -108,7 +111,10 @@ def mistakes_of(path: Path) -> list[str]:
         (HEAD + "[outputs]\npoints = 10000000000", "must be a whole number from 1 to 100000000"),
         (HEAD + "[outputs]\npoints = '1000'", "must be a whole number from 1 to 100000000"),
         (HEAD + "[outputs]\nevolution = 'yes'", "outputs.evolution: 'yes' is not allowed"),
-        (HEAD + "[outputs]\nbox = ['0', 1, 0, 1, 0, 1]", "outputs.box: it must be six numbers"),
+        (
+            HEAD + "[outputs]\nbox = ['0', 1, 0, 1, 0, 1]",
+            "outputs.box: it must be six numbers or cell",
+        ),
         (HEAD + "[outputs]\nbox = [0, 1, 0, 1, 0, nan]", "each lower bound the lesser"),
         (HEAD + "[outputs]\nbox = [0, 1e-200, 0, 1e-200, 0, 1]", "each lower bound the lesser"),
         (

@@ -18,7 +18,7 @@ LONGEST_LINE = 2000
 KINDS = {"dict_type": "a table", "model_type": "a table", "list_type": "a list"}
 KINDS |= {"tuple_type": "a list"}
 # Pydantic has several things to say of these keys at a time.
-WHOLE = {("deck",): "a name or a list of names", ("outputs", "box"): "six numbers"}
+WHOLE = {("deck",): "a name or a list of names", ("outputs", "box"): "six numbers or cell"}
 
 
 def placed(mistakes: Sequence[str], path: Path, text: str) -> list[str]:
