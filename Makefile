@@ -37,7 +37,7 @@ style: setup
 	ruff check .
 	ruff format --check .
 	clang-format --dry-run -Werror --style=file $$(find src_fix tests/core tests/npz -name '*.h' -o -name '*.cpp')
-	mypy -p lammps_inelastic.analysis -p lammps_inelastic.workflow -p tests
+	mypy -p lammps_inelastic.core -p lammps_inelastic.analysis -p lammps_inelastic.workflow -p tests
 
 test: style
 	$(PYTEST) -m "not slow and not validation"

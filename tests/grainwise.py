@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from lammps_inelastic import core
-from lammps_inelastic.workflow.records import Recorded, read_record, records
+from lammps_inelastic.workflow.tradeoff.states import records_in
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -74,18 +74,16 @@ class Grains:
         return found
 
 
-def grains_of(problem: Recorded) -> Grains:
+def grains_of(record: core.Record) -> Grains:
     """Return the grains of a problem."""
-    a = problem.arrays
-    free = a["inverse_mass"] > 0
+    problem = record.problem
+    free = problem.inverse_mass > 0
     of_particle = np.full(free.size, -1, np.int64)
-    mass = 1 / np.where(free, a["inverse_mass"], 1.0)
-    if "molecule" not in a:
+    mass = 1 / np.where(free, problem.inverse_mass, 1.0)
+    if problem.bodies is None:
         of_particle[free] = np.arange(free.sum())
         return Grains(of_particle, mass[free], free.astype(float))
-    bodies = problem.bodies
-    body: Indices = bodies["body"]
-    inverse: Floats = bodies["body_inverse_mass"]
+    body, inverse = problem.bodies.body, problem.bodies.inverse_mass
     in_body = body >= 0
     moving = np.flatnonzero(inverse > 0)
     number = np.full(inverse.size, -1, np.int64)
@@ -96,50 +94,37 @@ def grains_of(problem: Recorded) -> Grains:
     masses = np.concatenate([1 / inverse[moving], mass[alone]])
     share = np.zeros(free.size)
     moves = of_particle >= 0
-    share[moves] = a["mass"][moves] / masses[of_particle[moves]]
+    share[moves] = record.arrays["mass"][moves] / masses[of_particle[moves]]
     return Grains(of_particle, masses, share)
 
 
-def least_impulse(problem: Recorded) -> Floats:
-    """Return the least impulse of each constraint."""
-    return problem.arrays.get("least_impulse", np.zeros(problem.first.size))
-
-
-def compliance(problem: Recorded) -> Floats:
-    """Return the compliance of each constraint; zeros from a version that has none."""
-    return problem.arrays.get("compliance", np.zeros(problem.first.size))
-
-
-def velocity_of(problem: Recorded, impulse: Floats) -> Floats:
+def velocity_of(problem: core.Problem, impulse: Floats) -> Floats:
     """Return V* + M^-1 G^T lambda, in plain NumPy."""
-    a = problem.arrays
-    push = np.zeros_like(a["predicted_velocity"])
+    push = np.zeros_like(problem.predicted_velocity)
     pairs = problem.second >= 0
-    along = impulse[:, None] * a["normal"]
+    along = impulse[:, None] * problem.normal
     np.add.at(push, problem.first, along)
     np.add.at(push, problem.second[pairs], -along[pairs])
-    change = push * a["inverse_mass"][:, None]
-    if "molecule" in a:
+    change = push * problem.inverse_mass[:, None]
+    if problem.bodies is not None:
         bodies = problem.bodies
-        body: Indices = bodies["body"]
-        inside = body >= 0
-        arm, number = a["arm"][inside], body[inside]
-        force = np.zeros((bodies["body_inverse_mass"].size, 3))
+        inside = bodies.body >= 0
+        arm, number = bodies.arm[inside], bodies.body[inside]
+        force = np.zeros((bodies.inverse_mass.size, 3))
         torque = np.zeros_like(force)
         np.add.at(force, number, push[inside])
         np.add.at(torque, number, np.cross(arm, push[inside]))
-        slide = bodies["body_inverse_mass"][:, None] * force
-        turn = np.einsum("bij,bj->bi", bodies["body_inverse_inertia"], torque)
+        slide = bodies.inverse_mass[:, None] * force
+        turn = np.einsum("bij,bj->bi", bodies.inverse_inertia, torque)
         change[inside] = slide[number] + np.cross(turn[number], arm)
-    return a["predicted_velocity"] + change
+    return problem.predicted_velocity + change
 
 
-def gap_at_end(problem: Recorded, velocity: Floats, impulse: Floats) -> Floats:
+def gap_at_end(problem: core.Problem, velocity: Floats, impulse: Floats) -> Floats:
     """Return w = gap + h G V + C lambda of each constraint, in plain NumPy."""
-    a = problem.arrays
     second = np.where(problem.second[:, None] >= 0, velocity[problem.second], 0.0)
-    approach = np.einsum("ij,ij->i", a["normal"], velocity[problem.first] - second)
-    return a["gap"] + problem.timestep * approach + compliance(problem) * impulse
+    approach = np.einsum("ij,ij->i", problem.normal, velocity[problem.first] - second)
+    return problem.gap + problem.timestep * approach + problem.compliance * impulse
 
 
 @dataclass(frozen=True)
@@ -171,54 +156,40 @@ class Exact:
     bound: float
 
 
-def arguments_of(problem: Recorded) -> dict[str, Any]:
-    """Return what `core.project` takes beside the spheres; no compliance where there is none."""
-    found: dict[str, Any] = dict(problem.bodies)
-    if np.any(compliance(problem)):
-        found["compliance"] = compliance(problem)
-    if "least_impulse" in problem.arrays:
-        found["least_impulse"] = least_impulse(problem)
-    return found
-
-
-def solve(problem: Recorded, gravity: float = GRAVITY) -> Exact:
+def solve(record: core.Record, gravity: float = GRAVITY) -> Exact:
     """Solve a problem to EXACT, and further where that leaves too much of the velocities.
 
     Where the package's solver does not get there, Clarabel's impulses are tried, and what the
     solver makes of them. Returns what is deep enough; if nothing is, what has the least bound.
     """
-    unit = gravity * problem.timestep
-    length = unit * problem.timestep
+    unit = gravity * record.problem.timestep
+    length = unit * record.problem.timestep
 
     def enough(found: Exact) -> bool:
         return found.residual <= 1.01 * EXACT * length and found.bound <= 0.2 * QUIET * unit
 
-    found = [_solve(problem, EXACT * length, problem.arrays["impulse"])]
+    found = [_solve(record, EXACT * length, record.arrays["impulse"])]
     if not enough(found[-1]) and found[-1].residual <= 1.01 * EXACT * length:
-        found.append(_solve(problem, FURTHER * length, found[-1].impulse))
+        found.append(_solve(record, FURTHER * length, found[-1].impulse))
     if not any(map(enough, found)):
-        found.append(judged(problem, clarabel_impulses(problem, gravity), 0))
-        found.append(_solve(problem, EXACT * length, found[-1].impulse))
-        found.append(_solve(problem, FURTHER * length, found[-1].impulse))
+        found.append(judged(record, clarabel_impulses(record, gravity), 0))
+        found.append(_solve(record, EXACT * length, found[-1].impulse))
+        found.append(_solve(record, FURTHER * length, found[-1].impulse))
     best = min(found, key=lambda one: (not enough(one), one.bound))
     return replace(best, iterations=sum(one.iterations for one in found))
 
 
-def _solve(problem: Recorded, tolerance: float, impulse: Floats) -> Exact:
+def _solve(record: core.Record, tolerance: float, impulse: Floats) -> Exact:
     found = core.project(
-        *problem.spheres,
-        timestep=problem.timestep,
-        tolerance=tolerance,
-        max_iterations=MOST_ITERATIONS,
-        impulse=impulse,
-        **arguments_of(problem),
+        replace(record.problem, impulse_guess=impulse),
+        core.Limits(tolerance, max_iterations=MOST_ITERATIONS),
     )
-    return judged(problem, found.impulse, found.iterations)
+    return judged(record, found.impulse, found.iterations)
 
 
-def jacobian(problem: Recorded) -> sparse.csr_matrix:
+def jacobian(problem: core.Problem) -> sparse.csr_matrix:
     """Return G (m, 3 n): (G V)_c = n_c . (v_first - v_second)."""
-    normal = problem.arrays["normal"]
+    normal = problem.normal
     pairs = problem.second >= 0
     axes, contacts = np.arange(3), np.arange(len(problem.first))
     rows = np.concatenate([np.repeat(contacts, 3), np.repeat(contacts[pairs], 3)])
@@ -226,35 +197,31 @@ def jacobian(problem: Recorded) -> sparse.csr_matrix:
         (3 * ends[:, None] + axes).ravel() for ends in (problem.first, problem.second[pairs])
     ]
     values = np.concatenate([normal.ravel(), -normal[pairs].ravel()])
-    shape = len(problem.first), 3 * len(problem.arrays["id"])
+    shape = len(problem.first), 3 * len(problem.inverse_mass)
     return sparse.csr_matrix((values, (rows, np.concatenate(columns))), shape=shape)
 
 
-def root(problem: Recorded) -> sparse.csr_matrix:
+def root(problem: core.Problem) -> sparse.csr_matrix:
     """Return R with M^-1 = R R^T: V = R y for coordinates y of unit mass.
 
     Those of free spheres are their velocities times the root of the mass; those of a body are its
     velocity and its angular velocities about the axes of inertia, so scaled.
     """
-    a = problem.arrays
-    number = len(a["id"])
-    body = np.full(number, -1)
-    bodies: dict[str, Any] = {}
-    if "molecule" in a:
-        bodies = problem.bodies
-        body = bodies["body"]
-    free = np.flatnonzero((body < 0) & (a["inverse_mass"] > 0))
+    inverse_mass, bodies = problem.inverse_mass, problem.bodies
+    number = len(inverse_mass)
+    body = np.full(number, -1) if bodies is None else bodies.body
+    free = np.flatnonzero((body < 0) & (inverse_mass > 0))
     rows = [(3 * free[:, None] + np.arange(3)).ravel()]
     columns = [np.arange(3 * free.size)]
-    values = [np.repeat(np.sqrt(a["inverse_mass"][free]), 3)]
+    values = [np.repeat(np.sqrt(inverse_mass[free]), 3)]
     width = 3 * free.size
-    if bodies:
+    if bodies is not None:
         inside = np.flatnonzero(body >= 0)
-        of, arm = body[inside], a["arm"][inside]
-        inverse_moments, axes = np.linalg.eigh(bodies["body_inverse_inertia"])
+        of, arm = body[inside], bodies.arm[inside]
+        inverse_moments, axes = np.linalg.eigh(bodies.inverse_inertia)
         # Point masses on a line do not turn about it.
         inverse_moments[inverse_moments < 1e-9 * inverse_moments[:, -1:]] = 0
-        motions = [np.sqrt(bodies["body_inverse_mass"])[of, None] * one for one in np.eye(3)]
+        motions = [np.sqrt(bodies.inverse_mass)[of, None] * one for one in np.eye(3)]
         for k in range(3):
             turns = axes[:, :, k] * np.sqrt(inverse_moments[:, k : k + 1])
             motions.append(np.cross(turns[of], arm))
@@ -262,12 +229,12 @@ def root(problem: Recorded) -> sparse.csr_matrix:
             rows.append((3 * inside[:, None] + np.arange(3)).ravel())
             columns.append(np.repeat(width + 6 * of + k, 3))
             values.append(motion.ravel())
-        width += 6 * len(bodies["body_inverse_mass"])
+        width += 6 * len(bodies.inverse_mass)
     entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
     return sparse.csr_matrix(entries, shape=(3 * number, width))
 
 
-def clarabel_impulses(problem: Recorded, gravity: float = GRAVITY) -> Floats:
+def clarabel_impulses(record: core.Record, gravity: float = GRAVITY) -> Floats:
     """Return impulses by Clarabel, an interior-point method that shares nothing with the fix.
 
     minimise 1/2 (y . y + s . s) - l . (G R y + (C / h)^1/2 s)
@@ -275,18 +242,19 @@ def clarabel_impulses(problem: Recorded, gravity: float = GRAVITY) -> Floats:
 
     in units of g h, g h^2 and the median mass; the dual variables are lambda - l.
     """
-    h, a = problem.timestep, problem.arrays
-    unit, mass = gravity * h, float(np.median(a["mass"]))
+    problem = record.problem
+    h = problem.timestep
+    unit, mass = gravity * h, float(np.median(record.arrays["mass"]))
     constraints = jacobian(problem)
-    gap = a["gap"] + h * (constraints @ a["predicted_velocity"].ravel())
-    soft = compliance(problem) * mass / h
+    gap = problem.gap + h * (constraints @ problem.predicted_velocity.ravel())
+    soft = problem.compliance * mass / h
     springs = np.flatnonzero(soft > 0)
     columns = np.arange(springs.size)
     roots = sparse.csr_matrix(
         (np.sqrt(soft[springs]), (springs, columns)), shape=(gap.size, springs.size)
     )
     moves = sparse.hstack([np.sqrt(mass) * (constraints @ root(problem)), roots]).tocsc()
-    least = least_impulse(problem) / (mass * unit)
+    least = problem.least_impulse / (mass * unit)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     # Out of reach, so that it goes as far as round-off lets it; the impulses are judged later.
@@ -302,9 +270,10 @@ def clarabel_impulses(problem: Recorded, gravity: float = GRAVITY) -> Floats:
     return mass * unit * (np.maximum(np.array(solution.z), 0.0) + least)
 
 
-def judged(problem: Recorded, impulse: Floats, iterations: int) -> Exact:
+def judged(record: core.Record, impulse: Floats, iterations: int) -> Exact:
     """Judge impulses by NumPy alone."""
-    least = least_impulse(problem)
+    problem = record.problem
+    least = problem.least_impulse
     if np.any(impulse < least):
         raise ValueError("an impulse is below its least one")
     velocity = velocity_of(problem, impulse)
@@ -314,7 +283,7 @@ def judged(problem: Recorded, impulse: Floats, iterations: int) -> Exact:
     pushing = above[above > 0]
     others = np.maximum(2 * above, pushing.mean() if pushing.size else 0.0)
     product = above @ np.maximum(w, 0.0) + others @ np.maximum(-w, 0.0)
-    lightest = grains_of(problem).mass.min()
+    lightest = grains_of(record).mass.min()
     bound = float(np.sqrt(product / (problem.timestep * lightest)))
     return Exact(velocity, impulse, iterations, float(residual), bound)
 
@@ -370,7 +339,7 @@ def largest_but(values: Floats, part: float) -> float:
 
 
 def compare(
-    problem: Recorded,
+    record: core.Record,
     *,
     gravity: float = GRAVITY,
     nominal_timestep: float | None = None,
@@ -383,12 +352,12 @@ def compare(
     nominal_timestep : gives the unit g h; the record's own step by default
     exact : solution to compare with; found here by default
     """
-    a = problem.arrays
+    a, problem = record.arrays, record.problem
     h = problem.timestep
     unit = gravity * (nominal_timestep or h)
-    exact = exact or solve(problem, gravity)
-    grains = grains_of(problem)
-    impulses = np.zeros(len(a["id"]))
+    exact = exact or solve(record, gravity)
+    grains = grains_of(record)
+    impulses = np.zeros(problem.inverse_mass.size)
     size = np.abs(exact.impulse)
     pairs = problem.second >= 0
     np.add.at(impulses, problem.first, size)
@@ -397,21 +366,21 @@ def compare(
     total = np.bincount(grains.of_particle[moves], impulses[moves], grains.mass.size)
     off = a["velocity"] - exact.velocity
     return Compared(
-        step=int(a["step"]),
+        step=record.step,
         timestep=h,
         iterations=int(a["iterations"]),
-        bodies=int((a["body_inverse_mass"] > 0).sum()) if "molecule" in a else 0,
+        bodies=0 if problem.bodies is None else int((problem.bodies.inverse_mass > 0).sum()),
         unit=unit,
         error=np.linalg.norm(grains.centre(off), axis=1) / unit,
         member_error=grains.largest_of_members(np.linalg.norm(off, axis=1)) / unit,
         allowed=np.maximum(QUIET, ACCURACY * total / grains.mass / unit),
         exact=exact,
-        residual=judged(problem, a["impulse"], 0).residual / (unit * h),
+        residual=judged(record, a["impulse"], 0).residual / (unit * h),
     )
 
 
-def part_of(problem: Recorded, chosen: NDArray[np.bool_]) -> Recorded:
-    """Return the problem of some of the spheres alone.
+def part_of(record: core.Record, chosen: NDArray[np.bool_]) -> core.Record:
+    """Return the record of some of the spheres alone.
 
     Raises ValueError if one of their constraints, or bodies, is with another sphere.
 
@@ -419,7 +388,7 @@ def part_of(problem: Recorded, chosen: NDArray[np.bool_]) -> Recorded:
     ----------
     chosen : which spheres, (n,)
     """
-    a = problem.arrays
+    a, problem = record.arrays, record.problem
     pairs = problem.second >= 0
     mine = chosen[problem.first]
     if np.any(mine[pairs] != chosen[problem.second[pairs]]):
@@ -448,15 +417,13 @@ def part_of(problem: Recorded, chosen: NDArray[np.bool_]) -> Recorded:
     if not bodies.any():
         for name in [name for name in arrays if name.startswith("body_")] + ["molecule", "arm"]:
             arrays.pop(name, None)
-    index = np.cumsum(chosen) - 1
-    second = np.where(problem.second[mine] >= 0, index[problem.second[mine]], -1)
-    return Recorded(arrays, index[problem.first[mine]], second)
+    return core.Record(arrays)
 
 
 def compare_folder(folder: Path, after: int = 2, **options: Any) -> list[Compared]:
     """Compare the records of a folder whose steps are later than `after`, in their order."""
-    problems = (read_record(path) for path in records(folder))
-    return [compare(one, **options) for one in problems if int(one.arrays["step"]) > after]
+    records = (core.read_record(path) for path in records_in(folder))
+    return [compare(one, **options) for one in records if one.step > after]
 
 
 HEADING = (

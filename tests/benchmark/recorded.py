@@ -14,17 +14,13 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from lammps_inelastic import core
-from lammps_inelastic.workflow.records import Recorded
 from lammps_inelastic.workflow.tradeoff.states import (
     MOMENTS,
     RECORD_EVERY,
     TOLERANCE,
+    from_zero,
     problems_of,
     timed,
 )
@@ -68,7 +64,7 @@ def scenes(particles: int, diameter: float) -> list[Scene]:
     ]
 
 
-def record(scene: Scene, folder: Path) -> dict[str, Recorded]:
+def record(scene: Scene, folder: Path) -> dict[str, core.Record]:
     """Let a start settle in `folder`; return its problems at the three moments."""
     values: dict[str, object] = {"particles": scene.particles, "diameter": scene.diameter}
     if scene.aspect_ratio is not None:
@@ -97,36 +93,20 @@ class Solved:
     seconds: float
 
 
-def _solve(problem: Recorded, tolerance: float, **options: Any) -> Solved | None:
-    def once() -> core.Projection:
-        return core.project(
-            *problem.spheres,
-            timestep=problem.timestep,
-            tolerance=tolerance,
-            max_iterations=MOST_ITERATIONS,
-            **(problem.contact_laws | problem.bodies | options),
-        )
-
-    result, seconds = timed(once)
+def _solve(problem: core.Problem, tolerance: float, solver: core.Solver = "apgd") -> Solved | None:
+    limits = core.Limits(tolerance, max_iterations=MOST_ITERATIONS)
+    result, seconds = timed(problem, limits, solver)
     return Solved(result.iterations, seconds) if result.converged else None
 
 
-def _power_iteration(problem: Recorded) -> float:
+def _power_iteration(problem: core.Problem) -> float:
     """Seconds that Uzawa's step size takes, which is not counted as part of it."""
-    a = problem.arrays
     start = time.perf_counter()
-    core.largest_eigenvalue(
-        a["inverse_mass"],
-        problem.first,
-        problem.second,
-        a["normal"],
-        **problem.bodies,
-        timestep=problem.timestep,
-    )
+    core.largest_eigenvalue(problem)
     return time.perf_counter() - start
 
 
-def compare(scene: Scene, problems: dict[str, Recorded]) -> tuple[list[float], list[float]]:
+def compare(scene: Scene, problems: dict[str, core.Record]) -> tuple[list[float], list[float]]:
     """Print a line for each problem and tolerance.
 
     Returns
@@ -135,21 +115,21 @@ def compare(scene: Scene, problems: dict[str, Recorded]) -> tuple[list[float], l
     number a problem: with the accelerated gradient from the last step's impulses, and from zero.
     """
     warm_ratios, cold_ratios = [], []
-    for moment, problem in problems.items():
-        radius = float(problem.arrays["radius"].min())
-        contacts = int((problem.arrays["impulse"] > 0).sum())
+    for moment, recorded in problems.items():
+        problem, zero = recorded.problem, from_zero(recorded.problem)
+        radius = float(recorded.arrays["radius"].min())
+        contacts = int((recorded.arrays["impulse"] > 0).sum())
         print(
-            f"  {scene.name}, {moment}: {len(problem.first):,} constraints, {contacts:,} contacts",
+            f"  {scene.name}, {moment}: {problem.gap.size:,} constraints, {contacts:,} contacts",
             flush=True,
         )
-        guess: NDArray[np.float64] = problem.arrays["impulse_guess"]
         step_size = _power_iteration(problem)
         for tolerance in TOLERANCES:
-            cold = _solve(problem, tolerance * radius)
-            warm = _solve(problem, tolerance * radius, impulse=guess)
+            cold = _solve(zero, tolerance * radius)
+            warm = _solve(problem, tolerance * radius)
             uzawa = None
             if tolerance in UZAWA_TOLERANCES:
-                uzawa = _solve(problem, tolerance * radius, solver="uzawa")
+                uzawa = _solve(problem, tolerance * radius, "uzawa")
             words = [
                 f"{name} {solved.iterations:6d} in {1e3 * solved.seconds:8.1f} ms"
                 for name, solved in (("warm", warm), ("from zero", cold))

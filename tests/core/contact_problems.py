@@ -26,7 +26,7 @@ UP = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Bodies:
-    """The arguments of ``core.project`` about rigid bodies."""
+    """What ``core.Bodies`` takes, in arrays that can be written to."""
 
     body: Indices
     arm: Floats
@@ -47,7 +47,7 @@ def no_bodies(particles: int) -> Bodies:
 
 @dataclass(frozen=True)
 class Problem:
-    """The arguments of ``core.project`` (their shapes, signs and units are in _core.pyi).
+    """What ``core.Problem`` takes, in arrays that can be written to.
 
     The inverse masses of particles in bodies are those of the body's parts.
     """
@@ -61,28 +61,26 @@ class Problem:
     timestep: float
     bodies: Bodies
 
-    @property
-    def arguments(self) -> tuple[Floats, Floats, Indices, Indices, Floats, Floats]:
-        return (
-            self.predicted_velocity,
-            np.where(self.bodies.body < 0, self.inverse_mass, np.nan),  # not read in bodies
-            self.first,
-            self.second,
-            self.normal,
-            self.gap,
-        )
+    def for_core(self, **contacts: Any) -> core.Problem:
+        """Return the problem as the core takes it, with more about its contacts.
 
-    @property
-    def body_arguments(self) -> dict[str, Any]:
-        """Nothing in a scene without bodies."""
-        if self.bodies.inverse_mass.size == 0:
-            return {}
-        return {
-            "body": self.bodies.body,
-            "arm": np.where(self.bodies.body[:, None] < 0, np.nan, self.bodies.arm),  # not read
-            "body_inverse_mass": self.bodies.inverse_mass,
-            "body_inverse_inertia": self.bodies.inverse_inertia,
-        }
+        What the core says that it does not read is no number.
+        """
+        given = self.bodies
+        free = given.body < 0
+        arm = np.where(free[:, None], np.nan, given.arm)
+        bodies = core.Bodies(given.body, arm, given.inverse_mass, given.inverse_inertia)
+        return core.Problem(
+            timestep=self.timestep,
+            predicted_velocity=self.predicted_velocity,
+            inverse_mass=np.where(free, self.inverse_mass, np.nan),
+            first=self.first,
+            second=self.second,
+            normal=self.normal,
+            gap=self.gap,
+            bodies=bodies if given.inverse_mass.size else None,
+            **contacts,
+        )
 
     @property
     def mass(self) -> Floats:
@@ -94,13 +92,17 @@ class Problem:
     def fastest(self) -> float:
         return float(np.abs(self.predicted_velocity).max())
 
-    def project(self, tolerance: float, **options: Any) -> core.Projection:
-        return core.project(
-            *self.arguments,
-            timestep=self.timestep,
-            tolerance=tolerance,
-            **(self.body_arguments | options),
-        )
+    def project(
+        self,
+        tolerance: float,
+        *,
+        solver: core.Solver = "apgd",
+        accuracy: float = 0.0,
+        max_iterations: int = 100_000,
+        **contacts: Any,
+    ) -> core.Projection:
+        limits = core.Limits(tolerance, accuracy, max_iterations)
+        return core.project(self.for_core(**contacts), limits, solver=solver)
 
     def jacobian(self) -> Floats:
         """G (m, 3 n), dense: (G V)_c = n_c . (v_first - v_second)."""

@@ -9,12 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from lammps_inelastic import core
-from lammps_inelastic.workflow.records import Recorded
 from tests.core.contact_problems import Problem, bricks, column, heap
 from tests.grainwise import (
     ACCURACY,
     QUIET,
-    arguments_of,
     clarabel_impulses,
     compare,
     judged,
@@ -25,7 +23,7 @@ from tests.grainwise import (
 GRAVITY = 10.0  # the predicted velocities here are near 1, and time steps 0.01: g h is 0.1
 
 
-def recorded(given: Problem, velocity: NDArray[np.float64] | None = None) -> Recorded:
+def recorded(given: Problem, velocity: NDArray[np.float64] | None = None) -> core.Record:
     """Return a problem as a record of the fix, with some velocities for its solution."""
     bodies = given.bodies
     contacts = given.first.size
@@ -38,10 +36,13 @@ def recorded(given: Problem, velocity: NDArray[np.float64] | None = None) -> Rec
         "mass": given.mass,
         "predicted_velocity": given.predicted_velocity,
         "velocity": given.predicted_velocity if velocity is None else velocity,
+        "id1": given.first + 1,
+        "id2": given.second + 1 - (given.second < 0),  # the walls are number 1
         "normal": given.normal,
         "gap": given.gap,
         "compliance": np.zeros(contacts),
         "impulse": np.zeros(contacts),
+        "impulse_guess": np.zeros(contacts),
     }
     if bodies.inverse_mass.size:
         order = [[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -52,7 +53,7 @@ def recorded(given: Problem, velocity: NDArray[np.float64] | None = None) -> Rec
             "body_inverse_mass": bodies.inverse_mass,
             "body_inverse_inertia": bodies.inverse_inertia[:, order[0], order[1]],
         }
-    return Recorded(arrays, given.first, given.second)
+    return core.Record(arrays)
 
 
 PROBLEMS = {
@@ -80,32 +81,26 @@ def test_a_column_at_rest() -> None:
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_residual_is_that_of_the_solver(name: str) -> None:
     """NumPy finds the velocities and the residual that the package finds."""
-    problem = recorded(PROBLEMS[name])
-    impulse = np.random.default_rng(1).uniform(0, 1, problem.first.size)
-    arguments = arguments_of(problem) | {"timestep": problem.timestep}
-    residual = core.residual(*[*problem.spheres, impulse], **arguments)
-    assert judged(problem, impulse, 0).residual == pytest.approx(max(residual), rel=1e-12)
+    record = recorded(PROBLEMS[name])
+    impulse = np.random.default_rng(1).uniform(0, 1, record.problem.gap.size)
+    residual = core.residual(record.problem, impulse)
+    assert judged(record, impulse, 0).residual == pytest.approx(max(residual), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_no_velocity_is_off_by_more_than_the_bound(name: str) -> None:
     """Rough solutions, and Clarabel's, are off the deep one by less than their own bounds."""
-    problem = recorded(PROBLEMS[name])
-    deep = solve(problem, GRAVITY)
+    record = recorded(PROBLEMS[name])
+    deep = solve(record, GRAVITY)
     assert deep.bound <= 1e-5
     impulses = [
-        core.project(
-            *problem.spheres,
-            timestep=problem.timestep,
-            tolerance=tolerance * problem.timestep,
-            **arguments_of(problem),
-        ).impulse
+        core.project(record.problem, core.Limits(tolerance * record.problem.timestep)).impulse
         for tolerance in (1e-3, 1e-4, 1e-6)
     ]
-    for impulse in [*impulses, clarabel_impulses(problem, GRAVITY)]:
-        rough = judged(problem, impulse, 0)
+    for impulse in [*impulses, clarabel_impulses(record, GRAVITY)]:
+        rough = judged(record, impulse, 0)
         off = compare(
-            Recorded({**problem.arrays, "velocity": rough.velocity}, problem.first, problem.second),
+            core.Record({**record.arrays, "velocity": rough.velocity}),
             gravity=GRAVITY,
             exact=deep,
         )
@@ -119,12 +114,14 @@ def test_a_part_is_solved_as_the_whole() -> None:
         name: np.concatenate([values, values]) if values.ndim else values
         for name, values in one.arrays.items()
     }
-    arrays |= {"id1": np.arange(6), "gap": np.array([0, 0, 0, 0.01, 0, 0.02])}
-    two = Recorded(
-        arrays,
-        np.concatenate([one.first, one.first + 3]),
-        np.concatenate([one.second, np.where(one.second < 0, -1, one.second + 3)]),
-    )
+    below = one.arrays["id2"]
+    arrays |= {
+        "id": np.arange(1, 7),
+        "id1": np.concatenate([one.arrays["id1"], one.arrays["id1"] + 3]),
+        "id2": np.concatenate([below, np.where(below < 0, below, below + 3)]),
+        "gap": np.array([0, 0, 0, 0.01, 0, 0.02]),
+    }
+    two = core.Record(arrays)
     upper = np.arange(6) >= 3
     whole = solve(two, GRAVITY).velocity
     for half in (upper, ~upper):

@@ -81,13 +81,13 @@ def problems(
     return replace(chosen, gap=slack - moved), allowed
 
 
-def assert_projected(chosen: Problem, **options: int) -> None:
+def assert_projected(chosen: Problem, max_iterations: int = 100_000) -> None:
     """Look at the conditions for the nearest velocities, and compare with Clarabel's.
 
     With the end-of-step gaps w, w' of impulses l, l': h ||V - V'||^2_M = (l - l') . (w - w'), and
     at the exact solution all four products are zero or, for -l . w', negative.
     """
-    projection = chosen.project(TOLERANCE, **options)
+    projection = chosen.project(TOLERANCE, max_iterations=max_iterations)
     assert projection.converged
     rounding = ROUNDING * scale(chosen)
     assert_within(projection.velocity, chosen.velocity(projection.impulse), rounding)

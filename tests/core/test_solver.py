@@ -52,7 +52,7 @@ def solve(request: pytest.FixtureRequest) -> Solve:
 
 
 @pytest.mark.parametrize("solver", ["apgd", "uzawa"])
-def test_sphere_on_a_spring(solver: str) -> None:
+def test_sphere_on_a_spring(solver: core.Solver) -> None:
     # gap + h V + C lambda = 0 and V = -3 + lambda / m: lambda = 0.02 / (h / m + C).
     given = problem([(0, 0, -3)], [2], [(0, WALL, UP, 0.01)], timestep=0.01)
     projection = given.project(TOLERANCE, solver=solver, compliance=np.array([0.005]))
@@ -69,7 +69,9 @@ def test_sphere_on_a_spring(solver: str) -> None:
     [(0, 0, 3), (-4, -4, 1), (-6, -6, 0), (-60, -6, 0)],
     ids=["pushes only", "lets go", "just holds", "holds"],
 )
-def test_sphere_held_by_the_floor(solver: str, least: float, impulse: float, speed: float) -> None:
+def test_sphere_held_by_the_floor(
+    solver: core.Solver, least: float, impulse: float, speed: float
+) -> None:
     # m V = 2 3 upwards, of which the floor takes at most -l.
     given = problem([(0, 0, 3)], [2], [(0, WALL, UP, 0)], timestep=0.01)
     projection = given.project(TOLERANCE, solver=solver, least_impulse=np.array([least], float))
@@ -272,7 +274,7 @@ def test_contact_given_three_times(solve: Solve) -> None:
 
 
 @pytest.mark.parametrize("solver", ["apgd", "uzawa"])
-def test_no_room_is_not_converged(solver: str) -> None:
+def test_no_room_is_not_converged(solver: core.Solver) -> None:
     # Two walls leave 0.01 less than a diameter: one overlap is at least half of that.
     given = problem([(0, 0, 0)], [1], [(0, WALL, UP, 0), (0, WALL, (0, 0, -1), -0.01)])
     projection = given.project(TOLERANCE, solver=solver, max_iterations=100)

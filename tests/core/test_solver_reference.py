@@ -92,7 +92,7 @@ def test_impulses_of_an_interior_point_method(name: str) -> None:
 
 @pytest.mark.parametrize("solver", ["apgd", "uzawa"])
 @pytest.mark.parametrize("name", ["overlapping 0", "dense crystal", "mixed, frozen 0"])
-def test_springs(name: str, solver: str) -> None:
+def test_springs(name: str, solver: core.Solver) -> None:
     """Every other contact is a spring, soft or stiff; their impulses are unique."""
     given = PROBLEMS[name]
     diagonal = np.diag(given.delassus())
@@ -116,7 +116,7 @@ def test_springs(name: str, solver: str) -> None:
     [(name, "apgd") for name in PROBLEMS]
     + [(name, "uzawa") for name in ("overlapping 0", "mixed, frozen 0")],
 )
-def test_contacts_that_pull(name: str, solver: str) -> None:
+def test_contacts_that_pull(name: str, solver: core.Solver) -> None:
     """Every other contact may pull, by more or less than it takes to hold it."""
     given = PROBLEMS[name]
     # What stops the two sides of a contact from the fastest velocity.
@@ -154,9 +154,7 @@ EIGENVALUE_ACCURACY = 2e-3
 
 
 def largest_eigenvalue(given: Problem) -> float:
-    return core.largest_eigenvalue(
-        *given.arguments[1:5], timestep=given.timestep, **given.body_arguments
-    )
+    return core.largest_eigenvalue(given.for_core())
 
 
 @pytest.mark.parametrize(

@@ -133,18 +133,18 @@ def simulated(
                 gaps.append(sign * (x[:, axis] - face) - radii)
                 first.append(np.arange(len(x)))
                 second.append(np.full(len(x), -1))
-        result = core.project(
-            predicted,
-            1 / m,
-            np.concatenate(first).astype(np.int64),
-            np.concatenate(second).astype(np.int64),
-            np.concatenate(normals),
-            np.concatenate(gaps),
+        problem = core.Problem(
             timestep=step,
-            tolerance=tolerance,
+            predicted_velocity=predicted,
+            inverse_mass=1 / m,
+            first=np.concatenate(first),
+            second=np.concatenate(second),
+            normal=np.concatenate(normals),
+            gap=np.concatenate(gaps),
         )
+        result = core.project(problem, core.Limits(tolerance))
         assert result.converged
-        return np.asarray(result.velocity)
+        return result.velocity
 
     frames = [x.copy()]
     for count, step in runs:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.records import read_record, records
+from lammps_inelastic.core import read_record
+from lammps_inelastic.workflow.tradeoff.states import records_in
 from tests.grainwise import assert_kept, compare, part_of
 from tests.pouring import run_deck
 
@@ -90,9 +91,9 @@ def test_each_half_moves_as_alone(bed: str, deck: str, tmp_path: Path) -> None:
     (tmp_path / "dimer.mol").write_text(DIMER)
     run_deck(tmp_path, deck, {})
     quiet, violent = [], []
-    for path in records(tmp_path):
-        problem = read_record(path)
-        here = problem.arrays["position"][:, 0] < MIDDLE
-        quiet.append(compare(part_of(problem, here)))
-        violent.append(compare(part_of(problem, ~here)))
+    for path in records_in(tmp_path):
+        record = read_record(path)
+        here = record.arrays["position"][:, 0] < MIDDLE
+        quiet.append(compare(part_of(record, here)))
+        violent.append(compare(part_of(record, ~here)))
     assert_kept({f"bed of {bed}": quiet, f"violent half beside the bed of {bed}": violent})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import clarabel
@@ -13,7 +14,7 @@ from scipy.spatial import KDTree
 
 from lammps_inelastic import core
 from lammps_inelastic.analysis import ParticleDump, Spheres, largest_pair_overlap
-from lammps_inelastic.workflow.records import Recorded, read_record, records
+from lammps_inelastic.workflow.tradeoff.states import records_in
 from tests.pouring import (
     measure,
     recording,
@@ -168,7 +169,7 @@ STAGES = (20, 60, 80, 100, 120, 150, 600)
 
 
 @pytest.fixture(scope="module")
-def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
+def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[core.Record]:
     """One problem of 1,000 spheres at each stage, solved to 2e-10 r."""
     deck = shipped_deck("spheres")
     problems = []
@@ -190,15 +191,15 @@ def tight_records(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
                 "steps_measuring": 2,
             },
         )
-        problems.append(read_record(records(folder)[-1]))
+        problems.append(core.read_record(records_in(folder)[-1]))
     return problems
 
 
-def reference_projection(problem: Recorded) -> NDArray[np.float64]:
+def reference_projection(record: core.Record) -> NDArray[np.float64]:
     """Project with an independent solver, onto constraints built from the positions alone."""
-    x, radius = problem.arrays["position"], problem.arrays["radius"]
-    predicted = problem.arrays["predicted_velocity"]
-    h = problem.timestep
+    x, radius = record.arrays["position"], record.arrays["radius"]
+    predicted = record.arrays["predicted_velocity"]
+    h = record.problem.timestep
     number = len(x)
     # All pairs that could touch if both moved as fast as anything predicted, or stayed.
     reach = 2 * radius.max() + h * np.linalg.norm(predicted, axis=1).max()
@@ -241,7 +242,9 @@ def reference_projection(problem: Recorded) -> NDArray[np.float64]:
     return scale * np.array(solution.x).reshape(-1, 3)
 
 
-def test_projection_against_a_quadratic_programming_library(tight_records: list[Recorded]) -> None:
+def test_projection_against_a_quadratic_programming_library(
+    tight_records: list[core.Record],
+) -> None:
     """Falling, impact, at rest: the projected velocities, over every pair and wall.
 
     The residual, 2e-10 r here, bounds the error in the norm that the projection minimises. A sphere
@@ -249,22 +252,18 @@ def test_projection_against_a_quadratic_programming_library(tight_records: list[
     such a one): the same problem is solved further, and then every sphere must agree.
     """
     errors = []
-    for problem in tight_records:
-        reference = reference_projection(problem)
+    for record in tight_records:
+        reference = reference_projection(record)
         further = core.project(
-            *problem.spheres,
-            timestep=problem.timestep,
-            tolerance=1e-13,
-            max_iterations=1_000_000,
-            impulse=problem.arrays["impulse"],
-            **problem.contact_laws,
+            replace(record.problem, impulse_guess=record.arrays["impulse"]),
+            core.Limits(1e-13, max_iterations=1_000_000),
         )
         assert further.converged
-        largest = np.linalg.norm(problem.arrays["predicted_velocity"], axis=1).max()
-        off = np.linalg.norm(problem.arrays["velocity"] - reference, axis=1) / largest
+        largest = np.linalg.norm(record.problem.predicted_velocity, axis=1).max()
+        off = np.linalg.norm(record.arrays["velocity"] - reference, axis=1) / largest
         off_further = np.linalg.norm(further.velocity - reference, axis=1) / largest
         errors.append((np.sqrt(np.mean(off**2)), off_further.max()))
-    steps = ", ".join(str(int(problem.arrays["step"])) for problem in tight_records)
+    steps = ", ".join(str(record.step) for record in tight_records)
     print(
         f"projections of steps {steps}: off by "
         f"{', '.join(f'{mean:.1e}' for mean, _ in errors)} of the largest predicted velocity in "
@@ -290,26 +289,26 @@ def test_kinetic_energy_and_momentum(tmp_path: Path) -> None:
         },
     )
     largest = 0.0
-    for path in records(tmp_path):
-        problem = read_record(path)
-        a = problem.arrays
+    for path in records_in(tmp_path):
+        record = core.read_record(path)
+        a, timestep = record.arrays, record.problem.timestep
         mass = a["mass"][:, None]
         before, after = a["predicted_velocity"], a["velocity"]
         energy = [0.5 * float((mass * v**2).sum()) for v in (before, after)]
         # A contact gives back no more than its overlap.
         given_back = np.maximum(0.0, -a["gap_now"])
-        released = float((a["impulse"] * given_back).sum()) / problem.timestep
+        released = float((a["impulse"] * given_back).sum()) / timestep
         # Complementarity holds to the tolerance only, for each impulse.
-        share = float(a["impulse"].sum()) * problem.tolerance / problem.timestep
+        share = float(a["impulse"].sum()) * record.tolerance / timestep
         assert energy[1] <= energy[0] + released + share + 1e-14 * energy[0]
 
-        walls = problem.second < 0
+        walls = record.problem.second < 0
         from_walls = (a["impulse"][walls, None] * a["normal"][walls]).sum(axis=0)
         change = (mass * (after - before)).sum(axis=0)
         size = float(np.abs(mass * before).sum()) + float(a["impulse"].sum())
         assert np.allclose(change, from_walls, rtol=0, atol=1e-13 * size)  # round-off of the sums
         largest = max(largest, np.abs(change - from_walls).max() / size)
     print(
-        f"1,000 spheres, {len(records(tmp_path))} steps: no energy from nothing, momentum kept to "
-        f"{largest:.1e}"
+        f"1,000 spheres, {len(records_in(tmp_path))} steps: no energy from nothing, momentum kept "
+        f"to {largest:.1e}"
     )

@@ -44,6 +44,7 @@ from lammps_inelastic.workflow.tradeoff.states import (
     Solved,
     curves_of,
     errors,
+    from_zero,
     problems_of,
     read_states,
     write_states,
@@ -492,25 +493,29 @@ def test_the_exact_solution_is_that_of_another_solver(finished: tuple[list[str],
     _, out = finished
     (folder, *_) = (path.parent for path in out.glob("states/cases/*/problem.*.npz"))
     unique = 0
-    for problem in problems_of(folder).values():
-        number = len(problem.arrays["inverse_mass"])
-        velocity, inverse_mass, first, second, normal, gap = problem.spheres
+    for record in problems_of(folder).values():
+        problem = record.problem
+        first, second, normal = problem.first, problem.second, problem.normal
+        number = problem.inverse_mass.size
         given = Problem(
-            velocity, inverse_mass, first, second, normal, gap, problem.timestep, no_bodies(number)
+            problem.predicted_velocity,
+            problem.inverse_mass,
+            first,
+            second,
+            normal,
+            problem.gap,
+            problem.timestep,
+            no_bodies(number),
         )
         reference_velocity, impulse = reference(given, None, 1e-12)
-        exact = core.project(
-            *problem.spheres,
-            timestep=problem.timestep,
-            tolerance=EXACT * float(problem.arrays["radius"].min()),
-            **problem.contact_laws,
-        )
+        limits = core.Limits(EXACT * float(record.arrays["radius"].min()))
+        exact = core.project(from_zero(problem), limits)
         found = errors(
             exact.velocity,
             exact.impulse,
             reference_velocity,
             np.where(impulse > 1e-6 * impulse.max(), impulse, 0.0),
-            problem.arrays["predicted_velocity"],
+            problem.predicted_velocity,
         )
         # Clarabel's objective, half of a square of velocities, is known to 1e-12: they to 4e-6 of
         # what contacts change, which is the less of them (with 1e-11 to 1.8e-5; solved a thousand

@@ -12,11 +12,9 @@ import json
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +26,6 @@ from lammps_inelastic.analysis import read_run_log
 from ..decks import Value, find_deck
 from ..files import write_text
 from ..finished import LOG, read_json
-from ..records import Recorded, read_record, records
 from ..shipped import SETTLING
 from ..study import Case, Input, stage_of
 from .plan import Plan, input_of, start_values
@@ -60,7 +57,7 @@ class Way:
     by : tolerance or accuracy: what ends the iterations
     """
 
-    solver: str
+    solver: core.Solver
     guess: bool
     by: str
 
@@ -128,7 +125,12 @@ def recording_case(plan: Plan, start: int | Path) -> Case:
     return Case((first, stage_of(find_deck(SETTLING, folder), settling)), inputs)
 
 
-def problems_of(folder: Path, moments: Iterable[str] = MOMENTS) -> dict[str, Recorded]:
+def records_in(folder: Path) -> list[Path]:
+    """Return the files of the recorded problems of a deck's run in the order of their steps."""
+    return sorted(folder.glob("problem.*.npz"), key=lambda path: int(path.name.split(".")[1]))
+
+
+def problems_of(folder: Path, moments: Iterable[str] = MOMENTS) -> dict[str, core.Record]:
     """Return the recorded problems of a run that are nearest to some moments, by their names.
 
     Moments after the end of the run are left out. Raises ValueError if a record is damaged or
@@ -142,43 +144,47 @@ def problems_of(folder: Path, moments: Iterable[str] = MOMENTS) -> dict[str, Rec
             f"{log.path}: tells of no run that settles and then ends: a part of it is missing"
         )
     times = dict(zip(thermo["Step"], thermo["Time"], strict=True))
-    paths = {int(path.name.split(".")[1]): path for path in records(folder)}
+    paths = {int(path.name.split(".")[1]): path for path in records_in(folder)}
     paths = {step: path for step, path in paths.items() if step in times}
     if not paths:
         raise ValueError(f"{folder}: no recorded contact problem is there")
     last = max(times.values())
     return {
-        moment: read_record(paths[min(paths, key=lambda step: abs(times[step] - MOMENTS[moment]))])
+        moment: core.read_record(
+            paths[min(paths, key=lambda step: abs(times[step] - MOMENTS[moment]))]
+        )
         for moment in moments
         if MOMENTS[moment] <= last
     }
 
 
-def solve_state(start: str, moment: str, problem: Recorded) -> Iterator[Solved]:
+def from_zero(problem: core.Problem) -> core.Problem:
+    """Return a problem without its first guess."""
+    return replace(problem, impulse_guess=np.zeros_like(problem.gap))
+
+
+def solve_state(start: str, moment: str, record: core.Record) -> Iterator[Solved]:
     """Solve a problem in all ways, each from the loosest value until one is not reached.
 
     Raises ValueError if the exact solution is not to be had.
     """
-    radius = float(problem.arrays["radius"].min())
-    exact = _project(problem, tolerance=EXACT * radius, max_iterations=MOST_OF_EXACT)
+    radius = float(record.arrays["radius"].min())
+    warm, cold = record.problem, from_zero(record.problem)
+    exact = core.project(cold, core.Limits(EXACT * radius, max_iterations=MOST_OF_EXACT))
     if not exact.converged:
-        raise ValueError(f"{moment}: {EXACT:g} r is not reached in {MOST_OF_EXACT:,} iterations")
-    predicted = problem.arrays["predicted_velocity"]
+        raise ValueError(
+            f"{moment}: {EXACT:g} r is not reached in {MOST_OF_EXACT:,} iterations: {exact.status}"
+        )
     for way in WAYS:
-        options: dict[str, Any] = {
-            "solver": way.solver,
-            "max_iterations": MOST_ITERATIONS[way.solver],
-        }
-        if way.guess:
-            options["impulse"] = problem.arrays["impulse_guess"]
-        by_tolerance = way.by == "tolerance"
-        for value in TOLERANCES if by_tolerance else ACCURACIES:
-            if by_tolerance:
-                options["tolerance"] = value * radius
+        problem = warm if way.guess else cold
+        most = MOST_ITERATIONS[way.solver]
+        for value in TOLERANCES if way.by == "tolerance" else ACCURACIES:
+            if way.by == "tolerance":
+                limits = core.Limits(value * radius, max_iterations=most)
             else:
                 # With the loosest tolerance it is the accuracy that decides.
-                options |= {"tolerance": TOLERANCES[0] * radius, "accuracy": value}
-            result, seconds = timed(partial(_project, problem, **options))
+                limits = core.Limits(TOLERANCES[0] * radius, value, most)
+            result, seconds = timed(problem, limits, way.solver)
             if not result.converged:
                 break
             yield Solved(
@@ -189,7 +195,13 @@ def solve_state(start: str, moment: str, problem: Recorded) -> Iterator[Solved]:
                 value,
                 result.iterations,
                 seconds,
-                **errors(result.velocity, result.impulse, exact.velocity, exact.impulse, predicted),
+                **errors(
+                    result.velocity,
+                    result.impulse,
+                    exact.velocity,
+                    exact.impulse,
+                    problem.predicted_velocity,
+                ),
             )
 
 
@@ -229,21 +241,15 @@ def errors(
     }
 
 
-def _project(problem: Recorded, **options: Any) -> core.Projection:
-    return core.project(
-        *problem.spheres,
-        timestep=problem.timestep,
-        **(problem.contact_laws | problem.bodies | options),
-    )
-
-
-def timed(call: Callable[[], core.Projection]) -> tuple[core.Projection, float]:
-    """Return a result, and the median time [s] of three calls; of fewer where they take long."""
+def timed(
+    problem: core.Problem, limits: core.Limits, solver: core.Solver = "apgd"
+) -> tuple[core.Projection, float]:
+    """Return a solution, and the median time [s] of three solves; of fewer where they take long."""
     long = 1.0  # second
     seconds: list[float] = []
     while len(seconds) < REPEATS and sum(seconds) < long:
         start = time.perf_counter()
-        result = call()
+        result = core.project(problem, limits, solver=solver)
         seconds.append(time.perf_counter() - start)
     return result, statistics.median(seconds)
 
