@@ -96,7 +96,7 @@ def test_exports(form: str, study: Path, refused: Callable[..., str]) -> None:
     for size in (0, 100, path.stat().st_size - 1):
         # The header of raw bytes is written first.
         assert re.fullmatch(
-            rf"{run}/(packing|contacts)\.\w+: cannot be written: File too large",
+            rf"{re.escape(str(run))}/(packing|contacts)\.\w+: cannot be written: File too large",
             refused(*arguments, size=size),
         )
         assert contents(study) == before
