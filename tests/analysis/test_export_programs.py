@@ -20,6 +20,7 @@ from lammps_inelastic.analysis import (
     write_xyz,
 )
 from tests.analysis.touching_spheres import CELLS, Scene, lengths, scene, turned
+from tests.conftest import missing
 
 pytestmark = pytest.mark.slow
 
@@ -40,13 +41,13 @@ COLUMNS = [
 
 
 def package(name: str) -> Any:
-    """Import a package of the group; where it is not installed, its tests are skipped."""
+    """Import a package of the group; its tests are skipped, or fail in CI, where it is missing."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
         if error.name != name:
             raise
-        pytest.skip(f"{name} is not installed: make programs does it")
+        missing(f"{name} is not installed: make programs does it")
 
 
 @pytest.fixture(scope="module")

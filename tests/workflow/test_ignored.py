@@ -38,6 +38,7 @@ def test_git_ignores_what_a_command_leaves(name: str) -> None:
 
 def test_git_ignores_no_file_that_belongs_to_the_repository() -> None:
     if not (ROOT / ".git").exists():
+        # As above.
         pytest.skip("no clone: nothing is ignored")
     command = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     assert subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout == b""
