@@ -24,7 +24,7 @@ REQUIRED = "INELASTIC_PROGRAMS_REQUIRED"
 
 def missing(reason: str) -> NoReturn:
     """Skip a test that cannot be run here, and fail where all must run."""
-    # A browser and these programs are a gigabyte, which those who change something else do not need.
+    # A browser and these programs are a gigabyte, which few changes need.
     if os.environ.get(REQUIRED):
         pytest.fail(f"{REQUIRED} is set, but {reason}")
     pytest.skip(f"NOT TESTED HERE: {reason}")
