@@ -46,7 +46,7 @@ namespace {
   void choose_ghosts(const ContactProblem &problem, Host &host)
   {
     if (!host.has_ghosts()) return;
-    std::vector<char> chosen(static_cast<std::size_t>(problem.particles) + 1, 0);
+    std::vector<char> chosen(problem.slots(), 0);
     for (const int i : problem.contacts.first) chosen[i] = 1;
     for (const int i : problem.contacts.second) chosen[i] = 1;
     const RigidBodies &bodies = problem.bodies;

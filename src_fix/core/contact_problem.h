@@ -20,49 +20,18 @@
 // it. The vector w is the gradient of the dual function 1/2 lambda^T A lambda + (gap + h G V*)^T
 // lambda, where A = h G M^-1 G^T + C [time / mass].
 //
-// Every array per particle has one more entry than there are particles: a dummy particle that never
-// moves stands for all walls.
+// What V consists of, and M, is in unknowns.h.
 
 #pragma once
 
 #include "contact_set.h"
-#include "rigid_bodies.h"
-
-#include <vector>
+#include "unknowns.h"
 
 namespace inelastic {
 
-struct ContactProblem {
+struct ContactProblem : Unknowns {
   double timestep = 0.0;    // h [time]
-  // Counts the particles that this rank owns and its ghosts (host.h), owned ones
-  // first.
-  int particles = 0;
-  std::vector<double> predicted_velocity;    // 3 per particle and 3 zeros [length / time]
-  // One number per particle and a zero [1 / mass]. Zero freezes a particle; the numbers of
-  // particles in bodies are not read.
-  std::vector<double> inverse_mass;
-  RigidBodies bodies;    // empty in a scene of free particles
   ContactSet contacts;
-
-  // Sets the number of particles and the zeros of the dummy particle. The bodies stay as they are.
-  void resize(int number_of_particles);
-
-  // Returns n . M^-1 n [1 / mass]: the velocity along a unit vector n that a unit impulse along n
-  // gives to a particle. It is zero for frozen particles and for the dummy particle.
-  double mobility(int particle, const double *direction) const
-  {
-    return bodies.empty() || particle == particles || bodies.body[particle] < 0
-        ? inverse_mass[particle]
-        : bodies.mobility(particle, direction);
-  }
-
-  // Tells whether impulses move a particle; not the dummy particle.
-  bool is_mobile(int particle) const
-  {
-    return bodies.empty() || particle == particles || bodies.body[particle] < 0
-        ? inverse_mass[particle] > 0.0
-        : bodies.inverse_mass[bodies.body[particle]] > 0.0;
-  }
 
   // Returns the diagonal entry of A for constraint c [time / mass]: what a unit impulse of the
   // constraint adds to its own w.
@@ -72,8 +41,8 @@ struct ContactProblem {
         contacts.compliance[c];
   }
 
-  // Returns the length by which a unit impulse along n between two particles moves them apart in
-  // the step [time / mass].
+  // Returns the length by which a unit impulse along n between two slots moves them apart in the
+  // step [time / mass].
   double mobility_of_pair(int one, int other, const double *n) const
   { return timestep * (mobility(one, n) + mobility(other, n)); }
 };

@@ -21,17 +21,11 @@ namespace {
   // Gaps are known to a few units of round-off of what they are added up from.
   constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();
 
-  bool is_member(const ContactProblem &problem, int i)
+  // The slot that stands for all those that move together with this one.
+  int mover(const Unknowns &unknowns, int i)
   {
-    const RigidBodies &bodies = problem.bodies;
-    return !bodies.empty() && i != problem.particles && bodies.body[i] >= 0;
-  }
-
-  // The particle that stands for all those that move together with this one.
-  int mover(const ContactProblem &problem, int i)
-  {
-    const RigidBodies &bodies = problem.bodies;
-    return is_member(problem, i) ? bodies.member[bodies.start[bodies.body[i]]] : i;
+    const RigidBodies &bodies = unknowns.bodies;
+    return unknowns.is_member(i) ? bodies.member[bodies.start[bodies.body[i]]] : i;
   }
 
 }    // namespace
@@ -45,7 +39,7 @@ void ContactTargets::begin(const ContactProblem &problem, const SolverLimits &li
   change_by_guess_ = gap_operator.change();
   of_guess_.resize(contacts.size());
   for (std::size_t c = 0; c < contacts.size(); ++c)
-    of_guess_[c] = std::max(residual_of_one(gap[c], contacts.impulse[c], contacts.least[c]),
+    of_guess_[c] = std::max(contacts.set[c].residual(gap[c], contacts.impulse[c]),
                             PART_OF_LOAD * std::abs(contacts.impulse[c]) * diagonal[c]);
   set_least(problem, limits, gap_operator);
 }
@@ -62,21 +56,22 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
     std::fill(part_.begin(), part_.end(), 0.0);
     return;
   }
-  carried_.assign(static_cast<std::size_t>(problem.particles) + 1, 0.0);
+  carried_.assign(problem.slots(), 0.0);
   for (std::size_t c = 0; c < count; ++c) {
     const double load = std::abs(contacts.impulse[c]) * diagonal_[c];
     carried_[mover(problem, contacts.first[c])] += load;
     carried_[mover(problem, contacts.second[c])] += load;
   }
-  carried_[problem.particles] = 0.0;
+  for (int slot = problem.particles; slot < problem.slots(); ++slot)
+    if (!problem.is_mobile(slot)) carried_[slot] = 0.0;
   const double *const v = problem.predicted_velocity.data();
   const auto length_of = [&](int i) {
     return carried_[mover(problem, i)] +
         problem.timestep * norm(v + 3 * static_cast<std::size_t>(i));
   };
   for (std::size_t c = 0; c < count; ++c) {
-    const bool of_bodies = is_member(problem, contacts.first[c]) ||
-        is_member(problem, contacts.second[c]);
+    const bool of_bodies = problem.is_member(contacts.first[c]) ||
+        problem.is_member(contacts.second[c]);
     part_[c] = (of_bodies ? OF_BODIES : IN_NETWORKS) * limits.accuracy * limits.coarseness *
         contacts.refinement[c];
     const double length = std::abs(gap_operator.free_gap()[c]) + length_of(contacts.first[c]) +
@@ -106,26 +101,26 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
   constexpr double NEAR = 5.0;    // tolerances
   set_least(problem, limits, gap_operator);
   constexpr double NONE = std::numeric_limits<double>::max();
-  std::vector<double> of_particle(static_cast<std::size_t>(problem.particles) + 1, NONE);
-  for (std::size_t i = 0; limits.accuracy > 0.0 && i + 1 < of_particle.size(); ++i) {
+  std::vector<double> of_slot(problem.slots(), NONE);
+  for (std::size_t i = 0; limits.accuracy > 0.0 && i < of_slot.size(); ++i) {
     if (!problem.is_mobile(static_cast<int>(i))) continue;
     const double *const now = &change[3 * i], *const before = &change_by_guess_[3 * i];
     const double added[3] = {now[0] - before[0], now[1] - before[1], now[2] - before[2]};
-    of_particle[i] = problem.timestep * std::max(norm(now), norm(added));
+    of_slot[i] = problem.timestep * std::max(norm(now), norm(added));
   }
   double maxima[2] = {0.0, 0.0};    // the largest part of a target, the largest target
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double by_velocity =
-        part_[c] * std::min(of_particle[contacts.first[c]], of_particle[contacts.second[c]]);
+        part_[c] * std::min(of_slot[contacts.first[c]], of_slot[contacts.second[c]]);
     const double target = std::min(limits.tolerance, std::max(least_[c], by_velocity));
     // What may pull is open where it does not pull by as much as it may (solver.h).
-    const bool all = counts == Counts::ALL || contacts.least[c] < 0.0;
-    const double left = all ? residual_of_one(gap[c], contacts.impulse[c], contacts.least[c])
+    const bool all = counts == Counts::ALL || contacts.set[c].may_pull();
+    const double left = all ? contacts.set[c].residual(gap[c], contacts.impulse[c])
                             : std::max(0.0, -gap[c]);
     const bool finite = std::isfinite(gap[c]) && std::isfinite(contacts.impulse[c]);
     maxima[0] =
         std::max(maxima[0], finite ? left / target : std::numeric_limits<double>::infinity());
-    if (contacts.impulse[c] > contacts.least[c] || gap[c] < NEAR * limits.tolerance)
+    if (contacts.set[c].is_loaded(contacts.impulse[c]) || gap[c] < NEAR * limits.tolerance)
       maxima[1] = std::max(maxima[1], target);
   }
   host.reduce(nullptr, 0, maxima, 2);

@@ -38,11 +38,6 @@ namespace inelastic {
 
 struct SolverLimits;
 
-// Returns the residual of one constraint: what is lacking of its gap, or what its gap is open under
-// a force.
-inline double residual_of_one(double gap_at_end, double impulse, double least)
-{ return impulse > least && gap_at_end > 0.0 ? gap_at_end : gap_at_end < 0.0 ? -gap_at_end : 0.0; }
-
 class ContactTargets {
  public:
   // Takes the first guess: the operator was last applied to it, and `gap` are its gaps at the end
@@ -67,7 +62,7 @@ class ContactTargets {
   const std::vector<double> &least() const { return least_; }
   // By this a change of velocity counts: A/16, or A/48, times the refinement.
   const std::vector<double> &part() const { return part_; }
-  // [length / time] The changes of velocity by the first guess, 3 per particle.
+  // [length / time] The changes of velocity by the first guess, 3 per slot.
   const std::vector<double> &change_by_guess() const { return change_by_guess_; }
   // [length] The largest target of a constraint with impulse, or near it, on all ranks.
   double largest() const { return largest_; }
@@ -85,7 +80,7 @@ class ContactTargets {
   std::vector<double> of_guess_;    // [length] max(r_c, l_c / 50000)
   std::vector<double> change_by_guess_;
   std::vector<double> least_, part_;
-  std::vector<double> carried_;    // [length] per particle: the impulses on it, for the round-off
+  std::vector<double> carried_;    // [length] per slot: the impulses on it, for the round-off
   double largest_ = 0.0;
 };
 

@@ -10,7 +10,7 @@ namespace inelastic {
 
 namespace {
 
-  // Returns n . (v_first - v_second) for 3 numbers per particle.
+  // Returns n . (v_first - v_second) for 3 numbers per slot.
   inline double opening_speed(const double *n, const double *v_first, const double *v_second)
   {
     const double relative[3] = {v_first[0] - v_second[0], v_first[1] - v_second[1],
@@ -25,20 +25,16 @@ void GapOperator::prepare(const ContactProblem &problem)
   const ContactSet &contacts = problem.contacts;
   const double *velocity = problem.predicted_velocity.data();
   free_gap_.resize(contacts.size());
-  change_.resize(3 * (static_cast<std::size_t>(problem.particles) + 1));
+  change_.resize(3 * static_cast<std::size_t>(problem.slots()));
   for (std::size_t c = 0; c < contacts.size(); ++c)
     free_gap_[c] = contacts.gap[c] +
         problem.timestep *
             opening_speed(&contacts.normal[3 * c],
                           velocity + 3 * static_cast<std::size_t>(contacts.first[c]),
                           velocity + 3 * static_cast<std::size_t>(contacts.second[c]));
-  if (problem.bodies.empty()) return;
-  free_particles_.clear();
-  for (int i = 0; i <= problem.particles; ++i)
-    if (i == problem.particles || problem.bodies.body[i] < 0) free_particles_.push_back(i);
 }
 
-// Adds G^T impulse to `sum`, 3 per particle. Constraints come in runs with the same first particle,
+// Adds G^T impulse to `sum`, 3 per slot. Constraints come in runs with the same first particle,
 // in the order of the neighbour list. The sum of that particle is kept in registers over a run:
 // through memory each addition would wait for the one before.
 INELASTIC_CLONES void scatter_impulses(const ContactSet &contacts, const double *impulse,
@@ -87,25 +83,11 @@ INELASTIC_CLONES void gather_gaps(const ContactSet &contacts, const double *free
                           change + 3 * static_cast<std::size_t>(second[c]));
 }
 
-void GapOperator::velocity_change(const ContactProblem &problem, const double *impulse, Host &host)
+void GapOperator::find_change(const ContactProblem &problem, const double *impulse, Host &host)
 {
-  double *const change = change_.data();
   std::fill(change_.begin(), change_.end(), 0.0);
-  scatter_impulses(problem.contacts, impulse, change);
-  host.sum_over_ghosts(change);
-  auto divide_by_mass = [&](std::size_t i) {
-    const double w = problem.inverse_mass[i];
-    change[3 * i] *= w;
-    change[3 * i + 1] *= w;
-    change[3 * i + 2] *= w;
-  };
-  if (problem.bodies.empty()) {
-    for (std::size_t i = 0; i <= static_cast<std::size_t>(problem.particles); ++i)
-      divide_by_mass(i);
-  } else {
-    for (const int i : free_particles_) divide_by_mass(i);
-    problem.bodies.velocity_change(change);
-  }
+  scatter_impulses(problem.contacts, impulse, change_.data());
+  problem.velocity_change(change_.data(), host);
 }
 
 GapOperator::ImpulseNorm GapOperator::impulse_norm(const ContactProblem &problem,
@@ -116,9 +98,9 @@ GapOperator::ImpulseNorm GapOperator::impulse_norm(const ContactProblem &problem
   std::vector<double> sum(change_.size(), 0.0);
   scatter_impulses(problem.contacts, impulse, sum.data());
   host.sum_over_ghosts(sum.data());
-  velocity_change(problem, impulse, host);
+  find_change(problem, impulse, host);
   ImpulseNorm result = {0.0, 0.0};
-  std::vector<char> pushed(static_cast<std::size_t>(problem.particles) + 1, 0);
+  std::vector<char> pushed(problem.slots(), 0);
   for (std::size_t c = 0; c < problem.contacts.size(); ++c)
     if (impulse[c] > 0.0)
       pushed[problem.contacts.first[c]] = pushed[problem.contacts.second[c]] = 1;
@@ -126,9 +108,8 @@ GapOperator::ImpulseNorm GapOperator::impulse_norm(const ContactProblem &problem
     return dot(&sum[3 * i], &change_[3 * i]);
   };
   const RigidBodies &bodies = problem.bodies;
-  for (int i = 0; i < problem.particles; ++i) {
-    if (!pushed[i] || problem.inverse_mass[i] == 0.0) continue;
-    if (!bodies.empty() && bodies.body[i] >= 0) continue;
+  for (int i = 0; i < problem.slots(); ++i) {
+    if (!pushed[i] || problem.is_member(i) || !problem.is_mobile(i)) continue;
     result.squared += work(i);
     result.mass += 1.0 / problem.inverse_mass[i];
   }
@@ -149,7 +130,7 @@ GapOperator::ImpulseNorm GapOperator::impulse_norm(const ContactProblem &problem
 void GapOperator::apply(const ContactProblem &problem, const double *impulse, double *gap_at_end,
                         Host &host)
 {
-  velocity_change(problem, impulse, host);
+  find_change(problem, impulse, host);
   gather_gaps(problem.contacts, free_gap_.data(), problem.timestep, change_.data(), impulse,
               gap_at_end);
 }
@@ -157,13 +138,13 @@ void GapOperator::apply(const ContactProblem &problem, const double *impulse, do
 void GapOperator::velocity(const ContactProblem &problem, const double *impulse, double *velocity,
                            Host &host)
 {
-  velocity_change(problem, impulse, host);
+  find_change(problem, impulse, host);
   velocity_applied(problem, velocity);
 }
 
 void GapOperator::velocity_applied(const ContactProblem &problem, double *velocity) const
 {
-  for (std::size_t k = 0; k < 3 * static_cast<std::size_t>(problem.particles); ++k)
+  for (std::size_t k = 0; k < change_.size(); ++k)
     velocity[k] = problem.predicted_velocity[k] + change_[k];
 }
 

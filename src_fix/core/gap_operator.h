@@ -26,11 +26,11 @@ class GapOperator {
   // Writes w(impulse) [length], one per constraint.
   void apply(const ContactProblem &problem, const double *impulse, double *gap_at_end, Host &host);
 
-  // Writes V* + M^-1 G^T impulse, 3 per particle [length / time], ghosts included.
+  // Writes V* + M^-1 G^T impulse, 3 per slot [length / time].
   void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
 
   // M^-1 G^T impulse for the impulses of the last call of apply(): by how much contacts change the
-  // velocity of each particle, the dummy included; 3 numbers per particle [length / time].
+  // velocity of each slot; 3 numbers per slot [length / time].
   const std::vector<double> &change() const { return change_; }
 
   // Writes the same for the impulses of the last call of apply(), without communication.
@@ -40,22 +40,19 @@ class GapOperator {
     // |G^T lambda|^2 in the norm of M^-1 [mass length^2 / time^2]: twice the kinetic energy that
     // the impulses give to particles and bodies at rest.
     double squared;
-    // The mass of the particles and bodies that impulses act on.
+    // The mass of what impulses act on.
     double mass;
   };
 
-  // Returns this rank's share. Every ghost of a particle counts like the particle itself.
+  // Returns this rank's share. Every ghost of a particle counts like the particle itself, and so
+  // does a wall on every rank.
   ImpulseNorm impulse_norm(const ContactProblem &problem, const double *impulse, Host &host);
 
  private:
-  void velocity_change(const ContactProblem &problem, const double *impulse, Host &host);
+  void find_change(const ContactProblem &problem, const double *impulse, Host &host);
 
   std::vector<double> free_gap_;
-  // The particles in no body and the dummy particle; filled only if there are bodies.
-  std::vector<int> free_particles_;
-  // 3 per particle, the dummy particle included: the sums of impulses, then the changes of
-  // velocity.
-  std::vector<double> change_;
+  std::vector<double> change_;    // 3 per slot: the sums of impulses, then the changes of velocity
 };
 
 // Returns the largest eigenvalue of A [time / mass] by power iteration. The estimate comes from

@@ -21,9 +21,13 @@ class Host {
   // Returns whether any rank has ghosts. If none has, choose_ghosts need not be called.
   virtual bool has_ghosts() const = 0;
 
-  // Chooses the ghosts for sum_over_chosen_ghosts. `chosen` has one entry per particle; the entries
-  // of owned particles are not read.
+  // Chooses the ghosts for sum_over_chosen_ghosts. `chosen` has one entry per slot; the entries of
+  // owned particles are not read, and those of walls have no meaning.
   virtual void choose_ghosts(const std::vector<char> &chosen) = 0;
+
+  // Replaces numbers that every rank has of the walls (unknowns.h) by their sums over all ranks. It
+  // is called in scenes alone in which contacts move a wall.
+  virtual void sum_over_ranks(double *of_walls, int count) = 0;
 
   // Does the same as sum_over_ghosts, but for the chosen ghosts alone: the values of all other
   // ghosts are neither added nor replaced. There are 4 numbers per particle, and the fourth has no
@@ -46,6 +50,7 @@ class Host {
 class SerialHost final : public Host {
  public:
   void sum_over_ghosts(double *) override {}
+  void sum_over_ranks(double *, int) override {}
   bool has_ghosts() const override { return false; }
   void choose_ghosts(const std::vector<char> &) override {}
   void sum_over_chosen_ghosts(double *) override {}

@@ -20,7 +20,7 @@ bool is_infeasible(const ContactProblem &problem, GapOperator &gap_operator,
     lacking -= impulse[c] * (free_gap[c] + give + limits.tolerance);
     farthest = std::max(farthest, -free_gap[c]);
   }
-  for (int i = 0; i < problem.particles; ++i) {
+  for (int i = 0; i < problem.slots(); ++i) {
     const double *const v = &problem.predicted_velocity[3 * static_cast<std::size_t>(i)];
     farthest = std::max(farthest, problem.timestep * std::hypot(v[0], v[1], v[2]));
   }

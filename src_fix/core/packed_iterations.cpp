@@ -78,13 +78,13 @@ namespace {
   template <typename Real> Real length(const typename packed::Vector<Real>::Lanes &a)
   { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
 
-  // Returns the particle whose vector is at a place, in bytes.
+  // Returns the slot whose vector is at a place, in bytes.
   template <typename Real> std::size_t index(std::uint32_t place)
   { return place / sizeof(packed::Vector<Real>); }
 
-  // Returns the place of a particle's vector, in bytes.
-  template <typename Real> std::uint32_t place(int particle)
-  { return static_cast<std::uint32_t>(particle * sizeof(packed::Vector<Real>)); }
+  // Returns the place of a slot's vector, in bytes.
+  template <typename Real> std::uint32_t place(int slot)
+  { return static_cast<std::uint32_t>(slot * sizeof(packed::Vector<Real>)); }
 
 }    // namespace
 
@@ -98,37 +98,39 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   idle_gap_ = static_cast<Real>(idle_gap / scales.length);
   looks_ = 0;
   start_ = problem.contacts.impulse;
-  bound_ = problem.contacts.least;
+  of_impulses_ = problem.contacts.set;
   std::vector<std::size_t> near, far;
   for (std::size_t c = 0; c < gap.size(); ++c)
-    (start_[c] > bound_[c] || !(gap[c] > idle_gap) ? near : far).push_back(c);
+    (of_impulses_[c].is_loaded(start_[c]) || !(gap[c] > idle_gap) ? near : far).push_back(c);
   inverse_diagonals_ = 0.0;
   pack(problem.contacts, near, diagonal, gap, scales, targets, working_);
   pack(problem.contacts, far, diagonal, gap, scales, targets, idle_);
   for (std::vector<Real> *const state : states()) state->assign(near.size(), 0);
 
-  const std::size_t particles = static_cast<std::size_t>(problem.particles) + 1;
+  const auto slots = static_cast<std::size_t>(problem.slots());
+  first_wall_ = problem.particles;
+  walls_move_ = problem.any_wall_moves();
   const double mobility_unit = problem.timestep * (scales.impulse / scales.length);
-  inverse_mass_.resize(particles);
-  for (std::size_t i = 0; i < particles; ++i)
+  inverse_mass_.resize(slots);
+  for (std::size_t i = 0; i < slots; ++i)
     inverse_mass_[i] = static_cast<Real>(problem.inverse_mass[i] * mobility_unit);
   pack_bodies(problem.bodies, mobility_unit);
-  sum_.assign(particles, Vector{});
-  velocity_.assign(particles, Vector{});
+  sum_.assign(slots, Vector{});
+  velocity_.assign(slots, Vector{});
   kept_before_ = kept_ = velocity_;
 
   const double per_length = problem.timestep / scales.length;
   const std::vector<double> &guess = targets.change_by_guess();
-  at_start_.resize(particles);
-  since_guess_.resize(particles);
-  for (std::size_t i = 0; i < particles; ++i) {
+  at_start_.resize(slots);
+  since_guess_.resize(slots);
+  for (std::size_t i = 0; i < slots; ++i) {
     const double *const v = &change[3 * i], *const g = &guess[3 * i];
     set_lanes(at_start_[i], per_length * v[0], per_length * v[1], per_length * v[2], 0.0);
     set_lanes(since_guess_[i], per_length * (v[0] - g[0]), per_length * (v[1] - g[1]),
               per_length * (v[2] - g[2]), 0.0);
   }
-  mobile_.resize(particles);
-  for (std::size_t i = 0; i < particles; ++i) mobile_[i] = problem.is_mobile(static_cast<int>(i));
+  mobile_.resize(slots);
+  for (std::size_t i = 0; i < slots; ++i) mobile_[i] = problem.is_mobile(static_cast<int>(i));
   most_target_ = static_cast<Real>(tolerance / scales.length);
   set_targets();
 }
@@ -161,7 +163,7 @@ template <typename Real> double PackedIterations<Real>::moved_since_kept(double 
   }
   Real most = 0;
   for (std::size_t k = 0; k < working_.size(); ++k) {
-    if (!(unbound_[k] > working_.least[k])) continue;
+    if (!working_.set[k].is_loaded(unbound_[k])) continue;
     const std::size_t i = index<Real>(working_.ends[k].first);
     const std::size_t j = index<Real>(working_.ends[k].second);
     const Real both = !mobile_[i] ? moved[j]
@@ -187,9 +189,9 @@ Real PackedIterations<Real>::free_target(const Constraints &constraints, std::si
 template <typename Real>
 packed::Passed PackedIterations<Real>::advance(const Weights &weights, double step, double blur)
 {
-  packed::Passed passed = packed::advance_impulses(packed::Pass<Real>{
+  packed::Passed passed = packed::advance_impulses(packed::Pass<Real, HalfLine>{
       working_.size(), working_.ends.data(), working_.normal.data(), working_.diagonal.data(),
-      working_.compliance.data(), working_.least.data(), working_.inverse_target.data(),
+      working_.compliance.data(), working_.set.data(), working_.inverse_target.data(),
       velocity_.data(), unbound_.data(), change_before_.data(), gap_before_.data(), sum_.data(),
       static_cast<Real>(step), static_cast<Real>(step_before_), static_cast<Real>(weights.along),
       static_cast<Real>(weights.beyond), static_cast<Real>(weights.back), static_cast<Real>(blur)});
@@ -203,10 +205,22 @@ packed::Passed PackedIterations<Real>::advance(const Weights &weights, double st
 template <typename Real> void PackedIterations<Real>::finish(Host &host)
 {
   host.sum_over_chosen_ghosts(reinterpret_cast<Real *>(sum_.data()));
+  if (walls_move_) add_up_walls(host);
   if (!rods_.empty() || !bodies_.empty())
     packed::turn_bodies(rods_, bodies_, members_.data(), sum_.data());
   packed::move_particles(
       packed::Move<Real>{velocity_.size(), inverse_mass_.data(), sum_.data(), velocity_.data()});
+}
+
+template <typename Real> void PackedIterations<Real>::add_up_walls(Host &host)
+{
+  std::vector<double> of_walls;
+  for (std::size_t i = first_wall_; i < sum_.size(); ++i)
+    for (int d = 0; d < 3; ++d) of_walls.push_back(sum_[i].lanes[d]);
+  host.sum_over_ranks(of_walls.data(), static_cast<int>(of_walls.size()));
+  const double *next = of_walls.data();
+  for (std::size_t i = first_wall_; i < sum_.size(); ++i)
+    for (int d = 0; d < 3; ++d) sum_[i].lanes[d] = static_cast<Real>(*next++);
 }
 
 template <typename Real> void PackedIterations<Real>::look(double idle_gap)
@@ -265,8 +279,8 @@ void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Re
 template <typename Real> void PackedIterations<Real>::set_idle()
 {
   const auto is_idle = [this](std::size_t k) {
-    return working_.least[k] == 0 && !(unbound_[k] > 0) && change_before_[k] == 0 &&
-        gap_before_[k] > idle_gap_;
+    return !working_.set[k].may_pull() && !working_.set[k].is_loaded(unbound_[k]) &&
+        change_before_[k] == 0 && gap_before_[k] > idle_gap_;
   };
   std::size_t more = 0;
   for (std::size_t k = 0; k < working_.size(); ++k)
@@ -294,7 +308,7 @@ template <typename Real> void PackedIterations<Real>::Constraints::resize(std::s
   normal.resize(count);
   diagonal.resize(count);
   compliance.resize(count);
-  least.resize(count);
+  set.resize(count);
   least_target.resize(count);
   part.resize(count);
   inverse_target.resize(count);
@@ -309,7 +323,7 @@ void PackedIterations<Real>::Constraints::copy(const Constraints &other, std::si
   normal[to] = other.normal[k];
   diagonal[to] = other.diagonal[k];
   compliance[to] = other.compliance[k];
-  least[to] = other.least[k];
+  set[to] = other.set[k];
   least_target[to] = other.least_target[k];
   part[to] = other.part[k];
   inverse_target[to] = other.inverse_target[k];
@@ -334,7 +348,8 @@ void PackedIterations<Real>::pack(const ContactSet &contacts,
     packed.diagonal[k] = static_cast<Real>(diagonal[c] * diagonal_unit);
     inverse_diagonals_ += 1.0 / packed.diagonal[k];
     packed.compliance[k] = static_cast<Real>(contacts.compliance[c] * diagonal_unit);
-    packed.least[k] = static_cast<Real>((contacts.least[c] - contacts.impulse[c]) / scales.impulse);
+    packed.set[k] =
+        contacts.set[c].changes_of(contacts.impulse[c]).template in_units<Real>(scales.impulse);
     packed.least_target[k] = static_cast<Real>(targets.least()[c] * per_length);
     packed.part[k] = static_cast<Real>(targets.part()[c]);
   }
@@ -399,17 +414,17 @@ void PackedIterations<Real>::pack_body(const RigidBodies &bodies, std::size_t b,
   bodies_.push_back(body);
 }
 
-// `change` may be below the least one.
+// `change` need not be admissible.
 template <typename Real>
 void PackedIterations<Real>::unpack(const std::vector<Real> &change, const Scales &scales,
                                     std::vector<double> &impulse) const
 {
-  for (const std::size_t c : idle_.source) impulse[c] = bound_[c];
+  for (const std::size_t c : idle_.source) impulse[c] = of_impulses_[c].idle();
   for (std::size_t k = 0; k < change.size(); ++k) {
     const std::size_t c = working_.source[k];
-    impulse[c] = change[k] > working_.least[k]
-        ? std::max(bound_[c], start_[c] + scales.impulse * static_cast<double>(change[k]))
-        : bound_[c];
+    const double free = start_[c] + scales.impulse * static_cast<double>(change[k]);
+    impulse[c] = working_.set[k].is_loaded(change[k]) ? of_impulses_[c].project(free)
+                                                      : of_impulses_[c].idle();
   }
 }
 

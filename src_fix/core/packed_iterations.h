@@ -10,10 +10,9 @@
 // idle: iterations leave them out until they are looked at and found to be near. The others are
 // working. Each rank chooses for itself; nothing is communicated for it.
 //
-// Constraints and n particles are packed as normals with gaps, diagonal entries, compliances and
-// least changes, one for each constraint, and n + 1 vectors (contact_problem.h has the dummy
-// particle). Everything has units in which the largest length is near 1, so that single precision
-// can hold it.
+// Constraints and slots (unknowns.h) are packed as normals with gaps, diagonal entries, compliances
+// and least changes, one for each constraint, and vectors, one for each slot. Everything has units
+// in which the largest length is near 1, so that single precision can hold it.
 
 #pragma once
 
@@ -91,12 +90,14 @@ template <typename Real> class PackedIterations {
 
  private:
   using Vector = packed::Vector<Real>;
+  using Set = HalfLine<Real>;
 
   struct Constraints {
     std::vector<std::size_t> source;    // the place in the problem
     std::vector<packed::Ends> ends;
     std::vector<Vector> normal;    // the fourth number: the gap of the impulses at the start
-    std::vector<Real> diagonal, compliance, least;
+    std::vector<Real> diagonal, compliance;
+    std::vector<Set> set;                                    // of the changes since the start
     std::vector<Real> least_target, part, inverse_target;    // contact_targets.h
 
     std::size_t size() const { return source.size(); }
@@ -111,6 +112,7 @@ template <typename Real> class PackedIterations {
   Real free_target(const Constraints &constraints, std::size_t k) const;
   void wake(const std::vector<std::size_t> &near, const Real *gap);
   void set_idle();
+  void add_up_walls(Host &host);
   void pack_bodies(const RigidBodies &bodies, double mobility_unit);
   bool pack_rod(const RigidBodies &bodies, std::size_t b, double mobility_unit);
   void pack_body(const RigidBodies &bodies, std::size_t b, double mobility_unit);
@@ -123,20 +125,22 @@ template <typename Real> class PackedIterations {
 
   // As in packed::Pass
   std::vector<Real> unbound_, change_before_, gap_before_;
-  std::vector<double> start_;         // impulses, in the order of the problem
-  std::vector<double> bound_;         // the least ones
-  double step_before_ = 0.0;          // 1 / L of the last iteration
-  double inverse_diagonals_ = 0.0;    // their sum over all constraints
-  std::vector<Vector> looked_;        // gaps of the idle ones, four in each
-  int looks_ = 0;                     // since the start of the search
-  Real idle_gap_ = 0;                 // above it a constraint without an impulse is idle
-  std::vector<Real> inverse_mass_;    // per particle; 1 for particles in bodies
+  std::vector<double> start_;                    // impulses, in the order of the problem
+  std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
+  double step_before_ = 0.0;                     // 1 / L of the last iteration
+  double inverse_diagonals_ = 0.0;               // their sum over all constraints
+  std::vector<Vector> looked_;                   // gaps of the idle ones, four in each
+  int looks_ = 0;                                // since the start of the search
+  Real idle_gap_ = 0;                            // above it a constraint without an impulse is idle
+  std::vector<Real> inverse_mass_;               // per slot; 1 for particles in bodies
   std::vector<Vector> sum_, velocity_;
-  // Per particle: the change of velocity by the impulses at the start of the search, in all and
-  // since the first guess of the solve
+  int first_wall_ = 0;         // the slot of the first wall
+  bool walls_move_ = false;    // by impulses
+  // Per slot: the change of velocity by the impulses at the start of the search, in all and since
+  // the first guess of the solve
   std::vector<Vector> at_start_, since_guess_;
-  std::vector<char> mobile_;     // per particle
-  std::vector<Real> changed_;    // per particle that can move, what targets are a part of, as
+  std::vector<char> mobile_;     // per slot
+  std::vector<Real> changed_;    // per slot that can move, what targets are a part of, as
                                  // set_targets found it
   std::vector<Vector> kept_, kept_before_;    // of velocity_
   Real most_target_ = 0;

@@ -25,8 +25,8 @@ namespace {
   // a register: one that was just written is slow to read again. (Constraints in an order in which
   // neighbours have no particle in common, and every sum written, took a tenth longer for all of an
   // iteration, measured.)
-  template <typename Real>
-  inline __attribute__((always_inline)) void scatter(const Pass<Real> &pass, std::size_t begin,
+  template <typename Real, template <typename> typename Set>
+  inline __attribute__((always_inline)) void scatter(const Pass<Real, Set> &pass, std::size_t begin,
                                                      std::size_t end, const Real *change)
   {
     using Lanes = typename Vector<Real>::Lanes;
@@ -46,8 +46,8 @@ namespace {
 
   // Writes the four terms that a gap at the end of the step consists of: n_d dv_d of the three
   // directions, and the gap without impulses.
-  template <template <typename> typename Arrays, typename Real>
-  inline __attribute__((always_inline)) void split_gap(const Arrays<Real> &arrays, std::size_t c,
+  template <typename Arrays, typename Real>
+  inline __attribute__((always_inline)) void split_gap(const Arrays &arrays, std::size_t c,
                                                        Vector<Real> &terms)
   {
     using Lanes = typename Vector<Real>::Lanes;
@@ -68,8 +68,8 @@ namespace {
   }
 
   // Writes the gaps of a block, four at a time: up to three more are written than there are.
-  template <template <typename> typename Arrays, typename Real>
-  inline __attribute__((always_inline)) void gather(const Arrays<Real> &arrays, std::size_t begin,
+  template <typename Arrays, typename Real>
+  inline __attribute__((always_inline)) void gather(const Arrays &arrays, std::size_t begin,
                                                     std::size_t end, Vector<Real> *gap)
   {
     Vector<Real> terms[4];
@@ -85,16 +85,16 @@ namespace {
 
   // The part of advance_impulses between its gathers and its scatters makes the next changes of a
   // block, `next`, from the gaps that the present ones leave, and adds to what is passed.
-  template <typename Real>
-  inline __attribute__((always_inline)) void step_block(const Pass<Real> &pass, std::size_t begin,
-                                                        std::size_t size, const Real *gap,
-                                                        Real *next, Passed &passed)
+  template <typename Real, template <typename> typename Set>
+  inline __attribute__((always_inline)) void step_block(const Pass<Real, Set> &pass,
+                                                        std::size_t begin, std::size_t size,
+                                                        const Real *gap, Real *next, Passed &passed)
   {
     Real uphill = 0, curved = 0, steep = 0, lowest = 0, most = 0, heaviest = 0, farthest = 0,
          unsolved = 0, beyond_blur = 0;
     const Real *const diagonal = pass.diagonal + begin;
     const Real *const compliance = pass.compliance + begin;
-    const Real *const least = pass.least + begin;
+    const Set<Real> *const set = pass.set + begin;
     const Real *const inverse_target = pass.inverse_target + begin;
     Real *const unbound = pass.unbound + begin;
     Real *const change_before = pass.change_before + begin;
@@ -104,7 +104,7 @@ namespace {
 #pragma omp simd simdlen(16) reduction(+ : uphill, curved, steep) reduction(min : lowest) \
     reduction(max : most, heaviest, farthest, unsolved, beyond_blur)
     for (std::size_t k = 0; k < size; ++k) {
-      const Real present = unbound[k] > least[k] ? unbound[k] : least[k];
+      const Real present = set[k].project(unbound[k]);
       const Real here = gap[k] + compliance[k] * present;
       const Real per_diagonal = 1 / diagonal[k];
       const Real down = -step * here * per_diagonal;
@@ -112,16 +112,16 @@ namespace {
       const Real last_change = present - change_before[k];
       const Real free = present + down + along * (last_change + down - down_before) +
           beyond * down + back * (unbound[k] - present);
-      const Real value = free > least[k] ? free : least[k];
+      const Real value = set[k].project(free);
       const Real opened = here - gap_before[k];
       uphill += here * last_change;
       curved += opened * last_change;
       const Real larger = present > change_before[k] ? present : change_before[k];
-      steep += larger > least[k] ? opened * opened * per_diagonal : 0;
-      const Real under_force = present > least[k] ? here : 0;
+      steep += set[k].is_loaded(larger) ? opened * opened * per_diagonal : 0;
+      const Real under_force = set[k].is_loaded(present) ? here : 0;
       lowest = here < lowest ? here : lowest;
       most = under_force > most ? under_force : most;
-      const Real load = (value - least[k]) * diagonal[k];
+      const Real load = set[k].load(value) * diagonal[k];
       heaviest = load > heaviest ? load : heaviest;
       const Real far = (value > 0 ? value : -value) * diagonal[k];
       farthest = far > farthest ? far : farthest;
@@ -147,8 +147,8 @@ namespace {
         std::max(passed.unsolved_beyond_blur, static_cast<double>(beyond_blur));
   }
 
-  template <typename Real>
-  inline __attribute__((always_inline)) Passed advance(const Pass<Real> &pass)
+  template <typename Real, template <typename> typename Set>
+  inline __attribute__((always_inline)) Passed advance(const Pass<Real, Set> &pass)
   {
     Passed passed;
     Vector<Real> gaps[(BLOCK + 3) / 4];
@@ -233,9 +233,9 @@ namespace {
 
 }    // namespace
 
-INELASTIC_CLONES Passed advance_impulses(const Pass<float> &pass)
+INELASTIC_CLONES Passed advance_impulses(const Pass<float, HalfLine> &pass)
 { return advance(pass); }
-INELASTIC_CLONES Passed advance_impulses(const Pass<double> &pass)
+INELASTIC_CLONES Passed advance_impulses(const Pass<double, HalfLine> &pass)
 { return advance(pass); }
 
 INELASTIC_CLONES void find_gaps(const Look<float> &look)

@@ -10,6 +10,8 @@
 
 #pragma once
 
+#include "admissible_set.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -32,21 +34,22 @@ struct Ends {
 };
 
 // advance_impulses works on these arrays; those of constraints have `count` entries. All changes of
-// impulses are since the start of the search.
-template <typename Real> struct Pass {
+// impulses are since the start of the search. `Set` is the class of the admissible sets
+// (admissible_set.h).
+template <typename Real, template <typename> typename Set> struct Pass {
   std::size_t count;
   const Ends *ends;
   const Vector<Real>
       *normal;               // the fourth number: the gap that the first impulses end the step with
   const Real *diagonal;      // of A
   const Real *compliance;    // 0 for rigid constraints
-  const Real *least;         // the change that leaves the least impulse
+  const Set<Real> *set;      // which changes leave an admissible impulse
   const Real *inverse_target;      // 1 / the target of the residual
-  const Vector<Real> *velocity;    // per particle: change of velocity of the present changes
+  const Vector<Real> *velocity;    // per slot: change of velocity of the present changes
   Real *unbound;               // the present changes before projection; replaced by the next ones
   Real *change_before;         // the changes before; replaced by the present ones
   Real *gap_before;            // the gaps of the changes before; replaced by the present ones
-  Vector<Real> *sum;           // per particle: sum of the next changes; zero before
+  Vector<Real> *sum;           // per slot: sum of the next changes; zero before
   Real step, step_before;      // 1 / L, and that of the pass before
   Real along, beyond, back;    // the weights of accelerated_gradient.h
   Real blur;                   // a residual below this may be round-off
@@ -69,8 +72,8 @@ struct Passed {
 
 // Makes a gradient step from the present changes and the step of the momentum, and projects. `sum`
 // gets the sums of the changes that are next.
-Passed advance_impulses(const Pass<float> &pass);
-Passed advance_impulses(const Pass<double> &pass);
+Passed advance_impulses(const Pass<float, HalfLine> &pass);
+Passed advance_impulses(const Pass<double, HalfLine> &pass);
 
 // find_gaps works on these arrays of `count` constraints.
 template <typename Real> struct Look {
@@ -116,7 +119,7 @@ void turn_bodies(const std::vector<Rod<float>> &rods, const std::vector<Body<flo
 void turn_bodies(const std::vector<Rod<double>> &rods, const std::vector<Body<double>> &bodies,
                  const Member<double> *members, Vector<double> *sum);
 
-// move_particles works on these arrays, which are per particle.
+// move_particles works on these arrays, which are per slot (unknowns.h).
 template <typename Real> struct Move {
   std::size_t count;
   const Real *inverse_mass;    // 1 for particles in bodies, whose sums are changes of velocity

@@ -18,7 +18,7 @@ namespace {
     double most = 0.0;
     for (std::size_t c = 0; c < count; ++c) {
       const bool matters = gap_at_end[c] < 0.0 ||
-          (contacts.impulse[c] > contacts.least[c] && !overlaps_only);
+          (contacts.set[c].is_loaded(contacts.impulse[c]) && !overlaps_only);
       if (!matters || !(std::abs(gap_at_end[c]) > most)) continue;
       most = std::abs(gap_at_end[c]);
       result.worst = c;
@@ -51,7 +51,7 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
 {
   ProjectionResult result;
   GapOperator &gap_operator = solver.gap_operator();
-  velocity.resize(3 * static_cast<std::size_t>(problem.particles));
+  velocity.resize(problem.predicted_velocity.size());
   bool coarse = limits.coarseness > 1.0;
   while (true) {
     SolverLimits remaining = limits;

@@ -20,7 +20,7 @@ namespace inelastic {
 
 class ConstraintSource {
  public:
-  // Takes the velocities (3 per particle) that solve the problem as it stands, adds the constraints
+  // Takes the velocities (3 per slot) that solve the problem as it stands, adds the constraints
   // that they violate by more than the tolerance, and linearises constraints again where needed.
   // Returns the number of constraints that this rank added or changed.
   virtual long refine(const std::vector<double> &velocity, ContactProblem &problem) = 0;
@@ -53,7 +53,7 @@ inline Status worse(Status a, Status b)
 { return std::max(a, b); }
 
 // Projects problem.predicted_velocity in one to `max_rounds` rounds. On return `velocity` (3 per
-// particle, ghosts included) holds the projection and problem.contacts.impulse the impulses. If the
+// slot) holds the projection and problem.contacts.impulse the impulses. If the
 // last round added constraints, `velocity` knows nothing of them and their impulses are 0.
 // Where the limits are coarse, they are so until a round has left nothing to add or change; what
 // follows is solved as it should be. Collective.

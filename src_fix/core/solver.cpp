@@ -8,13 +8,14 @@ Residual residual(const double *gap_at_end, const ContactSet &contacts)
 {
   Residual worst;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const double impulse = contacts.impulse[c], least = contacts.least[c];
+    const double impulse = contacts.impulse[c];
+    const HalfLine<double> set = contacts.set[c];
     // A value that is no number satisfies no constraint.
     if (!std::isfinite(gap_at_end[c]) || !std::isfinite(impulse)) return UNSOLVED;
     worst.feasibility = std::max(worst.feasibility, -gap_at_end[c]);
-    if (!(impulse > least)) continue;
+    if (!set.is_loaded(impulse)) continue;
     worst.complementarity = std::max(worst.complementarity, gap_at_end[c]);
-    if (least < 0.0) worst.feasibility = std::max(worst.feasibility, gap_at_end[c]);
+    if (set.may_pull()) worst.feasibility = std::max(worst.feasibility, gap_at_end[c]);
   }
   return worst;
 }
@@ -30,12 +31,12 @@ Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contact
 Guess Solver::judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host)
 {
   std::vector<double> &impulse = problem.contacts.impulse;
-  const std::vector<double> &least = problem.contacts.least;
+  const std::vector<HalfLine<double>> &set = problem.contacts.set;
   const std::vector<double> &free_gap = gap_operator_.free_gap();
   const std::size_t count = impulse.size();
   gap_.resize(count);
   diagonal_.resize(count);
-  for (std::size_t c = 0; c < count; ++c) impulse[c] = std::max(least[c], impulse[c]);
+  for (std::size_t c = 0; c < count; ++c) impulse[c] = set[c].project(impulse[c]);
   gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
   const Residual mine = residual(gap_.data(), problem.contacts);
   Guess guess;

@@ -9,8 +9,8 @@
 //   complementarity   the largest w_c of the constraints with lambda_c > l_c: the gap that is left
 //                     where a force acts
 //
-// A solver that warm-starts takes its first guess from ContactSet::impulse, where numbers below the
-// least count as the least. Every solver leaves its result there.
+// A solver that warm-starts takes its first guess from ContactSet::impulse, of which it takes the
+// nearest admissible one. Every solver leaves its result there.
 
 #pragma once
 

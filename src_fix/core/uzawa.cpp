@@ -35,7 +35,7 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
       return ended(Status::INFEASIBLE);
     if (step == 0.0) step = 1.0 / largest_eigenvalue(problem, host);
     for (std::size_t c = 0; c < count; ++c)
-      contacts.impulse[c] = std::max(contacts.least[c], contacts.impulse[c] - step * gap_[c]);
+      contacts.impulse[c] = contacts.set[c].project(contacts.impulse[c] - step * gap_[c]);
     ++result.iterations;
   }
 }

@@ -90,7 +90,7 @@ void Clusters::find()
 
   label_.clear();
   shared_.clear();
-  cluster_.assign(static_cast<std::size_t>(count) + 1, NONE);
+  cluster_.assign(step_.problem.slots(), NONE);
   std::unordered_map<double, int> known;
   for (int i = 0; i < count; ++i) {
     if (!is_mobile(i)) continue;

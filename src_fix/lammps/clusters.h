@@ -26,14 +26,14 @@ class Clusters : protected Pointers {
   std::size_t size() const { return label_.size(); }
 
   static constexpr int NONE = -1;
-  // The cluster of a particle, ghosts included; NONE for one that no force moves.
-  int of(int particle) const { return cluster_[particle]; }
+  // The cluster of a slot (unknowns.h), ghosts included; NONE for one that no force moves.
+  int of(int slot) const { return cluster_[slot]; }
 
   // Tells whether forces move a particle.
   bool is_mobile(int i) const
   {
     const inelastic::ContactProblem &problem = step_.problem;
-    if (i == problem.particles) return false;
+    if (problem.is_wall(i)) return false;
     return step_.is_member(i) ? problem.bodies.inverse_mass[problem.bodies.body[i]] > 0.0
                               : problem.inverse_mass[i] > 0.0;
   }
@@ -52,7 +52,7 @@ class Clusters : protected Pointers {
   const Step &step_;
   GhostExchange &ranks_;
   std::vector<int> parent_;     // per particle, towards the root of what is connected on this rank
-  std::vector<int> cluster_;    // per particle
+  std::vector<int> cluster_;    // per slot (unknowns.h)
   // Per cluster: the least atom ID in it, and whether other ranks have a part.
   std::vector<double> label_;
   std::vector<char> shared_;

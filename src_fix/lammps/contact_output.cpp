@@ -77,7 +77,7 @@ bool ContactOutput::is_contact(std::size_t c) const
 
 void ContactOutput::clear_sums(bool virial_per_atom)
 {
-  const std::size_t size = 3 * static_cast<std::size_t>(step_.problem.particles + 1);
+  const std::size_t size = 3 * static_cast<std::size_t>(step_.problem.slots());
   contact_force_.assign(size, 0.0);
   contact_count_.assign(size, 0.0);
   if (virial_per_atom) {

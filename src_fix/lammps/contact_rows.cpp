@@ -36,7 +36,7 @@ void ContactRows::add(Side side, int i, int j, tagint partner, const double *nor
 
 void ContactRows::add_plane(Side side, int i, const double *normal, double gap, bool known)
 {
-  const int wall = step_.problem.particles;
+  const int wall = step_.problem.slot_of_wall(side.wall - 1);
   if (!known && laws_.has_law()) laws_.ask(side, i, wall, -side.wall, normal, true);
   step_.problem.contacts.add(i, wall, normal, gap, 0.0);
   step_.sides.push_back(side);

@@ -438,7 +438,7 @@ void FixInelastic::predict()
   inelastic::ContactProblem &problem = step_.problem;
   step_.impulse_per_force = step_.kicks() * update->dt * force->ftm2v;
   problem.timestep = update->dt;
-  problem.resize(nall);
+  problem.resize(nall, constraints_.walls().number_of_walls());
   if (laws_.has_law()) step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
   for (int i = 0; i < nall; ++i)
     problem.inverse_mass[i] = step_.is_mobile(atom, i) ? 1.0 / mass_of(atom, i) : 0.0;

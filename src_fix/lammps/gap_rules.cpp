@@ -45,7 +45,7 @@ std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
   const inelastic::ContactProblem &problem = step_.problem;
   if (step_.load_change.empty()) return std::nullopt;
   if (problem.inverse_mass[i] == 0.0) std::swap(i, j);
-  if (j == problem.particles || problem.inverse_mass[j] == 0.0) j = i;
+  if (problem.is_wall(j) || problem.inverse_mass[j] == 0.0) j = i;
   const double one = step_.load_change[3 * static_cast<std::size_t>(i)];
   const double other = step_.load_change[3 * static_cast<std::size_t>(j)];
   if (!(one > 0.0 && other > 0.0)) return std::nullopt;
@@ -168,7 +168,7 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     const bool may_stay = holds || contacts.impulse[c] == 0.0;
     if ((at_end >= -allowed || step_.keeps_overlaps) && (at_end <= allowed || may_stay)) continue;
     allowed = LEFT * tolerance;
-    if (contacts.impulse[c] > 0.0) contacts.least[c] = 0.0;
+    if (contacts.impulse[c] > 0.0) contacts.set[c].least = 0.0;
     const bool first_time = side.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
     contacts.gap[c] = first_time ? lessened : linear_gap;
     side.as_at_start = false;
@@ -192,7 +192,7 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
       return 0;
     if (contacts.impulse[c] > 0.0) {
       // What approaches across a gap needs no pull, and no push before it touches.
-      contacts.least[c] = 0.0;
+      contacts.set[c].least = 0.0;
     } else {
       gap = std::min(gap, most_closed(side) - side.wall_motion);
       if (gap <= contacts.gap[c]) return 0;
@@ -211,8 +211,7 @@ double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) 
   const int i = contacts.first[c], j = contacts.second[c];
   double opening = 0.0;
   for (int d = 0; d < 3; ++d)
-    opening += contacts.normal[3 * c + d] *
-        (velocity[3 * i + d] - (side.wall != 0 ? 0.0 : velocity[3 * j + d]));
+    opening += contacts.normal[3 * c + d] * (velocity[3 * i + d] - velocity[3 * j + d]);
   return side.gap_now - side.wall_motion + step_.problem.timestep * opening;
 }
 

@@ -57,6 +57,14 @@ void GhostExchange::sum_over_ghosts(double *per_particle)
   exchange(Exchange::VECTORS, true, true);
 }
 
+void GhostExchange::sum_over_ranks(double *of_walls, int count)
+{
+  if (comm->nprocs == 1) return;
+  const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
+  const std::vector<double> mine(of_walls, of_walls + count);
+  MPI_Allreduce(mine.data(), of_walls, count, MPI_DOUBLE, MPI_SUM, world);
+}
+
 void GhostExchange::least_over_ghosts(double *per_particle)
 {
   exchanged_ = per_particle;

@@ -36,6 +36,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
                LawMemory::packed_size(LawMemory::ENTRIES_PER_MESSAGE));
 
   void sum_over_ghosts(double *per_particle) override;
+  void sum_over_ranks(double *of_walls, int count) override;
   void choose_ghosts(const std::vector<char> &chosen) override;
   void sum_over_chosen_ghosts(double *per_particle) override;
   void sum_over_chosen_ghosts(float *per_particle) override;

@@ -79,7 +79,7 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   moving_.timestep = problem.timestep;
-  moving_.resize(problem.particles);
+  moving_.resize(problem.particles, problem.walls);
   moving_.inverse_mass = problem.inverse_mass;
   moving_.bodies = problem.bodies;
   std::copy_n(step_.velocity.begin(), step_.velocity.size(), moving_.predicted_velocity.begin());
@@ -104,8 +104,9 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
     const double ends_within =
         side.gap_now - side.wall_motion + (1.0 - DEEPER) * step_.settings.tolerance;
     // In all a contact still pushes, or pulls by as much as it may.
-    contacts.add(i, j, n, std::min(problem.contacts.gap[c], ends_within), 0.0, 0.0,
-                 std::min(0.0, problem.contacts.least[c] - problem.contacts.impulse[c]));
+    contacts.add(
+        i, j, n, std::min(problem.contacts.gap[c], ends_within), 0.0, 0.0,
+        std::min(0.0, problem.contacts.set[c].changes_of(problem.contacts.impulse[c]).least));
     source.push_back(c);
   }
   inelastic::SolverLimits limits;

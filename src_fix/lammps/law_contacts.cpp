@@ -12,13 +12,12 @@ using inelastic::Demand;
 
 namespace {
 
-// [length / time] Without that of a wall, for which j is the number of particles.
-double parting_speed(const std::vector<double> &velocity, int particles, int i, int j,
-                     const double *normal)
+// [length / time] With which the surfaces of two slots (unknowns.h) part; the prescribed motion of
+// a wall is not in it.
+double parting_speed(const std::vector<double> &velocity, int i, int j, const double *normal)
 {
   double speed = 0.0;
-  for (int d = 0; d < 3; ++d)
-    speed += normal[d] * (velocity[3 * i + d] - (j < particles ? velocity[3 * j + d] : 0.0));
+  for (int d = 0; d < 3; ++d) speed += normal[d] * (velocity[3 * i + d] - velocity[3 * j + d]);
   return speed;
 }
 
@@ -40,10 +39,10 @@ void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *no
   const inelastic::ContactProblem &problem = step_.problem;
   const double h = problem.timestep;
   const double speed_of_wall = side.wall_motion / h;
-  const double speed_before = parting_speed(step_.velocity_before, problem.particles, i, j, normal);
+  const double speed_before = parting_speed(step_.velocity_before, i, j, normal);
   LawContact contact{};
   const double predicted_speed =
-      parting_speed(problem.predicted_velocity, problem.particles, i, j, normal) - speed_of_wall;
+      parting_speed(problem.predicted_velocity, i, j, normal) - speed_of_wall;
   const LawMemory::Entry *const last = find(i, partner, normal, side.gap_now, side.size);
   if (last) {
     contact.known = true;
@@ -88,8 +87,8 @@ LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawContact &contact,
   const inelastic::ContactProblem &problem = step_.problem;
   const int i = problem.contacts.first[c], j = problem.contacts.second[c];
   const double *const n = &problem.contacts.normal[3 * c];
-  const double before = parting_speed(step_.velocity_before, problem.particles, i, j, n);
-  const double after = parting_speed(step_.velocity, problem.particles, i, j, n);
+  const double before = parting_speed(step_.velocity_before, i, j, n);
+  const double after = parting_speed(step_.velocity, i, j, n);
   LawMemory::Entry entry;
   entry.partner = partner;
   std::copy_n(n, 3, entry.normal.begin());
@@ -106,7 +105,7 @@ bool LawContacts::is_pushed_apart(std::size_t c) const
   if (!step_.bad_start) return false;
   const inelastic::ContactProblem &problem = step_.problem;
   const Side &side = step_.sides[c];
-  const double speed = parting_speed(step_.motion(), problem.particles, problem.contacts.first[c],
+  const double speed = parting_speed(step_.motion(), problem.contacts.first[c],
                                      problem.contacts.second[c], &problem.contacts.normal[3 * c]);
   const double gap = side.gap_now - side.wall_motion + problem.timestep * speed;
   return gap > REGULAR_OVERLAP * step_.settings.tolerance;

@@ -101,7 +101,7 @@ struct Step {
   inelastic::ContactProblem problem;
   std::vector<Side> sides;                 // one per constraint (contact_rows, gap_rules)
   std::vector<LawContact> law_contacts;    // empty without a contact law (law_contacts)
-  // 3 per particle and 3 zeros, before forces; only with a law (the movers)
+  // 3 per slot, before forces; only with a law (the movers)
   std::vector<double> velocity_before;
   // 3 per particle, of which the first is the factor by which the forces on one that is at rest
   // have changed since the last step; 0 where this is not known. Empty if nothing is at rest.
@@ -110,8 +110,8 @@ struct Step {
 
   // Of the step: what solves it.
 
-  std::vector<double> velocity;    // 3 per particle, the projection (the core, hold_still)
-  // 3 per particle, the mean velocity during the step; only in a scene with bodies, which turn (the
+  std::vector<double> velocity;    // 3 per slot, the projection (the core, hold_still)
+  // 3 per slot, the mean velocity during the step; only in a scene with bodies, which turn (the
   // movers)
   std::vector<double> motion_of_bodies;
 
@@ -151,8 +151,8 @@ struct Step {
   // Tells whether a constraint holds: it may pull, and with the present impulse it does not open.
   bool holds(std::size_t c) const
   {
-    return problem.contacts.least[c] < 0.0 &&
-        problem.contacts.impulse[c] > problem.contacts.least[c];
+    const inelastic::HalfLine<double> set = problem.contacts.set[c];
+    return set.may_pull() && set.is_loaded(problem.contacts.impulse[c]);
   }
 
   // Tells whether a particle belongs to a body.

@@ -133,8 +133,8 @@ void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &v
   const double gap_now = view.distance_now - size;
   const double motion = view.distance_now - view.distance;
   constraint_[key(i, view.wall)] = step_.problem.contacts.size();
-  rows_.add({view.wall, gap_now, size, motion}, i, step_.problem.particles, -view.wall,
-            view.normal);
+  rows_.add({view.wall, gap_now, size, motion}, i, step_.problem.slot_of_wall(view.wall - 1),
+            -view.wall, view.normal);
 }
 
 long WallConstraints::add_violated()

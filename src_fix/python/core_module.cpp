@@ -87,7 +87,7 @@ void add_contacts(inelastic::ContactProblem &problem, nb::handle given)
   for (std::size_t c = 0; c < gap.size(); ++c) {
     const auto wall_or_particle = static_cast<int>(second.data()[c]);
     problem.contacts.add(static_cast<int>(first.data()[c]),
-                         wall_or_particle < 0 ? problem.particles : wall_or_particle,
+                         wall_or_particle < 0 ? problem.slot_of_wall(0) : wall_or_particle,
                          normal.data() + 3 * c, gap.data()[c], guess.data()[c],
                          compliance.data()[c], least.data()[c], refinement.data()[c]);
   }
@@ -100,7 +100,7 @@ inelastic::ContactProblem make_problem(nb::handle given)
   const auto predicted_velocity = array<Vectors>(given, "predicted_velocity");
   const auto inverse_mass = array<Scalars>(given, "inverse_mass");
   problem.timestep = nb::cast<double>(given.attr("timestep"));
-  problem.resize(static_cast<int>(inverse_mass.size()));
+  problem.resize(static_cast<int>(inverse_mass.size()), 1);
   std::copy_n(predicted_velocity.data(), predicted_velocity.size(),
               problem.predicted_velocity.begin());
   std::copy_n(inverse_mass.data(), inverse_mass.size(), problem.inverse_mass.begin());
@@ -148,10 +148,11 @@ nb::tuple project(nb::handle given, const std::string &solver_name, double toler
   inelastic::SerialHost host;
   const inelastic::SolverResult result = solver->solve(problem, limits, host);
   const inelastic::Residual worst = residual_of(problem);
-  std::vector<double> velocity(3 * static_cast<std::size_t>(problem.particles));
+  std::vector<double> velocity(problem.predicted_velocity.size());
   inelastic::GapOperator gap_operator;
   gap_operator.prepare(problem);
   gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
+  velocity.resize(3 * static_cast<std::size_t>(problem.particles));
   return nb::make_tuple(to_numpy(velocity, 3), to_numpy(problem.contacts.impulse, 0),
                         result.iterations, in_words(result.status), worst.feasibility,
                         worst.complementarity);

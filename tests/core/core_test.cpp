@@ -135,14 +135,16 @@ ContactProblem make_problem(const std::vector<double> &velocity,
 {
   ContactProblem problem;
   problem.timestep = TIMESTEP;
-  problem.resize(static_cast<int>(inverse_mass.size()));
+  problem.resize(static_cast<int>(inverse_mass.size()), 1);
   std::copy(velocity.begin(), velocity.end(), problem.predicted_velocity.begin());
   std::copy(inverse_mass.begin(), inverse_mass.end(), problem.inverse_mass.begin());
   return problem;
 }
 
 void add_contact(ContactProblem &problem, int first, int second, const double *normal, double gap)
-{ problem.contacts.add(first, second == WALL ? problem.particles : second, normal, gap, 0.0); }
+{
+  problem.contacts.add(first, second == WALL ? problem.slot_of_wall(0) : second, normal, gap, 0.0);
+}
 
 // Unit spheres on top of each other, the lowest on a floor, all falling at g h = 0.1. With the
 // contacts or, for a source to find them, without.
@@ -164,6 +166,22 @@ std::vector<double> column_weights(int count)
   std::vector<double> weights;
   for (int i = 0; i < count; ++i) weights.push_back(0.1 * (count - i));
   return weights;
+}
+
+// The same column under a wall that has LID_MASS times the mass of a sphere and falls with it, with
+// a floor that has no mass and does not move.
+constexpr double LID_MASS = 7.0;
+ContactProblem make_column_under_lid(int count)
+{
+  const double down[3] = {0.0, 0.0, -1.0};
+  ContactProblem column = make_column(count, true), problem = column;
+  problem.resize(count, 2);
+  std::copy_n(column.predicted_velocity.begin(), 3 * count, problem.predicted_velocity.begin());
+  const int lid = problem.slot_of_wall(1);
+  problem.inverse_mass[static_cast<std::size_t>(lid)] = 1.0 / LID_MASS;
+  problem.predicted_velocity[3 * static_cast<std::size_t>(lid) + 2] = -0.1;
+  problem.contacts.add(count - 1, lid, down, 0.0, 0.0);
+  return problem;
 }
 
 // A cube of side^3 touching spheres with random velocities on a floor.
@@ -218,7 +236,7 @@ ContactProblem make_crystal_of_bodies()
   problem.contacts.clear();
   for (std::size_t c = 0; c < all.size(); ++c) {
     const auto body_of = [&](int i) {
-      return i == problem.particles ? -1 : bodies.body[static_cast<std::size_t>(i)];
+      return problem.is_wall(i) ? -1 : bodies.body[static_cast<std::size_t>(i)];
     };
     const int first = body_of(all.first[c]);
     if (first < 0 || first != body_of(all.second[c]))
@@ -245,10 +263,9 @@ std::vector<double> velocity_of(const ContactProblem &problem)
       push[3 * static_cast<std::size_t>(contacts.first[c]) + d] += along;
       push[3 * static_cast<std::size_t>(contacts.second[c]) + d] -= along;
     }
-  const auto particles = static_cast<std::size_t>(problem.particles);
   const RigidBodies &bodies = problem.bodies;
-  for (std::size_t i = 0; i < particles; ++i)
-    if (bodies.empty() || bodies.body[i] < 0)
+  for (std::size_t i = 0; i < problem.inverse_mass.size(); ++i)
+    if (bodies.empty() || problem.is_wall(static_cast<int>(i)) || bodies.body[i] < 0)
       for (std::size_t d = 0; d < 3; ++d)
         velocity[3 * i + d] += problem.inverse_mass[i] * push[3 * i + d];
   // Of every member on every member of the same body.
@@ -267,14 +284,12 @@ std::vector<double> velocity_of(const ContactProblem &problem)
       for (std::size_t d = 0; d < 3; ++d)
         velocity[3 * to + d] += bodies.inverse_mass[b] * push[3 * from + d] + turned[d];
     }
-  velocity.resize(3 * particles);
   return velocity;
 }
 
 // Gaps at the end of the step, by the formula.
-std::vector<double> gaps_of(const ContactProblem &problem, std::vector<double> velocity)
+std::vector<double> gaps_of(const ContactProblem &problem, const std::vector<double> &velocity)
 {
-  velocity.resize(velocity.size() + 3, 0.0);    // walls
   const ContactSet &contacts = problem.contacts;
   std::vector<double> gaps = contacts.gap;
   for (std::size_t c = 0; c < contacts.size(); ++c)
@@ -283,12 +298,6 @@ std::vector<double> gaps_of(const ContactProblem &problem, std::vector<double> v
           (velocity[3 * static_cast<std::size_t>(contacts.first[c]) + d] -
            velocity[3 * static_cast<std::size_t>(contacts.second[c]) + d]);
   return gaps;
-}
-
-std::vector<double> without_dummy(std::vector<double> per_particle)
-{
-  per_particle.resize(per_particle.size() - 3);
-  return per_particle;
 }
 
 // Adds nothing.
@@ -327,7 +336,7 @@ void test_empty_problems()
       CHECK(result.status == Status::CONVERGED);
       CHECK_EQUAL(result.rounds, 1);
       CHECK_EQUAL(source.looks, 1);
-      CHECK(velocity == given);
+      CHECK(velocity == problem.predicted_velocity);
       CHECK_EQUAL(largest_eigenvalue(problem, host), 0.0);
     }
   const Residual nothing = residual(nullptr, ContactSet());
@@ -351,19 +360,28 @@ void test_contact_set()
   CHECK(contacts.gap.empty() && contacts.impulse.empty());
 }
 
-void test_resize_keeps_the_dummy_particle_still()
+void test_resize_sets_walls_still()
 {
   ContactProblem problem;
-  for (const int particles : {3, 1, 4, 0}) {
-    problem.resize(particles);
-    CHECK_EQUAL(problem.particles, particles);
-    CHECK_EQUAL(problem.inverse_mass.size(), static_cast<std::size_t>(particles) + 1);
-    CHECK_EQUAL(problem.predicted_velocity.size(), 3 * (static_cast<std::size_t>(particles) + 1));
-    CHECK_EQUAL(problem.inverse_mass.back(), 0.0);
-    for (int d = 1; d <= 3; ++d) CHECK_EQUAL(*(problem.predicted_velocity.end() - d), 0.0);
-    std::fill(problem.inverse_mass.begin(), problem.inverse_mass.end(), 9.0);
-    std::fill(problem.predicted_velocity.begin(), problem.predicted_velocity.end(), 9.0);
-  }
+  for (const int particles : {3, 1, 4, 0})
+    for (const int walls : {0, 1, 3}) {
+      problem.resize(particles, walls);
+      CHECK_EQUAL(problem.particles, particles);
+      CHECK_EQUAL(problem.slots(), particles + walls);
+      CHECK_EQUAL(problem.inverse_mass.size(), static_cast<std::size_t>(particles + walls));
+      CHECK_EQUAL(problem.predicted_velocity.size(), 3 * problem.inverse_mass.size());
+      CHECK(!problem.any_wall_moves());
+      for (int wall = 0; wall < walls; ++wall) {
+        const int slot = problem.slot_of_wall(wall);
+        CHECK(problem.is_wall(slot) && !problem.is_mobile(slot));
+        for (int d = 0; d < 3; ++d)
+          CHECK_EQUAL(problem.predicted_velocity[3 * static_cast<std::size_t>(slot) +
+                                                 static_cast<std::size_t>(d)],
+                      0.0);
+      }
+      std::fill(problem.inverse_mass.begin(), problem.inverse_mass.end(), 9.0);
+      std::fill(problem.predicted_velocity.begin(), problem.predicted_velocity.end(), 9.0);
+    }
 }
 
 void test_residual()
@@ -398,12 +416,11 @@ void test_gap_operator()
     for (std::size_t c = 0; c < problem.contacts.size(); ++c)
       problem.contacts.impulse[c] = 0.1 * static_cast<double>(c % 7);
     gap_operator.prepare(problem);
-    CHECK_ALL_NEAR(gap_operator.free_gap(),
-                   gaps_of(problem, without_dummy(problem.predicted_velocity)), ROUNDING);
+    CHECK_ALL_NEAR(gap_operator.free_gap(), gaps_of(problem, problem.predicted_velocity), ROUNDING);
     std::vector<double> gaps(problem.contacts.size());
     gap_operator.apply(problem, problem.contacts.impulse.data(), gaps.data(), host);
     CHECK_ALL_NEAR(gaps, gaps_of(problem, velocity_of(problem)), ROUNDING);
-    std::vector<double> velocity(3 * static_cast<std::size_t>(problem.particles));
+    std::vector<double> velocity(problem.predicted_velocity.size());
     gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
     CHECK_ALL_NEAR(velocity, velocity_of(problem), ROUNDING);
   }
@@ -495,6 +512,45 @@ void test_sphere_falling_on_the_floor()
   }
 }
 
+// A lid that rests on a column adds its weight to every contact, and carries its own.
+void test_lid_on_a_column()
+{
+  constexpr int COUNT = 6;
+  SerialHost host;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_column_under_lid(COUNT);
+    const auto solver = make_solver(name);
+    const SolverResult result = solver->solve(problem, {1.0e-12, 100000}, host);
+    CHECK(result.status == Status::CONVERGED);
+    std::vector<double> expected = column_weights(COUNT);
+    for (double &weight : expected) weight += 0.1 * LID_MASS;
+    expected.push_back(0.1 * LID_MASS);
+    // A residual of 1e-12 at each of seven contacts in series, over h^2 of 1e-4 and the masses.
+    CHECK_ALL_NEAR(problem.contacts.impulse, expected, 1.0e-7);
+    std::vector<double> velocity(problem.predicted_velocity.size());
+    solver->gap_operator().velocity_applied(problem, velocity.data());
+    CHECK_ALL_NEAR(velocity, std::vector<double>(velocity.size(), 0.0), 1.0e-8);
+  }
+}
+
+// A sphere that meets a free wall shares its momentum with it.
+void test_sphere_meets_a_free_wall()
+{
+  SerialHost host;
+  for (const std::string &name : SOLVERS) {
+    ContactProblem problem = make_problem({0.0, 0.0, -1.0}, {1.0});
+    problem.inverse_mass.back() = 0.25;
+    problem.contacts.add(0, problem.slot_of_wall(0), UP, 0.0, 0.0);
+    const auto solver = make_solver(name);
+    solver->solve(problem, {1.0e-13, 100000}, host);
+    std::vector<double> velocity(problem.predicted_velocity.size());
+    solver->gap_operator().velocity(problem, problem.contacts.impulse.data(), velocity.data(),
+                                    host);
+    // The residual over h.
+    CHECK_ALL_NEAR(velocity, (std::vector<double>{0.0, 0.0, -0.2, 0.0, 0.0, -0.2}), 1.0e-11);
+  }
+}
+
 void test_frozen_particle()
 {
   SerialHost host;
@@ -505,7 +561,7 @@ void test_frozen_particle()
     std::vector<double> velocity;
     const auto solver = make_solver(name);
     project(problem, source, *solver, {TOLERANCE, 1000}, 1, host, velocity);
-    CHECK_ALL_NEAR(velocity, std::vector<double>({0.0, 0.0, 0.5, 0.0, 0.0, 0.5}),
+    CHECK_ALL_NEAR(velocity, std::vector<double>({0.0, 0.0, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0}),
                    TOLERANCE / TIMESTEP);
   }
 }
@@ -591,7 +647,7 @@ void test_no_room()
   for (const std::string &name : SOLVERS)
     for (const bool joined : {false, true}) {
       ContactProblem problem = make_column(COUNT, true);
-      problem.contacts.add(COUNT - 1, problem.particles, down, -MISSING, 0.0);
+      problem.contacts.add(COUNT - 1, problem.slot_of_wall(0), down, -MISSING, 0.0);
       if (joined) {
         const int members[1] = {2};
         const double arm[3] = {}, inertia[6] = {1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
@@ -712,7 +768,7 @@ class HiddenContacts final : public ConstraintSource {
 
   long refine(const std::vector<double> &velocity, ContactProblem &problem) override
   {
-    CHECK_EQUAL(velocity.size(), 3 * static_cast<std::size_t>(problem.particles));
+    CHECK_EQUAL(velocity.size(), 3 * static_cast<std::size_t>(problem.slots()));
     const std::vector<double> gaps = gaps_of(all_, velocity);
     const ContactSet &hidden = all_.contacts;
     long added = 0;
@@ -751,7 +807,8 @@ void test_contacts_are_found_in_rounds()
     CHECK_AT_MOST(result.residual.feasibility, TOLERANCE);
     CHECK_ALL_NEAR(problem.contacts.impulse, column_weights(COUNT),
                    COUNT * COUNT * TOLERANCE / TIMESTEP);
-    CHECK_ALL_NEAR(velocity, std::vector<double>(3 * COUNT, 0.0), COUNT * TOLERANCE / TIMESTEP);
+    CHECK_ALL_NEAR(velocity, std::vector<double>(3 * problem.slots(), 0.0),
+                   COUNT * TOLERANCE / TIMESTEP);
   }
 }
 
@@ -791,7 +848,7 @@ void test_round_limit()
     CHECK_ALL_NEAR(velocity, velocity_of(problem), ROUNDING);
     CHECK(result.status == Status::OUT_OF_ROUNDS);
     CHECK_ABOVE(result.residual.feasibility, TOLERANCE);    // of what was found and not solved
-    CHECK_EQUAL(velocity.size(), std::size_t{18});
+    CHECK_EQUAL(velocity.size(), std::size_t{21});          // of six particles and a wall
   }
 }
 
@@ -856,10 +913,10 @@ void test_concave_wall_is_linearised_again()
     // overlap only squared: the root of the tolerance, over the step.
     const double distance = std::hypot(1.1, 0.4);
     const double accuracy = std::sqrt(2.0 * TOLERANCE) / TIMESTEP;
-    CHECK_ALL_NEAR(
-        velocity,
-        std::vector<double>({(1.1 / distance - 0.8) / TIMESTEP, 0.4 / distance / TIMESTEP, 1.0}),
-        accuracy);
+    CHECK_ALL_NEAR(velocity,
+                   std::vector<double>({(1.1 / distance - 0.8) / TIMESTEP,
+                                        0.4 / distance / TIMESTEP, 1.0, 0.0, 0.0, 0.0}),
+                   accuracy);
   }
 }
 
@@ -1002,6 +1059,12 @@ class RankHost final : public Host {
   void sum_over_chosen_ghosts(double *per_particle) override { sum(per_particle, 4, &chosen_); }
   void sum_over_chosen_ghosts(float *per_particle) override { sum(per_particle, 4, &chosen_); }
 
+  void sum_over_ranks(double *of_walls, int count) override
+  {
+    const Ranks::Arrays arrays = {nullptr, of_walls, nullptr, count, 0};
+    ranks_.call("sum_over_ranks", rank_, arrays, &Ranks::reduce);
+  }
+
   void share_with_ghosts(double *per_particle) override
   {
     Ranks::Arrays arrays;
@@ -1098,6 +1161,9 @@ ContactProblem part_of(const ContactProblem &whole, const Share &share,
                 &whole.contacts.normal[3 * c], whole.contacts.gap[c]);
   }
   if (!whole.bodies.empty()) part.bodies = bodies_of(whole.bodies, share.particles);
+  part.inverse_mass.back() = whole.inverse_mass.back();
+  std::copy(whole.predicted_velocity.end() - 3, whole.predicted_velocity.end(),
+            part.predicted_velocity.end() - 3);
   return part;
 }
 
@@ -1164,6 +1230,8 @@ void check_agreement(const std::vector<RankOutcome> &outcomes, const Ranks &rank
     for (const int i : share.particles)
       for (std::size_t d = 0; d < 3; ++d)
         expected_here.push_back(expected[3 * static_cast<std::size_t>(i) + d]);
+    const std::ptrdiff_t of_wall = 3;
+    expected_here.insert(expected_here.end(), expected.end() - of_wall, expected.end());
     CHECK_ALL_NEAR(outcomes[rank].velocity, expected_here, bound);
     for (std::size_t other = 0; other < outcomes.size(); ++other) {
       const Share &owner = ranks.shares()[other];
@@ -1320,13 +1388,48 @@ void test_two_ranks(double tolerance)
 }
 
 // No rank has anything at all.
+// A lid lies on two columns, one on each rank, and half of its weight on each of them.
+void test_lid_over_two_ranks()
+{
+  constexpr int COUNT = 4;
+  const double down[3] = {0.0, 0.0, -1.0};
+  ContactProblem whole =
+      make_problem(std::vector<double>(6 * COUNT, 0.0), std::vector<double>(2 * COUNT, 1.0));
+  // The floor is a sphere that is frozen: the only wall is the lid.
+  for (const std::string &name : SOLVERS) {
+    std::vector<std::vector<std::size_t>> contacts(2);
+    std::vector<Share> shares(2);
+    whole.contacts.clear();
+    for (int i = 0; i < 2 * COUNT; ++i) {
+      const auto rank = static_cast<std::size_t>(i / COUNT);
+      shares[rank].particles.push_back(i);
+      ++shares[rank].owned;
+      const bool is_floor = i % COUNT == 0;
+      whole.inverse_mass[static_cast<std::size_t>(i)] = is_floor ? 0.0 : 1.0;
+      whole.predicted_velocity[3 * static_cast<std::size_t>(i) + 2] = is_floor ? 0.0 : -0.1;
+      contacts[rank].push_back(whole.contacts.size());
+      if (is_floor)
+        whole.contacts.add(i + COUNT - 1, whole.slot_of_wall(0), down, 0.0, 0.0);
+      else
+        whole.contacts.add(i, i - 1, UP, 0.0, 0.0);
+    }
+    whole.inverse_mass.back() = 1.0 / LID_MASS;
+    whole.predicted_velocity.back() = -0.1;
+    Ranks ranks(shares, 2 * COUNT);
+    const auto outcomes = solve_on_ranks(whole, ranks, contacts, name, 1.0e-12, false);
+    // A residual of 1e-12 at each of four contacts in series, over h, with room for the mass.
+    check_agreement(outcomes, ranks, std::vector<double>(whole.predicted_velocity.size(), 0.0),
+                    1.0e-8);
+  }
+}
+
 void test_two_ranks_with_nothing()
 {
   const ContactProblem nothing = make_problem({}, {});
   for (const std::string &name : SOLVERS) {
     Ranks ranks(std::vector<Share>(2), 0);
     const auto outcomes = solve_on_ranks(nothing, ranks, {{}, {}}, name, TOLERANCE, false);
-    check_agreement(outcomes, ranks, {}, 0.0);
+    check_agreement(outcomes, ranks, nothing.predicted_velocity, 0.0);
   }
 }
 
@@ -1377,6 +1480,7 @@ void test_periodic_images(bool joined)
     CHECK(result.status == Status::CONVERGED);
     std::vector<double> expected;
     for (int i = 0; i <= COUNT; ++i) expected.insert(expected.end(), {momentum / mass, 0.0, 0.0});
+    expected.insert(expected.end(), {0.0, 0.0, 0.0});    // the wall
     // Relative velocities add up along the ring, and add up to zero round it.
     CHECK_ALL_NEAR(velocity, expected, COUNT * COUNT * TOLERANCE / TIMESTEP);
   }
@@ -1437,12 +1541,14 @@ int main()
 {
   test_empty_problems();
   test_contact_set();
-  test_resize_keeps_the_dummy_particle_still();
+  test_resize_sets_walls_still();
   test_residual();
   test_gap_operator();
   test_rigid_bodies();
   test_mobility();
   test_sphere_falling_on_the_floor();
+  test_lid_on_a_column();
+  test_sphere_meets_a_free_wall();
   test_frozen_particle();
   test_column();
   test_crystal(make_crystal(4));
@@ -1467,6 +1573,7 @@ int main()
     test_bodies_on_two_ranks(tolerance);
   }
   test_two_ranks_with_nothing();
+  test_lid_over_two_ranks();
   test_periodic_images(false);
   test_periodic_images(true);
   test_largest_eigenvalue_on_two_ranks();
