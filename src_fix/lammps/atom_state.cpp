@@ -30,14 +30,14 @@ void AtomState::remember_contacts(GhostExchange &ranks)
   const double force_per_impulse = 1.0 / step_.impulse_per_force;
   for (int i = 0; i < problem.particles; ++i) memory_.forget(i);
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
-    const double closed_gap = step_.sides[c].closed_gap;
-    if (problem.contacts.impulse[c] == 0.0 && closed_gap == ContactMemory::NOT_CLOSED) continue;
+    const Contact &contact = step_.contact_of(c);
+    const double closed_gap = contact.closed_gap;
+    if (problem.contacts.impulse[c] == 0.0 && closed_gap == Contact::NOT_CLOSED) continue;
     const int i = problem.contacts.first[c];
     const int j = problem.contacts.second[c];
-    const int wall = step_.sides[c].wall;
     const double force = problem.contacts.impulse[c] * force_per_impulse;
-    memory_.remember(i, {wall ? -wall : atom->tag[j], force, closed_gap});
-    if (!wall) memory_.remember(j, {atom->tag[i], force, closed_gap});
+    memory_.remember(i, {contact.partner, force, closed_gap});
+    if (!contact.is_with_wall()) memory_.remember(j, {atom->tag[i], force, closed_gap});
   }
   ranks.gather(memory_);
   measure_messages(ranks);

@@ -5,6 +5,8 @@
 #ifndef INELASTIC_CONTACT_MEMORY_H
 #define INELASTIC_CONTACT_MEMORY_H
 
+#include "contact.h"
+
 #include "lmptype.h"
 
 #include <algorithm>
@@ -16,17 +18,14 @@ class ContactMemory {
  public:
   // The most contacts that a ghost tells its owned atom; what is beyond loses its first guess.
   static constexpr int SHARED_PARTNERS = 16;
-  // In place of a gap at which a contact is closed, which is not negative.
-  static constexpr double NOT_CLOSED = -1.0;
-
   void resize(int atoms) { remembered_.resize(atoms); }
 
   void forget(int atom) { remembered_[atom].clear(); }
 
   struct Entry {
-    tagint partner = 0;                // the other atom's ID, or minus the wall's number
-    double force = 0.0;                // [force] of the last step
-    double closed_gap = NOT_CLOSED;    // [length] the gap at which the contact is closed
+    tagint partner = 0;                         // the other atom's ID, or minus the wall's number
+    double force = 0.0;                         // [force] of the last step
+    double closed_gap = Contact::NOT_CLOSED;    // [length] the gap at which the contact is closed
   };
 
   void remember(int atom, const Entry &entry) { remembered_[atom].push_back(entry); }

@@ -71,8 +71,8 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
 bool ContactOutput::is_contact(std::size_t c) const
 {
   if (step_.problem.contacts.impulse[c] != 0.0) return true;
-  const LawContact *const contact = step_.law_contact(step_.sides[c]);
-  return contact && contact->kept && contact->impulse == 0.0;
+  const LawState *const law = step_.law_state_of(c);
+  return law && law->kept && law->impulse == 0.0;
 }
 
 void ContactOutput::clear_sums(bool virial_per_atom)
@@ -98,11 +98,11 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   const int i = problem.contacts.first[c];
   const int j = problem.contacts.second[c];
   const double *const n = &problem.contacts.normal[3 * c];
-  const Side &side = step_.sides[c];
-  const bool is_wall = side.wall != 0;
+  const Contact &contact = step_.contact_of(c);
+  const bool is_wall = contact.is_with_wall();
   counts_[is_wall] += 1.0;
   if (strength > 0.0) counts_[2] += 1.0;
-  const LawContact *const law = step_.law_contact(side);
+  const LawState *const law = step_.law_state_of(c);
   if (law && law->kept) counts_[3] += 1.0;
   largest_change_ = std::max(largest_change_,
                              std::abs(problem.contacts.impulse[c]) *
@@ -111,13 +111,13 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   for (int d = 0; d < 3; ++d) {
     contact_force_[3 * i + d] += strength * n[d];
     contact_force_[3 * j + d] -= strength * n[d];
-    if (is_wall) wall_force_[3 * (side.wall - 1) + d] -= strength * n[d];
+    if (is_wall) wall_force_[3 * (contact.wall() - 1) + d] -= strength * n[d];
   }
   if (!is_wall) contact_count_[3 * j] += 1.0;
-  const double to_point = atom->radius[i] + (is_wall ? side.gap_now : 0.5 * side.gap_now);
+  const double to_point = atom->radius[i] + (is_wall ? contact.gap_now : 0.5 * contact.gap_now);
   list_contact(c, strength, to_point);
   if (virial.global || virial.per_atom) {
-    const double arm = is_wall ? to_point : side.size + side.gap_now;
+    const double arm = is_wall ? to_point : contact.size + contact.gap_now;
     add_virial(c, arm * strength, virial);
   }
 }
@@ -127,18 +127,18 @@ void ContactOutput::list_contact(std::size_t c, double strength, double to_point
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const int i = contacts.first[c];
   const double *const n = &contacts.normal[3 * c];
-  const Side &side = step_.sides[c];
+  const Contact &contact = step_.contact_of(c);
   double *const out = local_[local_rows_++];
   out[0] = static_cast<double>(atom->tag[i]);
-  out[1] = side.wall != 0 ? -side.wall : static_cast<double>(atom->tag[contacts.second[c]]);
+  out[1] = static_cast<double>(contact.partner);
   for (int d = 0; d < 3; ++d) {
     out[2 + d] = atom->x[i][d] - to_point * n[d];
     out[5 + d] = n[d];
   }
-  out[8] = side.gap_now;
+  out[8] = contact.gap_now;
   out[9] = strength;
   if (remembered_ > 0)
-    std::copy_n(step_.law_contact(side)->remembered.begin(), remembered_, out + LOCAL_COLUMNS);
+    std::copy_n(step_.law_state_of(c)->remembered.begin(), remembered_, out + LOCAL_COLUMNS);
 }
 
 // `weight` is the distance over which the force acts, times the force. Half goes to each side; a
@@ -153,7 +153,7 @@ void ContactOutput::add_virial(std::size_t c, double weight, const VirialTarget 
     for (int k = 0; k < 6; ++k) virial.total[k] += v[k];
   if (!virial.per_atom) return;
   const int i = contacts.first[c];
-  const int j = step_.sides[c].wall != 0 ? i : contacts.second[c];
+  const int j = step_.contact_of(c).is_with_wall() ? i : contacts.second[c];
   for (int k = 0; k < 3; ++k) {
     virial_diagonal_[3 * i + k] += 0.5 * v[k];
     virial_diagonal_[3 * j + k] += 0.5 * v[k];

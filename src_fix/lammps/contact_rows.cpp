@@ -9,7 +9,8 @@ using namespace LAMMPS_NS;
 void ContactRows::begin_step()
 {
   step_.problem.contacts.clear();
-  step_.sides.clear();
+  step_.contacts.clear();
+  step_.rows.clear();
   laws_.begin_step();
 }
 
@@ -23,21 +24,30 @@ bool ContactRows::remembers(int i, tagint partner, const double *normal, double 
 bool ContactRows::remembers_wall(int i) const
 { return laws_.remembers_wall(i); }
 
-void ContactRows::add(Side side, int i, int j, tagint partner, const double *normal)
+void ContactRows::add(Contact contact, double wall_motion, int i, int j, const double *normal)
 {
   if (laws_.has_law())
-    laws_.ask(side, i, j, partner, normal, rules_.overlaps().is_bad(side.gap_now));
-  rules_.begin(side, memory_.find(i, partner), i, j, normal);
-  step_.problem.contacts.add(i, j, normal, rules_.asked_gap(side),
-                             step_.impulse_per_force * side.force, 0.0, side.asked.least_impulse,
-                             side.asked.refinement());
-  step_.sides.push_back(side);
+    laws_.ask(contact, wall_motion, i, j, normal, rules_.overlaps().is_bad(contact.gap_now));
+  rules_.begin(contact, memory_.find(i, contact.partner), wall_motion, i, j, normal);
+  const Row row = {static_cast<int>(step_.contacts.size()), wall_motion};
+  step_.problem.contacts.add(i, j, normal, rules_.effective_gap(contact) - wall_motion,
+                             step_.impulse_per_force * contact.force, 0.0,
+                             contact.asked.least_impulse, contact.asked.refinement());
+  step_.contacts.push_back(contact);
+  step_.rows.push_back(row);
 }
 
-void ContactRows::add_plane(Side side, int i, const double *normal, double gap, bool known)
+int ContactRows::add_late(Contact contact, double wall_motion, int i, const double *normal)
 {
-  const int wall = step_.problem.slot_of_wall(side.wall - 1);
-  if (!known && laws_.has_law()) laws_.ask(side, i, wall, -side.wall, normal, true);
+  const int wall = step_.problem.slot_of_wall(contact.wall() - 1);
+  if (laws_.has_law()) laws_.ask(contact, wall_motion, i, wall, normal, true);
+  step_.contacts.push_back(contact);
+  return static_cast<int>(step_.contacts.size()) - 1;
+}
+
+void ContactRows::add_plane(const Row &row, int i, const double *normal, double gap)
+{
+  const int wall = step_.problem.slot_of_wall(step_.contacts[row.contact].wall() - 1);
   step_.problem.contacts.add(i, wall, normal, gap, 0.0);
-  step_.sides.push_back(side);
+  step_.rows.push_back(row);
 }

@@ -31,14 +31,17 @@ class ContactRows {
   bool remembers(int i, tagint partner, const double *normal, double gap, double size) const;
   bool remembers_wall(int i) const;
 
-  // Adds a contact of particle i with particle j, or with a wall: then j is the number of
-  // particles.
-  void add(Side side, int i, int j, tagint partner, const double *normal);
+  // Adds a contact with one row. Slot i is its first particle, slot j the other side (unknowns.h).
+  // The wall, if it is one, closes the gap by `wall_motion` [length] during the step.
+  void add(Contact contact, double wall_motion, int i, int j, const double *normal);
 
-  // Adds one more tangent plane of a wall, which asks for `gap` [length] (contact_set.h). `known`
-  // tells whether the contact with this wall is in the problem already; if not, the plane only
-  // pushes in this step.
-  void add_plane(Side side, int i, const double *normal, double gap, bool known);
+  // Adds a contact with a wall that comes to light at the end of the step, without a row. In this
+  // step it only pushes. Returns its place in Step::contacts.
+  int add_late(Contact contact, double wall_motion, int i, const double *normal);
+
+  // Adds a row, a tangent plane of a wall, to a contact of particle i. It asks for `gap` [length]
+  // (contact_set.h).
+  void add_plane(const Row &row, int i, const double *normal, double gap);
 
  private:
   Step &step_;

@@ -23,10 +23,10 @@ void EntangledBodies::find()
   pairs_.clear();
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const Side &side = step_.sides[c];
+    const Contact &contact = step_.contact_of(c);
     const int i = contacts.first[c], j = contacts.second[c];
-    if (side.wall == 0 && (step_.is_member(i) || step_.is_member(j)) &&
-        side.gap_now < -PUSH_LIMIT * side.size)
+    if (!contact.is_with_wall() && (step_.is_member(i) || step_.is_member(j)) &&
+        contact.gap_now < -PUSH_LIMIT * contact.size)
       pairs_.insert(pair(i, j));
   }
 }
@@ -36,18 +36,18 @@ void EntangledBodies::disentangle(const Atom *atom, const OverlapWatch &overlaps
   constexpr double NEVER = 1.0e3;    // of the sum of radii, a gap that no step closes
   inelastic::ContactSet &contacts = step_.problem.contacts;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const Side &side = step_.sides[c];
+    const Contact &contact = step_.contact_of(c);
     const int i = contacts.first[c], j = contacts.second[c];
-    if (side.wall != 0 || !contains(i, j)) continue;
-    if (!overlaps.is_bad(side.gap_now)) {
-      contacts.gap[c] = NEVER * side.size;
+    if (contact.is_with_wall() || !contains(i, j)) continue;
+    if (!overlaps.is_bad(contact.gap_now)) {
+      contacts.gap[c] = NEVER * contact.size;
       continue;
     }
     double apart[3];
     for (int d = 0; d < 3; ++d)
       apart[d] = atom->x[i][d] - step_.arm(i)[d] - atom->x[j][d] + step_.arm(j)[d];
     const double distance = norm(apart);
-    if (distance > COINCIDENT * side.size)
+    if (distance > COINCIDENT * contact.size)
       for (int d = 0; d < 3; ++d) contacts.normal[3 * c + d] = apart[d] / distance;
   }
 }

@@ -17,25 +17,26 @@ constexpr double CLOSING = 0.01;
 
 }    // namespace
 
-void GapRules::begin(Side &side, const ContactMemory::Entry &last, int i, int j,
-                     const double *normal) const
+void GapRules::begin(Contact &contact, const ContactMemory::Entry &last, double wall_motion, int i,
+                     int j, const double *normal) const
 {
   constexpr double PART_OF_LOAD = 0.1;
   constexpr double SAME = 1.0e-9;    // round-off of forces
-  side.force = last.force;
+  contact.force = last.force;
   const auto changes = load_changes(i, j);
   // Loads of particles at rest that change by one factor change contact forces by it.
   if (changes && std::abs((*changes)[1] - (*changes)[0]) <= SAME * (*changes)[0])
-    side.force *= (*changes)[0];
+    contact.force *= (*changes)[0];
   const inelastic::ContactProblem &problem = step_.problem;
   const double *const v = problem.predicted_velocity.data();
   double opening = 0.0;
   for (int d = 0; d < 3; ++d) opening += normal[d] * (v[3 * i + d] - v[3 * j + d]);
-  const double load = step_.impulse_per_force * side.force * problem.mobility_of_pair(i, j, normal);
-  side.to_stop =
-      std::max({PART_OF_LOAD * load, side.wall_motion - problem.timestep * opening, 0.0});
+  const double load =
+      step_.impulse_per_force * contact.force * problem.mobility_of_pair(i, j, normal);
+  contact.to_stop = std::max({PART_OF_LOAD * load, wall_motion - problem.timestep * opening, 0.0});
   // What is at rest is closed where it is: to close would be a motion that nothing makes.
-  side.closed_gap = closed_gap(side, last.closed_gap, changes ? 0.0 : CLOSING * side.to_stop);
+  contact.closed_gap =
+      closed_gap(contact, last.closed_gap, changes ? 0.0 : CLOSING * contact.to_stop);
 }
 
 // The factors by which the loads of two particles have changed that were at rest in the last step,
@@ -58,88 +59,88 @@ std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
 // Beyond it the gap closes, so little that the force stays. When the force goes, the contact is
 // still closed at that gap until the two have parted: what lies on a contact that loses its force
 // for a step does not fall.
-double GapRules::closed_gap(const Side &side, double last, double most_closing) const
+double GapRules::closed_gap(const Contact &contact, double last, double most_closing) const
 {
   const double tolerance = step_.settings.tolerance;
-  const double gap = std::max(0.0, side.gap_now);
-  if (side.force > 0.0 && gap <= tolerance)
+  const double gap = std::max(0.0, contact.gap_now);
+  if (contact.force > 0.0 && gap <= tolerance)
     return gap - std::clamp(gap - CLOSED * tolerance, 0.0, most_closing);
   // The tolerance may have been lowered.
-  const bool parted = last == ContactMemory::NOT_CLOSED || last > tolerance ||
-      gap > last + tolerance;
-  return parted ? ContactMemory::NOT_CLOSED : std::min(gap, last);
+  const bool parted = last == Contact::NOT_CLOSED || last > tolerance || gap > last + tolerance;
+  return parted ? Contact::NOT_CLOSED : std::min(gap, last);
 }
 
 // [length] By how much a contact may close. An overlap of up to half a tolerance counts as closed,
 // too; beyond it it is given back little by little.
-double GapRules::contact_gap(const Side &side) const
+double GapRules::contact_gap(const Contact &contact) const
 {
-  const double gap = side.gap_now;
-  if (gap <= 0.0) return -given_back(side);
-  return gap - std::max(0.0, side.closed_gap);
+  const double gap = contact.gap_now;
+  if (gap <= 0.0) return -given_back(contact);
+  return gap - std::max(0.0, contact.closed_gap);
 }
 
 // [length] What is given back in the step of an overlap. It begins smoothly, with the accuracy's
 // part of what the contact has to stop where the overlap is 0.8 tolerances. What turning bodies and
 // curved walls leave beyond the tolerance is given back at once: with the next step's it could
 // become a bad start.
-double GapRules::given_back(const Side &side) const
+double GapRules::given_back(const Contact &contact) const
 {
   constexpr double FULL = 0.8;    // tolerances
   const double tolerance = step_.settings.tolerance;
-  const double beyond = -side.gap_now - CLOSED * tolerance;
+  const double beyond = -contact.gap_now - CLOSED * tolerance;
   if (beyond <= 0.0 || step_.keeps_overlaps) return 0.0;
   const double x = beyond / ((FULL - CLOSED) * tolerance);
-  const double softly = step_.settings.accuracy * side.to_stop * x * std::max(1.0, x * x);
-  return std::min(beyond, std::max(softly, -side.gap_now - tolerance));
+  const double softly = step_.settings.accuracy * contact.to_stop * x * std::max(1.0, x * x);
+  return std::min(beyond, std::max(softly, -contact.gap_now - tolerance));
 }
 
 // A held contact is under a force, push or pull, whatever the force was.
-double GapRules::held_gap(const Side &side) const
+double GapRules::held_gap(const Contact &contact) const
 {
-  if (side.gap_now <= 0.0) return -given_back(side);
-  const double open = std::max(0.0, side.gap_now - CLOSED * step_.settings.tolerance);
-  return std::min(open, most_closed(side));
+  if (contact.gap_now <= 0.0) return -given_back(contact);
+  const double open = std::max(0.0, contact.gap_now - CLOSED * step_.settings.tolerance);
+  return std::min(open, most_closed(contact));
 }
 
 // [length] The surfaces of a held contact are brought back to one another by no more than
 // velocities are resolved to, or as fast as they would part: this adds nothing to the kinetic
 // energy.
-double GapRules::most_closed(const Side &side) const
+double GapRules::most_closed(const Contact &contact) const
 {
-  return std::max(step_.settings.accuracy * side.to_stop,
-                  step_.problem.timestep * side.asked.predicted_speed);
+  return std::max(step_.settings.accuracy * contact.to_stop,
+                  step_.problem.timestep * contact.asked.predicted_speed);
 }
 
-double GapRules::effective_gap(const Side &side) const
+double GapRules::effective_gap(const Contact &contact) const
 {
-  const double gap = side.gap_now;
+  const double gap = contact.gap_now;
   if (step_.phase == Phase::CONTACT) {
     if (overlaps_.is_bad(gap)) return 0.0;
-    if (side.asked.least_impulse < 0.0) return held_gap(side);
-    const double closed = contact_gap(side);
-    const double parted = -step_.problem.timestep * side.asked.parting_speed;
-    return side.asked.parts ? std::min(closed, parted) : closed;
+    if (contact.asked.least_impulse < 0.0) return held_gap(contact);
+    const double closed = contact_gap(contact);
+    const double parted = -step_.problem.timestep * contact.asked.parting_speed;
+    return contact.asked.parts ? std::min(closed, parted) : closed;
   }
-  const double limit = PUSH_LIMIT * side.size * step_.problem.timestep / step_.regular_timestep;
+  const double limit = PUSH_LIMIT * contact.size * step_.problem.timestep / step_.regular_timestep;
   return std::max(gap, -std::max(limit, REGULAR_OVERLAP * step_.settings.tolerance));
 }
 
-double GapRules::wanted_gap(const Side &side) const
+double GapRules::wanted_gap(const Contact &contact) const
 {
   constexpr double MOST_LEFT = 0.5;    // tolerances
-  const double wanted = side.gap_now - effective_gap(side);
-  return overlaps_.is_bad(side.gap_now) ? wanted
-                                        : std::max(wanted, -MOST_LEFT * step_.settings.tolerance);
+  const double wanted = contact.gap_now - effective_gap(contact);
+  return overlaps_.is_bad(contact.gap_now)
+      ? wanted
+      : std::max(wanted, -MOST_LEFT * step_.settings.tolerance);
 }
 
-bool GapRules::ends_too_deep(const Side &side, double gap_at_end)
+bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
 {
   const double tolerance = step_.settings.tolerance;
-  const bool bad = overlaps_.is_bad(side.gap_now);
-  const double allowed = bad ? side.gap_now : 0.0;
+  const bool bad = overlaps_.is_bad(contact.gap_now);
+  const double allowed = bad ? contact.gap_now : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
-  const double wanted = bad ? wanted_gap(side) : 0.0;
+  const double wanted = bad ? wanted_gap(contact) : 0.0;
   return wanted - gap_at_end > RELINEARISE_BEYOND * tolerance;
 }
 
@@ -153,15 +154,15 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   double allowed = tolerance;
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    Side &side = step_.sides[c];
-    const double linear_gap = side.gap_now - side.wall_motion;
+    Row &row = step_.rows[c];
+    const Contact &contact = step_.contact_of(c);
+    const double linear_gap = contact.gap_now - row.wall_motion;
     const double lessened = linear_gap + LEFT * tolerance;
     // Gaps that were set by the end of the step are kept there by follow().
-    if (!side.as_at_start && contacts.gap[c] != lessened) continue;
-    if (contacts.gap[c] == linear_gap || overlaps_.is_bad(side.gap_now)) continue;
-    if (step_.is_member(contacts.first[c])) continue;
-    if (side.wall == 0 && step_.is_member(contacts.second[c])) continue;
-    if (side.asked.parts) continue;
+    if (!row.as_at_start && contacts.gap[c] != lessened) continue;
+    if (contacts.gap[c] == linear_gap || overlaps_.is_bad(contact.gap_now)) continue;
+    if (step_.is_member(contacts.first[c]) || step_.is_member(contacts.second[c])) continue;
+    if (contact.asked.parts) continue;
     const double at_end = gap_at_end(c, velocity);
     // A held contact is closed no faster than its gap asks for.
     const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
@@ -169,9 +170,9 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     if ((at_end >= -allowed || step_.keeps_overlaps) && (at_end <= allowed || may_stay)) continue;
     allowed = LEFT * tolerance;
     if (contacts.impulse[c] > 0.0) contacts.set[c].least = 0.0;
-    const bool first_time = side.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
+    const bool first_time = row.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
     contacts.gap[c] = first_time ? lessened : linear_gap;
-    side.as_at_start = false;
+    row.as_at_start = false;
     ++changed;
   }
   return changed;
@@ -181,10 +182,11 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
 {
   const double tolerance = step_.settings.tolerance;
   inelastic::ContactSet &contacts = step_.problem.contacts;
-  Side &side = step_.sides[c];
+  Row &row = step_.rows[c];
+  const Contact &contact = step_.contact_of(c);
   double gap = gap_at_end - opening;
   if (gap_at_end < -tolerance) {
-    gap = std::min(gap, side.gap_now - side.wall_motion);
+    gap = std::min(gap, contact.gap_now - row.wall_motion);
     if (step_.relinearisations > MAX_RELINEARISATIONS) return 0;
   } else {
     if (gap_at_end <= RELINEARISE_BEYOND * tolerance || !step_.holds(c) || along < LEAST_ALONG ||
@@ -194,36 +196,38 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
       // What approaches across a gap needs no pull, and no push before it touches.
       contacts.set[c].least = 0.0;
     } else {
-      gap = std::min(gap, most_closed(side) - side.wall_motion);
+      gap = std::min(gap, most_closed(contact) - row.wall_motion);
       if (gap <= contacts.gap[c]) return 0;
     }
   }
   if (contacts.gap[c] == gap) return 0;
   contacts.gap[c] = gap;
-  side.as_at_start = false;
+  row.as_at_start = false;
   return 1;
 }
 
 double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) const
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
-  const Side &side = step_.sides[c];
+  const Row &row = step_.rows[c];
+  const Contact &contact = step_.contact_of(c);
   const int i = contacts.first[c], j = contacts.second[c];
   double opening = 0.0;
   for (int d = 0; d < 3; ++d)
     opening += contacts.normal[3 * c + d] * (velocity[3 * i + d] - velocity[3 * j + d]);
-  return side.gap_now - side.wall_motion + step_.problem.timestep * opening;
+  return contact.gap_now - row.wall_motion + step_.problem.timestep * opening;
 }
 
 long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
-  Side &side = step_.sides[c];
-  const double linear_gap = effective_gap(side) - side.wall_motion;
+  Row &row = step_.rows[c];
+  const Contact &contact = step_.contact_of(c);
+  const double linear_gap = effective_gap(contact) - row.wall_motion;
   double gap = std::min(exact_gap, linear_gap);
   // What may keep its overlap, and with the residual still gets too deep, is to give it back.
-  if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(side.gap_now))
-    gap = std::min(gap, side.gap_now - side.wall_motion);
+  if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(contact.gap_now))
+    gap = std::min(gap, contact.gap_now - row.wall_motion);
   if (!too_deep) {
     const bool worth_it = contacts.impulse[c] > 0.0 &&
         gap - contacts.gap[c] > RELINEARISE_BEYOND * step_.settings.tolerance &&
@@ -231,8 +235,7 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
     if (!worth_it) return 0;
   }
   contacts.gap[c] = gap;
-  side.as_at_start = false;
-  side.followed = step_.is_member(contacts.first[c]) ||
-      (side.wall == 0 && step_.is_member(contacts.second[c]));
+  row.as_at_start = false;
+  row.followed = step_.is_member(contacts.first[c]) || step_.is_member(contacts.second[c]);
   return 1;
 }

@@ -4,6 +4,7 @@
 #ifndef INELASTIC_GAP_RULES_H
 #define INELASTIC_GAP_RULES_H
 
+#include "contact_memory.h"
 #include "overlap_watch.h"
 #include "step.h"
 
@@ -25,27 +26,25 @@ class GapRules {
   static constexpr double LEAST_ALONG = 0.5;
 
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
-  double effective_gap(const Side &side) const;
+  double effective_gap(const Contact &contact) const;
 
   // Takes what is remembered of the contact of particles i and j, and finds the gap at which it is
   // closed, and what it has to stop in this step: the length by which the two approach one another
   // without contacts, or a tenth of that by which the force opens the gap, whichever is more. What
   // a position error gives back in a step is at most the accuracy's part of it, so that it is no
   // more than the errors of velocities.
-  void begin(Side &side, const ContactMemory::Entry &last, int i, int j,
+  // The wall closes the gap by `wall_motion` [length] in the step.
+  void begin(Contact &contact, const ContactMemory::Entry &last, double wall_motion, int i, int j,
              const double *normal) const;
-
-  // The gap [length] of the constraint, the wall's motion in it (contact_set.h).
-  double asked_gap(const Side &side) const { return effective_gap(side) - side.wall_motion; }
 
   // The gap [length] at the end of the step for which the constraint is just met: negative where an
   // overlap need not be given back in one step, of which at most half a tolerance may be left.
-  double wanted_gap(const Side &side) const;
+  double wanted_gap(const Contact &contact) const;
 
   // Tells whether the end of the step is so deep that the constraint must change. The excess is
   // noted as well: what starts with a bad overlap may keep it, but not get deeper. It is asked for
   // more, which costs no shorter step where it is not to be had.
-  bool ends_too_deep(const Side &side, double gap_at_end);
+  bool ends_too_deep(const Contact &contact, double gap_at_end);
 
   // Sets the gap of constraint c to one that is exact for the present velocity, or to the
   // linearised one if that is smaller. One that was set for an earlier velocity is set again, so
@@ -72,11 +71,11 @@ class GapRules {
 
  private:
   std::optional<std::array<double, 2>> load_changes(int i, int j) const;
-  double closed_gap(const Side &side, double last, double most_closing) const;
-  double contact_gap(const Side &side) const;
-  double given_back(const Side &side) const;
-  double held_gap(const Side &side) const;
-  double most_closed(const Side &side) const;
+  double closed_gap(const Contact &contact, double last, double most_closing) const;
+  double contact_gap(const Contact &contact) const;
+  double given_back(const Contact &contact) const;
+  double held_gap(const Contact &contact) const;
+  double most_closed(const Contact &contact) const;
   // [length] of constraint c with these velocities, along a straight line.
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 

@@ -100,9 +100,8 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
     if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
     // What counts as closed, and overlaps, is to end within the tolerance, the residual included.
-    const Side &side = step_.sides[c];
-    const double ends_within =
-        side.gap_now - side.wall_motion + (1.0 - DEEPER) * step_.settings.tolerance;
+    const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
+        (1.0 - DEEPER) * step_.settings.tolerance;
     // In all a contact still pushes, or pulls by as much as it may.
     contacts.add(
         i, j, n, std::min(problem.contacts.gap[c], ends_within), 0.0, 0.0,

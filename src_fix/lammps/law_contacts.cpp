@@ -33,56 +33,54 @@ const LawMemory::Entry *LawContacts::find(int i, tagint partner, const double *n
   return memory_.find(i, partner, normal);
 }
 
-void LawContacts::ask(Side &side, int i, int j, tagint partner, const double *normal,
+void LawContacts::ask(Contact &contact, double wall_motion, int i, int j, const double *normal,
                       bool bad_start)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   const double h = problem.timestep;
-  const double speed_of_wall = side.wall_motion / h;
+  const double speed_of_wall = wall_motion / h;
   const double speed_before = parting_speed(step_.velocity_before, i, j, normal);
-  LawContact contact{};
+  LawState state{};
   const double predicted_speed =
       parting_speed(problem.predicted_velocity, i, j, normal) - speed_of_wall;
-  const LawMemory::Entry *const last = find(i, partner, normal, side.gap_now, side.size);
+  const LawMemory::Entry *const last =
+      find(i, contact.partner, normal, contact.gap_now, contact.size);
   if (last) {
-    contact.known = true;
-    contact.remembered = last->remembered;
-    contact.last_impulse = last->impulse;
+    state.known = true;
+    state.remembered = last->remembered;
+    state.last_impulse = last->impulse;
   }
-  const inelastic::ContactState state = {h, side.gap_now, speed_before - speed_of_wall,
-                                         predicted_speed};
-  Demand &demand = contact.demand;
-  demand = step_.settings.law->ask(state, contact.remembered.data());
-  demand.least_impulse = std::min(0.0, demand.least_impulse + taken_before(contact));
+  const inelastic::ContactState seen = {h, contact.gap_now, speed_before - speed_of_wall,
+                                        predicted_speed};
+  Demand &demand = state.demand;
+  demand = step_.settings.law->ask(seen, state.remembered.data());
+  demand.least_impulse = std::min(0.0, demand.least_impulse + taken_before(state));
   // The velocities at the start of a run are half way through a collision of the last step, if they
   // are those with which it ended. (Spheres of bodies turn a little.)
   constexpr double SAME = 0.05;
-  if (is_repeated(contact) && last->demand.parts &&
+  if (is_repeated(state) && last->demand.parts &&
       std::abs(speed_before - last->speed) <= SAME * last->demand.parting_speed) {
     demand.parts = true;
     demand.parting_speed = last->demand.parting_speed;
   }
   if (bad_start) demand.parts = false;
-  side.asked = {demand.least_impulse, demand.parts, demand.parting_speed, predicted_speed};
-  side.law_contact = static_cast<int>(step_.law_contacts.size());
-  step_.law_contacts.push_back(contact);
+  contact.asked = {demand.least_impulse, demand.parts, demand.parting_speed, predicted_speed};
+  step_.law_states.push_back(state);
 }
 
-// Several constraints can be one contact: planes at a curved wall.
+// A contact may have several rows: planes at a curved wall.
 void LawContacts::take_impulses()
 {
-  for (std::size_t c = 0; c < step_.sides.size(); ++c)
-    if (LawContact *const contact = step_.law_contact(step_.sides[c]))
-      contact->impulse += step_.problem.contacts.impulse[c];
-  for (LawContact &contact : step_.law_contacts)
-    contact.kept = step_.settings.law->remember(contact.impulse - taken_before(contact),
-                                                contact.remembered.data());
+  for (std::size_t c = 0; has_law() && c < step_.rows.size(); ++c)
+    step_.law_states[step_.rows[c].contact].impulse += step_.problem.contacts.impulse[c];
+  for (LawState &state : step_.law_states)
+    state.kept =
+        step_.settings.law->remember(state.impulse - taken_before(state), state.remembered.data());
 }
 
 // In the half kick with which a run starts velocities are at the end of the last step already; the
 // next run may start with the same half kick.
-LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawContact &contact,
-                                       tagint partner) const
+LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawState &state) const
 {
   const inelastic::ContactProblem &problem = step_.problem;
   const int i = problem.contacts.first[c], j = problem.contacts.second[c];
@@ -90,12 +88,12 @@ LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawContact &contact,
   const double before = parting_speed(step_.velocity_before, i, j, n);
   const double after = parting_speed(step_.velocity, i, j, n);
   LawMemory::Entry entry;
-  entry.partner = partner;
+  entry.partner = step_.contact_of(c).partner;
   std::copy_n(n, 3, entry.normal.begin());
-  entry.demand = contact.demand;
-  entry.impulse = contact.impulse / step_.kicks();
+  entry.demand = state.demand;
+  entry.impulse = state.impulse / step_.kicks();
   entry.speed = step_.kick == Kick::WHOLE ? 0.5 * (before + after) : before;
-  entry.remembered = contact.remembered;
+  entry.remembered = state.remembered;
   return entry;
 }
 
@@ -104,10 +102,10 @@ bool LawContacts::is_pushed_apart(std::size_t c) const
 {
   if (!step_.bad_start) return false;
   const inelastic::ContactProblem &problem = step_.problem;
-  const Side &side = step_.sides[c];
   const double speed = parting_speed(step_.motion(), problem.contacts.first[c],
                                      problem.contacts.second[c], &problem.contacts.normal[3 * c]);
-  const double gap = side.gap_now - side.wall_motion + problem.timestep * speed;
+  const double gap =
+      step_.contact_of(c).gap_now - step_.rows[c].wall_motion + problem.timestep * speed;
   return gap > REGULAR_OVERLAP * step_.settings.tolerance;
 }
 
@@ -147,22 +145,19 @@ void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
     memory_.set_owner(i, atom->tag[i]);
   }
   int last = -1;
-  for (std::size_t c = 0; c < step_.sides.size(); ++c) {
-    const Side &side = step_.sides[c];
-    const LawContact *const contact = step_.law_contact(side);
-    // The constraints that were added later for a contact come after all first ones.
-    if (!contact || side.law_contact <= last) continue;
-    last = side.law_contact;
-    if (!contact->kept && contact->demand.is_inelastic()) continue;
+  for (std::size_t c = 0; has_law() && c < step_.rows.size(); ++c) {
+    // The rows that were added later for a contact come after all first ones.
+    if (step_.rows[c].contact <= last) continue;
+    last = step_.rows[c].contact;
+    const LawState &state = step_.law_states[last];
+    if (!state.kept && state.demand.is_inelastic()) continue;
     if (is_pushed_apart(c)) continue;
-    const int i = contacts.first[c], j = contacts.second[c];
-    const tagint partner = side.wall != 0 ? -side.wall : atom->tag[j];
-    LawMemory::Entry entry = entry_of(c, *contact, partner);
-    memory_.remember(i, entry);
-    if (side.wall != 0) continue;
-    entry.partner = atom->tag[i];
+    LawMemory::Entry entry = entry_of(c, state);
+    memory_.remember(contacts.first[c], entry);
+    if (step_.contact_of(c).is_with_wall()) continue;
+    entry.partner = atom->tag[contacts.first[c]];
     for (double &component : entry.normal) component = -component;
-    memory_.remember(j, entry);
+    memory_.remember(contacts.second[c], entry);
   }
   ranks.gather(memory_);
 }

@@ -20,11 +20,13 @@ class LawContacts {
 
   bool has_law() const { return step_.settings.law != nullptr; }
 
-  void begin_step() { step_.law_contacts.clear(); }
+  void begin_step() { step_.law_states.clear(); }
 
-  // Asks the law about a contact of particle i with particle j (the number of particles: a wall),
-  // and notes the answer for its `side`. Of a bad start the law only asks which impulse is allowed.
-  void ask(Side &side, int i, int j, tagint partner, const double *normal, bool bad_start);
+  // Asks the law about a contact of slots i and j (unknowns.h), which is the next one of the step,
+  // and notes the answer with it. The wall closes the gap by `wall_motion` [length] in the step. Of
+  // a bad start the law only asks which impulse is allowed.
+  void ask(Contact &contact, double wall_motion, int i, int j, const double *normal,
+           bool bad_start);
 
   // Tells whether the law remembers a contact with this gap and sum of radii [length], which then
   // belongs to the problem.
@@ -46,10 +48,9 @@ class LawContacts {
   // The half kick with which a run starts takes the place of the second half of the last step of
   // the run before, whose impulses the law has taken: it is given the difference. [mass length /
   // time]
-  double taken_before(const LawContact &contact) const
-  { return is_repeated(contact) ? step_.kicks() * contact.last_impulse : 0.0; }
-  bool is_repeated(const LawContact &contact) const
-  { return contact.known && step_.kick == Kick::HALF; }
+  double taken_before(const LawState &state) const
+  { return is_repeated(state) ? step_.kicks() * state.last_impulse : 0.0; }
+  bool is_repeated(const LawState &state) const { return state.known && step_.kick == Kick::HALF; }
 
   // Looks for what is remembered of a contact with this gap and sum of radii [length]. One whose
   // surfaces something else than a step has parted begins anew.
@@ -57,8 +58,8 @@ class LawContacts {
                                double size) const;
   bool is_pushed_apart(std::size_t c) const;
 
-  // What is to be remembered of constraint c, on its first side.
-  LawMemory::Entry entry_of(std::size_t c, const LawContact &contact, tagint partner) const;
+  // What is to be remembered of the contact of row c, on its first side.
+  LawMemory::Entry entry_of(std::size_t c, const LawState &state) const;
 
   Step &step_;
   LawMemory &memory_;

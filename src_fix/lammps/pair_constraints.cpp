@@ -176,7 +176,7 @@ void PairConstraints::take(std::size_t slot, int i, int j)
           "atom {} overlaps its own periodic image: the box is too small", atom->tag[i]);
     return;
   }
-  rows_.add({0, gap, size, 0.0}, i, j, atom->tag[j], normal);
+  rows_.add({atom->tag[j], gap, size}, 0.0, i, j, normal);
 }
 
 // A pair of which something is remembered is in the problem even if it is farther apart than others
@@ -251,31 +251,30 @@ long PairConstraints::relinearise()
   auto relinearised_gap = [&](std::size_t c, double gap) {
     const double along =
         std::max(GapRules::LEAST_ALONG, dot(&contacts.normal[3 * c], away) / norm(away));
-    const Side &side = step_.sides[c];
-    const double lacking = gap - rules_.wanted_gap(side);
+    const double lacking = gap - rules_.wanted_gap(step_.contact_of(c));
     return (lacking < 0.0 ? lacking / along : lacking) - opening(c);
   };
 
   const bool may_change = step_.relinearisations <= GapRules::MAX_RELINEARISATIONS;
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const Side &side = step_.sides[c];
+    const Contact &contact = step_.contact_of(c);
     const int i = contacts.first[c], j = contacts.second[c];
     const bool may_hold = step_.may_hold(c);
-    if (side.wall != 0 || !(may_hold || step_.is_member(i) || step_.is_member(j))) continue;
+    if (contact.is_with_wall() || !(may_hold || step_.is_member(i) || step_.is_member(j))) continue;
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
-    const bool too_deep = rules_.ends_too_deep(side, gap);
+    const bool too_deep = rules_.ends_too_deep(contact, gap);
     // A push is to move no contact, but it may turn a held pair back, and the gap that made room
     // for its turning would be an overlap.
     const bool follows = step_.phase == Phase::CONTACT || gap < -step_.settings.tolerance;
-    if (may_hold && follows && !rules_.overlaps().is_bad(side.gap_now)) {
+    if (may_hold && follows && !rules_.overlaps().is_bad(contact.gap_now)) {
       const double along = dot(&contacts.normal[3 * c], away) / norm(away);
       changed += rules_.hold(c, gap, opening(c), along);
       continue;
     }
     if (!(step_.is_member(i) || step_.is_member(j))) continue;
-    if ((too_deep || side.followed) && may_change)
+    if ((too_deep || step_.rows[c].followed) && may_change)
       changed += rules_.follow(c, relinearised_gap(c, gap), too_deep);
   }
   return changed;

@@ -96,18 +96,14 @@ ProblemRecord::Table ProblemRecord::bodies() const
 ProblemRecord::Table ProblemRecord::contacts() const
 {
   const inelastic::ContactSet &set = step_.problem.contacts;
-  const std::vector<Side> &sides = step_.sides;
-  auto partner = [this, &set, &sides](int c) {
-    return sides[c].wall ? static_cast<tagint>(-sides[c].wall) : atom->tag[set.second[c]];
-  };
   return {
       {"id1", 1, Column::INTEGER,
        [this, &set](int c, double *out) {
          *out = static_cast<double>(atom->tag[set.first[c]]);
        }},
       {"id2", 1, Column::INTEGER,
-       [partner](int c, double *out) {
-         *out = static_cast<double>(partner(c));
+       [this](int c, double *out) {
+         *out = static_cast<double>(step_.contact_of(c).partner);
        }},
       {"normal", 3, Column::REAL,
        [&set](int c, double *out) {
@@ -118,20 +114,20 @@ ProblemRecord::Table ProblemRecord::contacts() const
          *out = set.gap[c];
        }},
       {"gap_now", 1, Column::REAL,
-       [&sides](int c, double *out) {
-         *out = sides[c].gap_now;
+       [this](int c, double *out) {
+         *out = step_.contact_of(c).gap_now;
        }},
       {"wall_motion", 1, Column::REAL,
-       [&sides](int c, double *out) {
-         *out = sides[c].wall_motion;
+       [this](int c, double *out) {
+         *out = step_.rows[c].wall_motion;
        }},
       {"impulse", 1, Column::REAL,
        [&set](int c, double *out) {
          *out = set.impulse[c];
        }},
       {"impulse_guess", 1, Column::REAL,
-       [this, &sides](int c, double *out) {
-         *out = step_.impulse_per_force * sides[c].force;
+       [this](int c, double *out) {
+         *out = step_.impulse_per_force * step_.contact_of(c).force;
        }},
   };
 }

@@ -64,12 +64,12 @@ void PushApart::ask_for(double part, const Atom *atom)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const Side &side = step_.sides[c];
+    const Contact &contact = step_.contact_of(c);
     // A gap that counts as closed is one here.
-    if (side.gap_now <= step_.settings.tolerance)
+    if (contact.gap_now <= step_.settings.tolerance)
       contacts.gap[c] =
-          (side.gap_now < 0.0 ? part : 1.0) * constraints_.rules().effective_gap(side) -
-          side.wall_motion;
+          (contact.gap_now < 0.0 ? part : 1.0) * constraints_.rules().effective_gap(contact) -
+          step_.rows[c].wall_motion;
     contacts.impulse[c] = 0.0;
   }
   if (movers_.any_turns()) constraints_.entangled().disentangle(atom, constraints_.overlaps());
@@ -91,6 +91,7 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
 {
   inelastic::ContactProblem &problem = step_.problem;
   const inelastic::ContactSet contacts = problem.contacts;
+  const std::size_t number_of_contacts = step_.contacts.size();
   std::copy_n(step_.velocity.begin(), 3 * static_cast<std::size_t>(problem.particles),
               problem.predicted_velocity.begin());
   step_.phase = Phase::PUSH;
@@ -118,6 +119,8 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   }
 
   problem.contacts = contacts;
-  step_.sides.resize(contacts.size());
+  step_.rows.resize(contacts.size());
+  step_.contacts.resize(number_of_contacts);
+  if (!step_.law_states.empty()) step_.law_states.resize(number_of_contacts);
   movers_.note_push(problem, step_.velocity);
 }

@@ -104,7 +104,8 @@ bool Rest::look(const inelastic::ProjectionResult &result)
     const int one = clusters_.of(contacts.first[c]), other = clusters_.of(contacts.second[c]);
     const bool refines = (one != Clusters::NONE && needs_refinement(motions_[one])) ||
         (other != Clusters::NONE && needs_refinement(motions_[other]));
-    contacts.refinement[c] = std::min(refines ? REFINED : 1.0, step_.sides[c].asked.refinement());
+    contacts.refinement[c] =
+        std::min(refines ? REFINED : 1.0, step_.contact_of(c).asked.refinement());
     if (refines) any = 1.0;
   }
   ranks_.reduce(nullptr, 0, &any, 1);
@@ -143,7 +144,7 @@ void Rest::measure_resistance()
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double impulse = std::abs(contacts.impulse[c]);
     if (impulse == 0.0) continue;
-    const bool open = step_.sides[c].gap_now > step_.settings.tolerance;
+    const bool open = step_.contact_of(c).gap_now > step_.settings.tolerance;
     for (const int i : {contacts.first[c], contacts.second[c]}) {
       if (!clusters_.is_mobile(i)) continue;
       const double along = dot(&contacts.normal[3 * c], velocity(i));
@@ -226,9 +227,10 @@ void Rest::measure_clusters()
     const bool one = clusters_.is_mobile(i), other = clusters_.is_mobile(j);
     if (one && other) continue;
     double *const m = &maxima[MAXIMA * static_cast<std::size_t>(clusters_.of(one ? i : j))];
-    const bool frozen_moves = step_.sides[c].wall == 0 && norm(velocity(one ? j : i)) > 0.0;
+    const bool frozen_moves =
+        !step_.contact_of(c).is_with_wall() && norm(velocity(one ? j : i)) > 0.0;
     if (problem.contacts.impulse[c] != 0.0) m[SUPPORTED] = 1.0;
-    if (step_.sides[c].wall_motion != 0.0 || frozen_moves) m[DRIVEN] = 1.0;
+    if (step_.rows[c].wall_motion != 0.0 || frozen_moves) m[DRIVEN] = 1.0;
   }
   clusters_.over_ranks(SUMS, sums, MAXIMA, maxima);
   motions_.assign(clusters_.size(), ClusterMotion{});

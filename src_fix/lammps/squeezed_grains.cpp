@@ -26,7 +26,7 @@ double SqueezedGrains::fastest_before() const
 {
   const inelastic::ContactProblem &problem = step_.problem;
   double fastest = step_.settings.tolerance;
-  for (const Side &side : step_.sides) fastest = std::max(fastest, std::abs(side.wall_motion));
+  for (const Row &row : step_.rows) fastest = std::max(fastest, std::abs(row.wall_motion));
   fastest /= problem.timestep;
   for (int i = 0; i < atom->nlocal; ++i)
     if (step_.in_group(atom, i))
@@ -43,9 +43,8 @@ void SqueezedGrains::look()
   const std::vector<double> &impulse = step_.problem.contacts.impulse;
   double speed = 0.0;
   std::string named;
-  for (std::size_t c = 0; c < step_.sides.size(); ++c) {
-    const Side &side = step_.sides[c];
-    if (side.wall == 0 || !(side.wall_motion > 0.0 && impulse[c] > 0.0)) continue;
+  for (std::size_t c = 0; c < step_.rows.size(); ++c) {
+    if (!(step_.rows[c].wall_motion > 0.0 && impulse[c] > 0.0)) continue;
     const int i = step_.problem.contacts.first[c];
     const double its_speed = norm(&step_.motion()[3 * i]);
     if (its_speed <= speed) continue;

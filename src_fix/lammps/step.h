@@ -1,18 +1,16 @@
-// One time step as all rooms of the fix know it: the contact problem, what stands on the other side
-// of each constraint, and where the step takes the particles.
+// One time step as all rooms of the fix know it: the contact problem, its contacts, and where the
+// step takes the particles.
 
 #ifndef INELASTIC_STEP_H
 #define INELASTIC_STEP_H
 
-#include "contact_law.h"
-#include "contact_memory.h"
+#include "contact.h"
 #include "contact_problem.h"
 #include "fix_settings.h"
 #include "vector3.h"
 
 #include "atom.h"
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -35,43 +33,6 @@ constexpr double PUSH_LIMIT = 0.05;
 constexpr double COINCIDENT = 1.0e-10;
 // This value is below (with a minus sign) or above every value that is compared with it.
 constexpr double EXTREME = 1.0e300;
-
-// What a contact asks for beside that its surfaces stay apart. An inelastic one asks for nothing.
-struct Asked {
-  double least_impulse = 0.0;      // [mass length / time] <= 0: it may pull by so much
-  bool parts = false;              // its surfaces are to part, at least
-  double parting_speed = 0.0;      // with this speed [length / time]
-  double predicted_speed = 0.0;    // [length / time] with which they part without contacts
-
-  // By this the contact is solved more accurately than others (contact_set.h). A speed with which
-  // surfaces part is asked for where they collide, maybe hundreds of times: errors of it add up.
-  double refinement() const { return parts ? 1.0 / 16.0 : 1.0; }
-};
-
-// The row beside each constraint of the problem.
-struct Side {
-  int wall;              // the wall's number; 0 = the second side is a particle
-  double gap_now;        // [length] at the present positions
-  double size;           // [length] the sum of the two radii; the radius at a wall
-  double wall_motion;    // [length] by how much the wall closes the gap during the step
-  double force = 0.0;    // [force] that the last step left
-  double closed_gap = ContactMemory::NOT_CLOSED;    // [length] see contact_memory.h
-  double to_stop = 0.0;       // [length] what the contact has to stop (gap_rules.h)
-  bool as_at_start = true;    // the constraint asks for what it asked for at the start of the step
-  bool followed = false;      // the gap was set by where an earlier solution of the step ends
-  Asked asked = {};
-  int law_contact = -1;    // in Step::law_contacts; -1: there is no law
-};
-
-// A contact as the contact law sees it (law_contacts.h).
-struct LawContact {
-  inelastic::Demand demand;
-  std::array<double, inelastic::ContactLaw::MOST_REMEMBERED> remembered;
-  double impulse = 0.0;    // [mass length / time] over its constraints, when the step is solved
-  double last_impulse = 0.0;    // [mass length / time] in the last step
-  bool known = false;           // something was remembered of it
-  bool kept = false;            // something is to be remembered of it
-};
 
 struct Step {
   explicit Step(const Settings &of_fix) : settings(of_fix), has_bodies(of_fix.has_bodies()) {}
@@ -99,8 +60,10 @@ struct Step {
   // and masses: the movers; bodies: body_members, body_inertia; contacts: contact_rows, and their
   // gaps gap_rules and push_apart; impulses: the solver)
   inelastic::ContactProblem problem;
-  std::vector<Side> sides;                 // one per constraint (contact_rows, gap_rules)
-  std::vector<LawContact> law_contacts;    // empty without a contact law (law_contacts)
+  std::vector<Contact> contacts;    // (contact_rows)
+  std::vector<Row> rows;            // one per row of the problem (contact_rows, gap_rules)
+  std::vector<LawState>
+      law_states;    // one per contact; empty without a contact law (law_contacts)
   // 3 per slot, before forces; only with a law (the movers)
   std::vector<double> velocity_before;
   // 3 per particle, of which the first is the factor by which the forces on one that is at rest
@@ -139,16 +102,17 @@ struct Step {
   bool is_mobile(const Atom *atom, int i) const
   { return in_group(atom, i) && !(atom->mask[i] & settings.frozen_bit); }
 
-  // The contact of a constraint as the law sees it; nullptr without a law.
-  LawContact *law_contact(const Side &side)
-  { return side.law_contact < 0 ? nullptr : &law_contacts[side.law_contact]; }
-  const LawContact *law_contact(const Side &side) const
-  { return side.law_contact < 0 ? nullptr : &law_contacts[side.law_contact]; }
+  // The contact of a row.
+  Contact &contact_of(std::size_t c) { return contacts[rows[c].contact]; }
+  const Contact &contact_of(std::size_t c) const { return contacts[rows[c].contact]; }
+  // The same as the law sees it; nullptr without a law.
+  const LawState *law_state_of(std::size_t c) const
+  { return law_states.empty() ? nullptr : &law_states[rows[c].contact]; }
 
-  // Tells whether a constraint may pull.
-  bool may_hold(std::size_t c) const { return sides[c].asked.least_impulse < 0.0; }
+  // Tells whether the contact of a row may pull.
+  bool may_hold(std::size_t c) const { return contact_of(c).asked.least_impulse < 0.0; }
 
-  // Tells whether a constraint holds: it may pull, and with the present impulse it does not open.
+  // Tells whether a row holds: it may pull, and with the present impulse it does not open.
   bool holds(std::size_t c) const
   {
     const inelastic::HalfLine<double> set = problem.contacts.set[c];
@@ -156,7 +120,7 @@ struct Step {
   }
 
   // Tells whether a particle belongs to a body.
-  bool is_member(int i) const { return has_bodies && problem.bodies.body[i] >= 0; }
+  bool is_member(int i) const { return problem.is_member(i); }
 
   const std::vector<double> &motion() const { return has_bodies ? motion_of_bodies : velocity; }
 

@@ -29,10 +29,10 @@ void UnsolvedStep::note_worst(const inelastic::ProjectionResult &result)
   std::string named;
   if (result.worst != inelastic::ProjectionResult::NONE) {
     const std::size_t c = result.worst;
-    const int wall = step_.sides[c].wall;
+    const Contact &contact = step_.contact_of(c);
     const tagint first = atom->tag[step_.problem.contacts.first[c]];
-    const std::string sides = wall
-        ? fmt::format("atom {} and wall {}", first, wall)
+    const std::string sides = contact.is_with_wall()
+        ? fmt::format("atom {} and wall {}", first, contact.wall())
         : fmt::format("atoms {} and {}", first, atom->tag[step_.problem.contacts.second[c]]);
     size = std::abs(result.worst_gap);
     named = result.worst_gap < 0.0
@@ -60,8 +60,8 @@ double UnsolvedStep::largest_angle() const
 bool UnsolvedStep::law_parts() const
 {
   double any = 0.0;
-  for (const LawContact &contact : step_.law_contacts)
-    if (contact.demand.parts && contact.demand.parting_speed > 0.0) any = 1.0;
+  for (const Contact &contact : step_.contacts)
+    if (contact.asked.parts && contact.asked.parting_speed > 0.0) any = 1.0;
   ranks_.reduce(nullptr, 0, &any, 1);
   return any > 0.0;
 }

@@ -63,11 +63,10 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
   viewpoints_.clear();
   const double h = step_.problem.timestep;
   std::unordered_set<int> followed;
-  for (std::size_t c = 0; c < step_.sides.size(); ++c) {
+  for (std::size_t c = 0; c < step_.rows.size(); ++c) {
     const int i = step_.problem.contacts.first[c];
-    const Side &side = step_.sides[c];
-    const bool may_hold = step_.may_hold(c);
-    if (side.wall == 0 || !(side.followed || may_hold)) continue;
+    const bool follows = step_.rows[c].followed || step_.may_hold(c);
+    if (!step_.contact_of(c).is_with_wall() || !follows) continue;
     if (!step_.is_member(i) || movers_.angle_turned(step_.problem, i) < HALF_A_TURN)
       followed.insert(i);
   }
@@ -129,13 +128,15 @@ void WallConstraints::note_overlaps_with_moving_walls()
 void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &view)
 {
   const int i = from.atom;
-  const double size = atom->radius[i];
-  const double gap_now = view.distance_now - size;
   const double motion = view.distance_now - view.distance;
   constraint_[key(i, view.wall)] = step_.problem.contacts.size();
-  rows_.add({view.wall, gap_now, size, motion}, i, step_.problem.slot_of_wall(view.wall - 1),
-            -view.wall, view.normal);
+  rows_.add(contact_with(i, view.wall, view.distance_now - atom->radius[i]), motion, i,
+            step_.problem.slot_of_wall(view.wall - 1), view.normal);
 }
+
+// A contact of an atom with a wall that is at this gap now [length].
+Contact WallConstraints::contact_with(int i, int wall, double gap_now) const
+{ return {-wall, gap_now, atom->radius[i]}; }
 
 long WallConstraints::add_violated()
 {
@@ -181,22 +182,14 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
   // obstacle that is overlapped is seen; its plane at the end of the step may lie beyond where the
   // sphere is now.
   const double to_plane = gap_here + wall_motion;
-  Side side = {view.wall, view.convex ? std::max(0.0, to_plane) : to_plane, atom->radius[i],
-               wall_motion};
-  side.as_at_start = false;
-  side.followed = step_.is_member(i);
-  if (known) side.gap_now = step_.sides[existing->second].gap_now;
-  if (known) side.force = step_.sides[existing->second].force;
-  if (known) side.closed_gap = step_.sides[existing->second].closed_gap;
-  if (known) side.to_stop = step_.sides[existing->second].to_stop;
-  if (known) side.asked = step_.sides[existing->second].asked;
-  if (known) side.law_contact = step_.sides[existing->second].law_contact;
-  rules_.overlaps().note(side.gap_now, i, -view.wall);
+  Contact unseen = contact_with(i, view.wall, view.convex ? std::max(0.0, to_plane) : to_plane);
+  const Contact &contact = known ? step_.contact_of(existing->second) : unseen;
+  rules_.overlaps().note(contact.gap_now, i, -view.wall);
   // This makes it exact for this motion, also where a body turns.
   const double turning = step_.is_member(i)
       ? h * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]))
       : 0.0;
-  const double gap = gap_here + turning - rules_.wanted_gap(side);
+  const double gap = gap_here + turning - rules_.wanted_gap(contact);
   if (known && is_same_plane(existing->second, n))
     return rules_.follow(existing->second, gap, too_deep);
   if (!too_deep) return 0;
@@ -206,8 +199,10 @@ long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallVi
     step_.excess = std::max(step_.excess, -gap_there);
     return 0;
   }
+  const int place = known ? step_.rows[existing->second].contact
+                          : rows_.add_late(unseen, wall_motion, i, n);
   constraint_[key(i, view.wall)] = step_.problem.contacts.size();
-  rows_.add_plane(side, i, view.normal, gap, known);
+  rows_.add_plane({place, wall_motion, false, step_.is_member(i)}, i, n, gap);
   return 1;
 }
 
@@ -222,16 +217,16 @@ long WallConstraints::relinearise(double margin)
         const auto existing = constraint_.find(key(from.atom, view.wall));
         const bool known = existing != constraint_.end();
         if (known) seen.insert(existing->second);
-        const Side side = known ? step_.sides[existing->second]
-                                : Side{view.wall, 0.0, atom->radius[from.atom], 0.0};
+        const Contact contact = known ? step_.contact_of(existing->second)
+                                      : contact_with(from.atom, view.wall, 0.0);
         const double gap = view.distance - atom->radius[from.atom];
         // The walls behind a periodic boundary are as exact as others.
         const bool exact = is_image(from) && walls_.exact() && !step_.is_member(from.atom);
-        const bool too_deep = rules_.ends_too_deep(side, gap) ||
-            (exact && gap < std::min(side.gap_now, -step_.settings.tolerance));
+        const bool too_deep = rules_.ends_too_deep(contact, gap) ||
+            (exact && gap < std::min(contact.gap_now, -step_.settings.tolerance));
         if (known && may_hold(existing->second, view.normal))
           changed += hold(existing->second, gap, view.normal);
-        else if (too_deep || (known && side.followed))
+        else if (too_deep || (known && step_.rows[existing->second].followed))
           changed += add_plane(from, view, too_deep);
       },
       [&](const RegionWalls::Viewpoint &from, const std::string &) {
@@ -247,7 +242,7 @@ bool WallConstraints::may_hold(std::size_t c, const double *normal_at_end) const
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   return step_.may_hold(c) && step_.phase == Phase::CONTACT &&
-      !rules_.overlaps().is_bad(step_.sides[c].gap_now) &&
+      !rules_.overlaps().is_bad(step_.contact_of(c).gap_now) &&
       dot(&contacts.normal[3 * c], normal_at_end) >= GapRules::LEAST_ALONG;
 }
 
@@ -268,15 +263,15 @@ long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
   for (const RegionWalls::Viewpoint &from : beyond) skipped.insert(from.atom);
   long changed = 0;
   for (const auto &[atom_and_wall, c] : constraint_) {
-    const Side &side = step_.sides[c];
+    const Row &row = step_.rows[c];
     const int i = step_.problem.contacts.first[c];
-    if (!side.followed || seen.count(c) || skipped.count(i) ||
+    if (!row.followed || seen.count(c) || skipped.count(i) ||
         movers_.angle_turned(step_.problem, i) >= HALF_A_TURN)
       continue;
     const double *const n = &step_.problem.contacts.normal[3 * c];
     const double turning =
         step_.problem.timestep * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]));
-    const double linear_gap = rules_.effective_gap(side) - side.wall_motion;
+    const double linear_gap = rules_.effective_gap(step_.contact_of(c)) - row.wall_motion;
     changed += rules_.follow(c, linear_gap + turning, false);
   }
   return changed;

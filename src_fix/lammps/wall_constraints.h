@@ -56,6 +56,7 @@ class WallConstraints : protected Pointers {
   bool wrap(RegionWalls::Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const RegionWalls::Viewpoint &, const WallView &);
+  Contact contact_with(int i, int wall, double gap_now) const;
   const Viewpoints &viewpoints(const double *velocity, double beyond);
   const Viewpoints &viewpoints_at_end(double margin);
   Viewpoints last_inside(const Viewpoints &beyond);

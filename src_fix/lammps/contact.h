@@ -1,0 +1,67 @@
+// A contact: two particles, or a particle and a wall, which a step keeps apart. It has a row in the
+// problem (contact_set.h) for each plane that does so: one, at curved walls also more.
+
+#ifndef INELASTIC_CONTACT_H
+#define INELASTIC_CONTACT_H
+
+#include "contact_law.h"
+
+#include "lmptype.h"
+
+#include <array>
+
+namespace LAMMPS_NS {
+
+// What a contact asks for beside that its surfaces stay apart. An inelastic one asks for nothing.
+struct Asked {
+  double least_impulse = 0.0;      // [mass length / time] <= 0: it may pull by so much
+  bool parts = false;              // its surfaces are to part, at least
+  double parting_speed = 0.0;      // with this speed [length / time]
+  double predicted_speed = 0.0;    // [length / time] with which they part without contacts
+
+  // By this the contact is solved more accurately than others (contact_set.h). A speed with which
+  // surfaces part is asked for where they collide, maybe hundreds of times: errors of it add up.
+  double refinement() const { return parts ? 1.0 / 16.0 : 1.0; }
+};
+
+struct Contact {
+  // In place of a gap at which a contact is closed, which is not negative.
+  static constexpr double NOT_CLOSED = -1.0;
+
+  tagint partner;    // of the first particle: the other one's ID, or minus the wall's number
+  double gap_now;    // [length] at the present positions
+  double size;       // [length] the sum of the two radii; the radius at a wall
+
+  // Of the last step.
+  double force = 0.0;    // [force]
+  double closed_gap =
+      NOT_CLOSED;    // [length] the gap at which the contact is closed (gap_rules.h)
+
+  double to_stop = 0.0;    // [length] what the contact has to stop (gap_rules.h)
+  Asked asked = {};
+
+  bool is_with_wall() const { return partner < 0; }
+  int wall() const { return static_cast<int>(-partner); }
+};
+
+// What stands beside a row of the problem.
+struct Row {
+  int contact;                // its place in Step::contacts
+  double wall_motion;         // [length] by how much the wall closes the row's gap during the step
+  bool as_at_start = true;    // the row asks for what it asked for at the start of the step
+  bool followed = false;      // the gap was set by where an earlier solution of the step ends
+};
+
+// A contact as the contact law sees it (law_contacts.h).
+struct LawState {
+  inelastic::Demand demand;
+  std::array<double, inelastic::ContactLaw::MOST_REMEMBERED> remembered;
+  double impulse = 0.0;         // [mass length / time] over its rows, when the step is solved
+  double last_impulse = 0.0;    // [mass length / time] in the last step
+  bool known = false;           // something was remembered of it
+  bool kept = false;            // something is to be remembered of it
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
