@@ -28,7 +28,7 @@ void AtomState::remember_contacts(GhostExchange &ranks)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   const double force_per_impulse = 1.0 / step_.impulse_per_force;
-  for (int i = 0; i < problem.particles; ++i) memory_.forget(i);
+  for (int i = 0; i < problem.particles; ++i) guesses_.forget(i);
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     const Contact &contact = step_.contact_of(c);
     const double closed_gap = contact.closed_gap;
@@ -36,10 +36,10 @@ void AtomState::remember_contacts(GhostExchange &ranks)
     const int i = problem.contacts.first[c];
     const int j = problem.contacts.second[c];
     const double force = problem.contacts.impulse[c] * force_per_impulse;
-    memory_.remember(i, {contact.partner, force, closed_gap});
-    if (!contact.is_with_wall()) memory_.remember(j, {atom->tag[i], force, closed_gap});
+    guesses_.remember(i, {contact.partner, force, closed_gap});
+    if (!contact.is_with_wall()) guesses_.remember(j, {atom->tag[i], force, closed_gap});
   }
-  ranks.gather(memory_);
+  ranks.gather(guesses_);
   measure_messages(ranks);
 }
 
@@ -47,25 +47,25 @@ void AtomState::measure_messages(GhostExchange &ranks)
 {
   double most[2] = {0.0, 0.0};
   for (int i = 0; i < atom->nlocal; ++i) {
-    most[0] = std::max(most[0], static_cast<double>(memory_.number_of_partners(i)));
+    most[0] = std::max(most[0], static_cast<double>(guesses_.number_of_entries(i)));
     if (has_law())
       most[1] = std::max(most[1], static_cast<double>(law_memory_.number_of_entries(i)));
   }
   ranks.reduce(nullptr, 0, most, 2);
-  most_partners_ = static_cast<int>(most[0]);
+  most_guesses_ = static_cast<int>(most[0]);
   most_law_entries_ = static_cast<int>(most[1]);
 }
 
 int AtomState::exchange_size() const
 {
-  return carried_size() + ContactMemory::packed_size(most_partners_) +
+  return carried_size() + FirstGuesses::packed_size(most_guesses_) +
       (has_law() ? LawMemory::packed_size(most_law_entries_) : 0);
 }
 
 void AtomState::grow(int atoms)
 {
   memory->grow(state_, atoms, STATE_SIZE, "inelastic:state");
-  memory_.resize(atoms);
+  guesses_.resize(atoms);
   if (has_law()) law_memory_.resize(atoms);
   if (step_.has_bodies) momenta_.resize(atoms);
 }
@@ -73,7 +73,7 @@ void AtomState::grow(int atoms)
 void AtomState::copy(int from, int to)
 {
   std::copy_n(state_[from], STATE_SIZE, state_[to]);
-  memory_.copy(from, to);
+  guesses_.copy(from, to);
   if (has_law()) law_memory_.copy(from, to);
   if (step_.has_bodies) momenta_.copy(from, to);
 }
@@ -82,7 +82,7 @@ void AtomState::copy(int from, int to)
 void AtomState::begin(int i)
 {
   std::fill_n(state_[i], STATE_SIZE, 0.0);
-  memory_.forget(i);
+  guesses_.forget(i);
   if (has_law()) law_memory_.forget(i);
   if (step_.has_bodies) momenta_.forget(i);
   std::copy_n(atom->x[i], 3, expected_position(i));
@@ -94,7 +94,7 @@ int AtomState::pack_exchange(int i, double *buffer) const
 {
   double *out = std::copy_n(state_[i], STATE_SIZE, buffer);
   if (step_.has_bodies) out += momenta_.pack(i, out);
-  out += memory_.pack(i, out, memory_.number_of_partners(i));
+  out += guesses_.pack(i, 0, guesses_.number_of_entries(i), out);
   if (has_law()) out += law_memory_.pack(i, out);
   return static_cast<int>(out - buffer);
 }
@@ -102,10 +102,10 @@ int AtomState::pack_exchange(int i, double *buffer) const
 int AtomState::unpack_exchange(int i, const double *buffer)
 {
   std::copy_n(buffer, STATE_SIZE, state_[i]);
-  memory_.forget(i);
+  guesses_.forget(i);
   const double *in = buffer + STATE_SIZE;
   if (step_.has_bodies) in += momenta_.unpack(i, in);
-  in += memory_.unpack(i, in);
+  in += guesses_.unpack(i, in);
   if (has_law()) {
     law_memory_.forget(i);
     in += law_memory_.unpack(i, in);

@@ -5,7 +5,7 @@
 #define INELASTIC_ATOM_STATE_H
 
 #include "carried_momenta.h"
-#include "contact_memory.h"
+#include "first_guess.h"
 #include "law_memory.h"
 #include "step.h"
 
@@ -42,7 +42,7 @@ class AtomState : protected Pointers {
   // (rest.h).
   double &load_at_rest(int i) { return state_[i][LOAD_AT_REST]; }
 
-  ContactMemory &contact_memory() { return memory_; }
+  FirstGuesses &first_guesses() { return guesses_; }
   LawMemory &law_memory() { return law_memory_; }
   CarriedMomenta &momenta() { return momenta_; }
 
@@ -97,10 +97,10 @@ class AtomState : protected Pointers {
 
   const Step &step_;
   double **state_ = nullptr;
-  ContactMemory memory_;
+  FirstGuesses guesses_;
   LawMemory law_memory_;      // empty without a law
   CarriedMomenta momenta_;    // empty in a scene of free spheres
-  int most_partners_ = 0;     // of an atom, on any rank
+  int most_guesses_ = 0;      // of an atom, on any rank
   int most_law_entries_ = 0;
 };
 

@@ -14,6 +14,7 @@ int CarriedMomenta::pack(int i, double *buffer) const
   }
   out = std::copy_n(of_body.left_over.begin(), 3, out);
   *out++ = of_body.angle;
+  *out++ = of_body.continues ? 1.0 : 0.0;
   return static_cast<int>(out - buffer);
 }
 
@@ -32,6 +33,7 @@ int CarriedMomenta::unpack(int i, const double *buffer)
   }
   take(of_body.left_over);
   of_body.angle = *in++;
+  of_body.continues = *in++ != 0.0;
   return static_cast<int>(in - buffer);
 }
 

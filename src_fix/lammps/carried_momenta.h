@@ -24,6 +24,9 @@ struct Carried {
   std::array<double, 3> left_over;
   // [radians] The largest one turned in a step of this run, by motion and by moments of contacts.
   double angle;
+  // The body has made a step: what is carried along is known. A body that is new has its velocities
+  // alone.
+  bool continues;
 };
 
 class CarriedMomenta {
@@ -36,7 +39,7 @@ class CarriedMomenta {
   void forget(int i) { carried_[i] = Carried{}; }
 
   // Each returns how many numbers it wrote or read.
-  static constexpr int PACKED_SIZE = 19;
+  static constexpr int PACKED_SIZE = 20;
   int pack(int i, double *buffer) const;
   int unpack(int i, const double *buffer);
 

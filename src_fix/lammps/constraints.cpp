@@ -14,12 +14,12 @@ constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
 }    // namespace
 
 Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
-                         const ContactMemory &memory, LawContacts &laws, Movers &movers) :
-    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), movers_(movers),
-    walls_(lmp, step.settings.regions), overlaps_(lmp, step, ranks), rules_(step, overlaps_),
-    rows_(step, rules_, laws, memory), entangled_(step),
-    pairs_(lmp, step, rules_, rows_, entangled_, movers),
-    wall_constraints_(lmp, step, rules_, rows_, walls_, ranks, movers)
+                         const FirstGuesses &guesses, LawContacts &laws, Walls &walls,
+                         Movers &movers) :
+    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), movers_(movers), walls_(walls),
+    overlaps_(lmp, step, ranks), rules_(step, overlaps_), rows_(step, rules_, laws, guesses),
+    entangled_(step), pairs_(lmp, step, rules_, rows_, entangled_, movers),
+    wall_constraints_(lmp, step, rules_, rows_, walls, ranks, movers)
 {
 }
 

@@ -11,8 +11,8 @@
 #include "pair_constraints.h"
 #include "phase_clock.h"
 #include "projection.h"
-#include "region_walls.h"
 #include "wall_constraints.h"
+#include "walls.h"
 
 #include "pointers.h"
 
@@ -23,9 +23,8 @@ namespace LAMMPS_NS {
 class Constraints final : public inelastic::ConstraintSource, protected Pointers {
  public:
   Constraints(class LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
-              const ContactMemory &memory, LawContacts &laws, Movers &movers);
+              const FirstGuesses &guesses, LawContacts &laws, Walls &walls, Movers &movers);
 
-  RegionWalls &walls() { return walls_; }
   bool walls_move() const { return walls_.any_moves(); }
   OverlapWatch &overlaps() { return overlaps_; }
   const OverlapWatch &overlaps() const { return overlaps_; }
@@ -64,7 +63,7 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   GhostExchange &ranks_;
   PhaseClock &clock_;
   Movers &movers_;
-  RegionWalls walls_;
+  Walls &walls_;
   OverlapWatch overlaps_;
   GapRules rules_;
   ContactRows rows_;

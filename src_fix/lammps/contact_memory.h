@@ -1,11 +1,13 @@
 // What is known of contacts from the last step, kept per atom so that it follows the atoms through
-// neighbour list rebuilds and from rank to rank: their forces, the first guess of the next step,
-// and the gaps at which they are closed (gap_rules.h).
+// neighbour list rebuilds and from rank to rank. Both atoms of a contact remember it.
+//
+// There are two memories. That of the first guesses (first_guess.h) may lose some where a ghost has
+// more contacts than a message takes: a solve then takes longer. What a contact law remembers
+// (law_memory.h) is physics, is never lost, and is in restart files. Here is what both have in
+// common: how a contact is found again, and how it travels.
 
 #ifndef INELASTIC_CONTACT_MEMORY_H
 #define INELASTIC_CONTACT_MEMORY_H
-
-#include "contact.h"
 
 #include "lmptype.h"
 
@@ -14,66 +16,64 @@
 
 namespace LAMMPS_NS {
 
-class ContactMemory {
+// An Entry is found by its `partner`, the ID of the other atom or minus the number of a wall, and
+// by the side of the atom on which it lies: entry.along(normal) is the cosine of the angle between
+// the entry's normal and another one. It travels as Entry::SIZE numbers, which entry.pack(out)
+// writes and entry.unpack(in) reads.
+template <typename Entry> class ContactMemory {
  public:
-  // The most contacts that a ghost tells its owned atom; what is beyond loses its first guess.
-  static constexpr int SHARED_PARTNERS = 16;
-  void resize(int atoms) { remembered_.resize(atoms); }
+  void resize(int atoms) { entries_.resize(atoms); }
+  void forget(int atom) { entries_[atom].clear(); }
+  void remember(int atom, const Entry &entry) { entries_[atom].push_back(entry); }
+  void copy(int from, int to) { entries_[to] = entries_[from]; }
 
-  void forget(int atom) { remembered_[atom].clear(); }
+  int number_of_entries(int atom) const { return static_cast<int>(entries_[atom].size()); }
 
-  struct Entry {
-    tagint partner = 0;                         // the other atom's ID, or minus the wall's number
-    double force = 0.0;                         // [force] of the last step
-    double closed_gap = Contact::NOT_CLOSED;    // [length] the gap at which the contact is closed
-  };
-
-  void remember(int atom, const Entry &entry) { remembered_[atom].push_back(entry); }
-
-  // An entry without force that is not closed where nothing is remembered. Of two contacts with one
-  // partner (in the tip of a cone, or through two periodic boundaries) nobody knows which is which,
-  // and both are the first one.
-  Entry find(int atom, tagint partner) const
+  // Returns the contact with a partner that lies on the side of the normal; nullptr if there is
+  // none. (Two contacts with one partner are on different sides: through two periodic boundaries,
+  // or in the tip of a cone.)
+  const Entry *find(int atom, tagint partner, const double *normal) const
   {
-    for (const Entry &entry : remembered_[atom])
-      if (entry.partner == partner) return entry;
-    return {};
-  }
-
-  int number_of_partners(int atom) const { return static_cast<int>(remembered_[atom].size()); }
-
-  void copy(int from, int to) { remembered_[to] = remembered_[from]; }
-
-  // Buffer layout: number of partners, then each one's entry.
-  static constexpr int packed_size(int partners) { return 1 + 3 * partners; }
-
-  // At most `partners` of them.
-  int pack(int atom, double *buffer, int partners) const
-  {
-    const int packed = std::min(partners, number_of_partners(atom));
-    int m = 0;
-    buffer[m++] = packed;
-    for (int k = 0; k < packed; ++k) {
-      const Entry &entry = remembered_[atom][k];
-      buffer[m++] = static_cast<double>(entry.partner);
-      buffer[m++] = entry.force;
-      buffer[m++] = entry.closed_gap;
+    constexpr double SAME_SIDE = 0.1;    // the least cosine
+    const Entry *found = nullptr;
+    double nearest = SAME_SIDE;
+    for (const Entry &entry : entries_[atom]) {
+      if (entry.partner != partner) continue;
+      const double cosine = entry.along(normal);
+      if (cosine <= nearest) continue;
+      nearest = cosine;
+      found = &entry;
     }
-    return m;
+    return found;
   }
 
-  // Adds what is in the buffer to what the atom has.
+  // Buffer layout: number of entries, then the numbers of each.
+  static constexpr int packed_size(int entries) { return 1 + Entry::SIZE * entries; }
+
+  // Packs the entries from `begin` to before `end`. Returns how many numbers it wrote.
+  int pack(int atom, int begin, int end, double *buffer) const
+  {
+    double *out = buffer;
+    *out++ = end - begin;
+    for (int k = begin; k < end; ++k) out = entries_[atom][k].pack(out);
+    return static_cast<int>(out - buffer);
+  }
+
+  // Adds what is in the buffer to what the atom has. Returns how many numbers it read.
   int unpack(int atom, const double *buffer)
   {
-    int m = 0;
-    const int partners = static_cast<int>(buffer[m++]);
-    for (int k = 0; k < partners; ++k, m += 3)
-      remember(atom, {static_cast<tagint>(buffer[m]), buffer[m + 1], buffer[m + 2]});
-    return m;
+    const double *in = buffer;
+    const int count = static_cast<int>(*in++);
+    for (int k = 0; k < count; ++k) {
+      Entry entry;
+      in = entry.unpack(in);
+      remember(atom, entry);
+    }
+    return static_cast<int>(in - buffer);
   }
 
- private:
-  std::vector<std::vector<Entry>> remembered_;
+ protected:
+  std::vector<std::vector<Entry>> entries_;    // per atom
 };
 
 }    // namespace LAMMPS_NS

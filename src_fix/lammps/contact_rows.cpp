@@ -1,6 +1,6 @@
 #include "contact_rows.h"
 
-#include "contact_memory.h"
+#include "first_guess.h"
 #include "gap_rules.h"
 #include "law_contacts.h"
 
@@ -28,7 +28,8 @@ void ContactRows::add(Contact contact, double wall_motion, int i, int j, const d
 {
   if (laws_.has_law())
     laws_.ask(contact, wall_motion, i, j, normal, rules_.overlaps().is_bad(contact.gap_now));
-  rules_.begin(contact, memory_.find(i, contact.partner), wall_motion, i, j, normal);
+  const FirstGuess *const last = guesses_.find(i, contact.partner, normal);
+  rules_.begin(contact, last ? *last : FirstGuess{}, wall_motion, i, j, normal);
   const Row row = {static_cast<int>(step_.contacts.size()), wall_motion};
   step_.problem.contacts.add(i, j, normal, rules_.effective_gap(contact) - wall_motion,
                              step_.impulse_per_force * contact.force, 0.0,

@@ -8,14 +8,14 @@
 
 namespace LAMMPS_NS {
 
-class ContactMemory;
+class FirstGuesses;
 class GapRules;
 class LawContacts;
 
 class ContactRows {
  public:
-  ContactRows(Step &step, GapRules &rules, LawContacts &laws, const ContactMemory &memory) :
-      step_(step), rules_(rules), laws_(laws), memory_(memory)
+  ContactRows(Step &step, GapRules &rules, LawContacts &laws, const FirstGuesses &guesses) :
+      step_(step), rules_(rules), laws_(laws), guesses_(guesses)
   {
   }
 
@@ -47,7 +47,7 @@ class ContactRows {
   Step &step_;
   GapRules &rules_;
   LawContacts &laws_;
-  const ContactMemory &memory_;
+  const FirstGuesses &guesses_;
 };
 
 }    // namespace LAMMPS_NS

@@ -1,5 +1,6 @@
 #include "fix_inelastic.h"
 
+#include "lammps_versions.h"
 #include "make_solver.h"
 
 #include "atom.h"
@@ -31,23 +32,14 @@ std::string first_word(const std::string &words)
 // before the release of the next version, with the other number.
 constexpr double LAYOUT = -3.0, EARLIER_LAYOUT = -2.0;
 
-// What LAMMPS has read from a restart file for fixes that are not yet defined is hidden in its
-// class.
-struct FromRestart : Modify {
-  static char *id_of(const Modify *modify, int k)
-  { return (modify->*(&FromRestart::id_restart_peratom))[k]; }
-  static char *style_of(const Modify *modify, int k)
-  { return (modify->*(&FromRestart::style_restart_peratom))[k]; }
-};
-
 }    // namespace
 
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), settings_(read_settings(lmp, narg, arg, groupbit)), step_(settings_),
     ranks_(lmp, this, clock_), state_(lmp, step_), laws_(step_, state_.law_memory()),
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
-    spheres_(lmp, step_, ranks_, state_),
-    constraints_(lmp, step_, ranks_, clock_, state_.contact_memory(), laws_, movers_),
+    spheres_(lmp, step_, ranks_, state_), walls_(lmp, settings_.regions),
+    constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
     solver_(inelastic::make_solver(settings_.solver)), push_apart_(step_, constraints_, movers_),
     length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_),
     hold_still_(step_, ranks_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
@@ -56,8 +48,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
 {
   movers_.add(&spheres_);
   if (bodies_) movers_.add(bodies_.get());
-  constraints_.walls().init();
-  output_.set_walls(constraints_.walls().number_of_walls());
+  walls_.init();
+  output_.set_walls(walls_.number_of_walls());
   if (!atom->radius_flag)
     error->all(FLERR, "Fix inelastic needs spheres with a radius: use atom_style sphere");
   if (!atom->tag_enable) error->all(FLERR, "Fix inelastic needs atom IDs: use atom_modify id yes");
@@ -74,9 +66,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
 // The flags of Fix that tell LAMMPS what the fix has and needs.
 void FixInelastic::announce_to_lammps()
 {
-  const RegionWalls &walls = constraints_.walls();
-  array_flag = walls.empty() ? 0 : 1;
-  size_array_rows = walls.number_of_walls();
+  array_flag = walls_.empty() ? 0 : 1;
+  size_array_rows = walls_.number_of_walls();
   size_array_cols = 3;
   extarray = 0;
   virial_global_flag = virial_peratom_flag = thermo_virial = 1;
@@ -109,12 +100,12 @@ void FixInelastic::find_lost_memory() const
 {
   if (!laws_.has_law()) return;
   for (int k = 0; k < modify->nfix_restart_peratom; ++k)
-    if (strcmp(FromRestart::style_of(modify, k), style) == 0 &&
-        strcmp(FromRestart::id_of(modify, k), id) != 0)
+    if (strcmp(style_in_restart_file(modify, k), style) == 0 &&
+        strcmp(id_in_restart_file(modify, k), id) != 0)
       error->all(FLERR,
                  "Fix inelastic: the restart file holds what contacts remember for fix {}: give "
                  "this fix the same ID, in place of {}",
-                 FromRestart::id_of(modify, k), id);
+                 id_in_restart_file(modify, k), id);
 }
 
 FixInelastic::~FixInelastic()
@@ -186,7 +177,7 @@ void FixInelastic::init()
 // LAMMPS sets the run up: the list is new, and no step has been made.
 void FixInelastic::begin_run()
 {
-  constraints_.walls().warn();
+  walls_.warn();
   check_.begin_run();
   constraints_.begin_run(length_.smallest_radius());
   length_.begin_run();
@@ -201,15 +192,14 @@ void FixInelastic::begin_run()
 void FixInelastic::check_scene()
 {
   check_group();
-  RegionWalls &walls = constraints_.walls();
-  const int walls_before = walls.number_of_walls();
-  walls.init();
-  if (walls.number_of_walls() != walls_before)
+  const int walls_before = walls_.number_of_walls();
+  walls_.init();
+  if (walls_.number_of_walls() != walls_before)
     error->all(
         FLERR,
         "Fix inelastic: its regions have {} walls, and had {} when the fix was defined: define "
         "fix {} again after its regions",
-        walls.number_of_walls(), walls_before, id);
+        walls_.number_of_walls(), walls_before, id);
   find_frozen();
   if (bodies_) bodies_->find_fix();
   length_.measure_radii();
@@ -304,8 +294,7 @@ void FixInelastic::setup(int vflag)
 // frozen ones may overlap one another, and out of a box without walls they may be pushed.
 void FixInelastic::check_volume()
 {
-  const bool closed = !domain->nonperiodic ||
-      (!constraints_.walls().empty() && domain->nonperiodic == 1);
+  const bool closed = !domain->nonperiodic || (!walls_.empty() && domain->nonperiodic == 1);
   if (settings_.warn_only || !closed || domain->dimension == 2) return;
   const double unit_sphere = 4.0 / 3.0 * std::acos(-1.0);
   double volume = 0.0;
@@ -422,7 +411,7 @@ inelastic::ProjectionResult FixInelastic::solve()
     }
     // A step that is not solved, or pushes a bad start apart, says so itself.
     const bool solved = result.status == inelastic::Status::CONVERGED && !step_.bad_start;
-    if (solved && constraints_.walls().any_moves())
+    if (solved && walls_.any_moves())
       squeezed_.look();
     else
       squeezed_.skip();
@@ -438,7 +427,7 @@ void FixInelastic::predict()
   inelastic::ContactProblem &problem = step_.problem;
   step_.impulse_per_force = step_.kicks() * update->dt * force->ftm2v;
   problem.timestep = update->dt;
-  problem.resize(nall, constraints_.walls().number_of_walls());
+  problem.resize(nall, walls_.number_of_walls());
   if (laws_.has_law()) step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
   for (int i = 0; i < nall; ++i)
     problem.inverse_mass[i] = step_.is_mobile(atom, i) ? 1.0 / mass_of(atom, i) : 0.0;

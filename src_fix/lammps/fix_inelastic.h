@@ -27,6 +27,7 @@ FixStyle(inelastic,FixInelastic);
 #include "phase_clock.h"
 #include "problem_record.h"
 #include "push_apart.h"
+#include "region_walls.h"
 #include "rest.h"
 #include "rigid_motion.h"
 #include "run_summary.h"
@@ -93,6 +94,7 @@ class FixInelastic : public Fix {
   std::unique_ptr<RigidMotion> bodies_;    // null in a scene of free spheres
   SphereMotion spheres_;
   Movers movers_;    // the free spheres, then the bodies
+  RegionWalls walls_;
   Constraints constraints_;
   std::unique_ptr<inelastic::Solver> solver_;
   PushApart push_apart_;

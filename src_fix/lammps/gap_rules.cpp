@@ -17,8 +17,8 @@ constexpr double CLOSING = 0.01;
 
 }    // namespace
 
-void GapRules::begin(Contact &contact, const ContactMemory::Entry &last, double wall_motion, int i,
-                     int j, const double *normal) const
+void GapRules::begin(Contact &contact, const FirstGuess &last, double wall_motion, int i, int j,
+                     const double *normal) const
 {
   constexpr double PART_OF_LOAD = 0.1;
   constexpr double SAME = 1.0e-9;    // round-off of forces

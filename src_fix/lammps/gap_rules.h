@@ -4,7 +4,7 @@
 #ifndef INELASTIC_GAP_RULES_H
 #define INELASTIC_GAP_RULES_H
 
-#include "contact_memory.h"
+#include "first_guess.h"
 #include "overlap_watch.h"
 #include "step.h"
 
@@ -34,7 +34,7 @@ class GapRules {
   // a position error gives back in a step is at most the accuracy's part of it, so that it is no
   // more than the errors of velocities.
   // The wall closes the gap by `wall_motion` [length] in the step.
-  void begin(Contact &contact, const ContactMemory::Entry &last, double wall_motion, int i, int j,
+  void begin(Contact &contact, const FirstGuess &last, double wall_motion, int i, int j,
              const double *normal) const;
 
   // The gap [length] at the end of the step for which the constraint is just met: negative where an

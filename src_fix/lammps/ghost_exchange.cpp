@@ -95,10 +95,10 @@ void GhostExchange::sum_over_chosen_ghosts(float *per_particle)
   exchange(Exchange::CHOSEN_SINGLE, true, true);
 }
 
-void GhostExchange::gather(ContactMemory &memory)
+void GhostExchange::gather(FirstGuesses &guesses)
 {
-  exchanged_memory_ = &memory;
-  exchange(Exchange::MEMORY, true, false);
+  exchanged_guesses_ = &guesses;
+  exchange(Exchange::GUESSES, true, false);
 }
 
 // A ghost may get more to tell from other ghosts of the same atom while it tells what it has.
@@ -151,10 +151,9 @@ int GhostExchange::pack_reverse(int n, int first, double *buffer)
 {
   if (n == 0) return 0;
   switch (exchanging_) {
-    case Exchange::MEMORY: {
+    case Exchange::GUESSES: {
       int m = 0;
-      for (int k = 0; k < n; ++k)
-        m += exchanged_memory_->pack(first + k, buffer + m, ContactMemory::SHARED_PARTNERS);
+      for (int k = 0; k < n; ++k) m += exchanged_guesses_->pack_message(first + k, buffer + m);
       return m;
     }
     case Exchange::LAW_MEMORY: {
@@ -180,8 +179,8 @@ void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
 {
   if (n == 0) return;
   switch (exchanging_) {
-    case Exchange::MEMORY:
-      for (int k = 0, m = 0; k < n; ++k) m += exchanged_memory_->unpack(list[k], buffer + m);
+    case Exchange::GUESSES:
+      for (int k = 0, m = 0; k < n; ++k) m += exchanged_guesses_->unpack(list[k], buffer + m);
       return;
     case Exchange::LAW_MEMORY:
       for (int k = 0, m = 0; k < n; ++k) m += exchanged_law_memory_->unpack(list[k], buffer + m);

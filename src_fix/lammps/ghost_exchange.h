@@ -5,7 +5,7 @@
 #define INELASTIC_GHOST_EXCHANGE_H
 
 #include "chosen_ghosts.h"
-#include "contact_memory.h"
+#include "first_guess.h"
 #include "host.h"
 #include "law_memory.h"
 #include "phase_clock.h"
@@ -32,7 +32,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   // The largest messages, in numbers per atom: LAMMPS sizes its buffers by these.
   static constexpr int FORWARD_SIZE = 3;
   static constexpr int REVERSE_SIZE =
-      std::max(ContactMemory::packed_size(ContactMemory::SHARED_PARTNERS),
+      std::max(FirstGuesses::packed_size(FirstGuesses::ENTRIES_PER_MESSAGE),
                LawMemory::packed_size(LawMemory::ENTRIES_PER_MESSAGE));
 
   void sum_over_ghosts(double *per_particle) override;
@@ -49,7 +49,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   void least_over_ghosts(double *per_particle);
 
   // Adds to each owned atom the contacts that its ghosts remember.
-  void gather(ContactMemory &memory);
+  void gather(FirstGuesses &guesses);
   void gather(LawMemory &memory);
 
   int pack_forward(int n, const int *list, double *buffer) const;
@@ -74,7 +74,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
 
  private:
   // The pack and unpack functions work on one of these.
-  enum class Exchange { VECTORS, LEAST, MEMORY, LAW_MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
+  enum class Exchange { VECTORS, LEAST, GUESSES, LAW_MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
 
   void exchange(Exchange what, bool reverse, bool forward);
 
@@ -85,7 +85,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   Exchange exchanging_ = Exchange::VECTORS;
   double *exchanged_ = nullptr;          // VECTORS, LEAST: 3 numbers per particle; CHOSEN: 4
   float *exchanged_single_ = nullptr;    // 4 numbers per particle
-  ContactMemory *exchanged_memory_ = nullptr;
+  FirstGuesses *exchanged_guesses_ = nullptr;
   LawMemory *exchanged_law_memory_ = nullptr;
   ChosenGhosts chosen_ghosts_;
 };

@@ -1,6 +1,6 @@
 // What differs between the releases of LAMMPS for which these sources compile: errors that point to
 // a word of the input and the arguments of `minimum_image` are of 2025, a description of a variable
-// is of 2024.
+// is of 2024. And what no release shows but to its own classes.
 
 #ifndef INELASTIC_LAMMPS_VERSIONS_H
 #define INELASTIC_LAMMPS_VERSIONS_H
@@ -8,6 +8,7 @@
 #include "domain.h"
 #include "error.h"
 #include "info.h"
+#include "modify.h"
 
 #include <cstdlib>
 #include <string>
@@ -69,6 +70,19 @@ inline std::string description_of_variable(LAMMPS *lmp, int variable)
   Info info(lmp);
   return Description<Info>::of_variable(info, variable);
 }
+
+// The ID and the style of the k-th fix that is not yet defined and for which a restart file holds
+// numbers per atom. LAMMPS hides them in its class.
+struct HiddenInModify : Modify {
+  static const char *id(const Modify *modify, int k)
+  { return (modify->*(&HiddenInModify::id_restart_peratom))[k]; }
+  static const char *style(const Modify *modify, int k)
+  { return (modify->*(&HiddenInModify::style_restart_peratom))[k]; }
+};
+inline const char *id_in_restart_file(const Modify *modify, int k)
+{ return HiddenInModify::id(modify, k); }
+inline const char *style_in_restart_file(const Modify *modify, int k)
+{ return HiddenInModify::style(modify, k); }
 
 }    // namespace LAMMPS_NS
 

@@ -23,8 +23,8 @@ double parting_speed(const std::vector<double> &velocity, int i, int j, const do
 
 }    // namespace
 
-const LawMemory::Entry *LawContacts::find(int i, tagint partner, const double *normal, double gap,
-                                          double size) const
+const LawEntry *LawContacts::find(int i, tagint partner, const double *normal, double gap,
+                                  double size) const
 {
   constexpr double PARTED = 0.1;    // of the sum of radii
   // Nothing has moved since the last step when a run starts, in which the surfaces may have
@@ -43,8 +43,7 @@ void LawContacts::ask(Contact &contact, double wall_motion, int i, int j, const 
   LawState state{};
   const double predicted_speed =
       parting_speed(problem.predicted_velocity, i, j, normal) - speed_of_wall;
-  const LawMemory::Entry *const last =
-      find(i, contact.partner, normal, contact.gap_now, contact.size);
+  const LawEntry *const last = find(i, contact.partner, normal, contact.gap_now, contact.size);
   if (last) {
     state.known = true;
     state.remembered = last->remembered;
@@ -80,14 +79,14 @@ void LawContacts::take_impulses()
 
 // In the half kick with which a run starts velocities are at the end of the last step already; the
 // next run may start with the same half kick.
-LawMemory::Entry LawContacts::entry_of(std::size_t c, const LawState &state) const
+LawEntry LawContacts::entry_of(std::size_t c, const LawState &state) const
 {
   const inelastic::ContactProblem &problem = step_.problem;
   const int i = problem.contacts.first[c], j = problem.contacts.second[c];
   const double *const n = &problem.contacts.normal[3 * c];
   const double before = parting_speed(step_.velocity_before, i, j, n);
   const double after = parting_speed(step_.velocity, i, j, n);
-  LawMemory::Entry entry;
+  LawEntry entry;
   entry.partner = step_.contact_of(c).partner;
   std::copy_n(n, 3, entry.normal.begin());
   entry.demand = state.demand;
@@ -152,7 +151,7 @@ void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
     const LawState &state = step_.law_states[last];
     if (!state.kept && state.demand.is_inelastic()) continue;
     if (is_pushed_apart(c)) continue;
-    LawMemory::Entry entry = entry_of(c, state);
+    LawEntry entry = entry_of(c, state);
     memory_.remember(contacts.first[c], entry);
     if (step_.contact_of(c).is_with_wall()) continue;
     entry.partner = atom->tag[contacts.first[c]];

@@ -54,12 +54,11 @@ class LawContacts {
 
   // Looks for what is remembered of a contact with this gap and sum of radii [length]. One whose
   // surfaces something else than a step has parted begins anew.
-  const LawMemory::Entry *find(int i, tagint partner, const double *normal, double gap,
-                               double size) const;
+  const LawEntry *find(int i, tagint partner, const double *normal, double gap, double size) const;
   bool is_pushed_apart(std::size_t c) const;
 
   // What is to be remembered of the contact of row c, on its first side.
-  LawMemory::Entry entry_of(std::size_t c, const LawState &state) const;
+  LawEntry entry_of(std::size_t c, const LawState &state) const;
 
   Step &step_;
   LawMemory &memory_;

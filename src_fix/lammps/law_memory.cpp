@@ -6,51 +6,64 @@
 
 using namespace LAMMPS_NS;
 
-namespace {
+double LawEntry::along(const double *other_normal) const
+{ return inelastic::dot(normal.data(), other_normal); }
 
-constexpr double SAME_SIDE =
-    0.1;    // the least cosine of the angle between two normals of one contact
+double *LawEntry::pack(double *out) const
+{
+  *out++ = static_cast<double>(partner);
+  out = std::copy(normal.begin(), normal.end(), out);
+  *out++ = demand.parts ? 1.0 : 0.0;
+  *out++ = demand.parting_speed;
+  *out++ = demand.least_impulse;
+  *out++ = impulse;
+  *out++ = speed;
+  return std::copy(remembered.begin(), remembered.end(), out);
+}
 
-}    // namespace
+const double *LawEntry::unpack(const double *in)
+{
+  partner = static_cast<tagint>(*in++);
+  for (double &component : normal) component = *in++;
+  demand.parts = *in++ != 0.0;
+  demand.parting_speed = *in++;
+  demand.least_impulse = *in++;
+  impulse = *in++;
+  speed = *in++;
+  for (double &value : remembered) value = *in++;
+  return in;
+}
 
 void LawMemory::resize(int atoms)
 {
-  entries_.resize(atoms);
+  ContactMemory::resize(atoms);
   owner_.resize(atoms, 0);
   sent_.resize(atoms, 0);
 }
 
 void LawMemory::forget(int atom)
 {
-  entries_[atom].clear();
+  ContactMemory::forget(atom);
   sent_[atom] = 0;
 }
 
-const LawMemory::Entry *LawMemory::find(int atom, tagint partner, const double *normal) const
+void LawMemory::copy(int from, int to)
 {
-  const Entry *found = nullptr;
-  double nearest = SAME_SIDE;
-  for (const Entry &entry : entries_[atom]) {
-    if (entry.partner != partner) continue;
-    const double cosine = inelastic::dot(entry.normal.data(), normal);
-    if (cosine <= nearest) continue;
-    nearest = cosine;
-    found = &entry;
-  }
-  return found;
+  ContactMemory::copy(from, to);
+  owner_[to] = owner_[from];
 }
 
 bool LawMemory::remembers_wall(int atom) const
 {
-  return std::any_of(entries_[atom].begin(), entries_[atom].end(), [](const Entry &entry) {
+  return std::any_of(entries_[atom].begin(), entries_[atom].end(), [](const LawEntry &entry) {
     return entry.partner < 0;
   });
 }
 
 void LawMemory::rename_partners(int atom, const std::unordered_map<tagint, tagint> &id_now)
 {
-  std::vector<Entry> known;
-  for (Entry entry : entries_[atom]) {
+  std::vector<LawEntry> known;
+  for (LawEntry entry : entries_[atom]) {
     if (entry.partner > 0) {
       const auto now = id_now.find(entry.partner);
       if (now == id_now.end()) continue;
@@ -63,44 +76,14 @@ void LawMemory::rename_partners(int atom, const std::unordered_map<tagint, tagin
 
 int LawMemory::pack(int atom, int begin, int end, double *buffer) const
 {
-  double *out = buffer;
-  *out++ = static_cast<double>(owner_[atom]);
-  *out++ = end - begin;
-  for (int k = begin; k < end; ++k) {
-    const Entry &entry = entries_[atom][k];
-    *out++ = static_cast<double>(entry.partner);
-    out = std::copy(entry.normal.begin(), entry.normal.end(), out);
-    *out++ = entry.demand.parts ? 1.0 : 0.0;
-    *out++ = entry.demand.parting_speed;
-    *out++ = entry.demand.least_impulse;
-    *out++ = entry.impulse;
-    *out++ = entry.speed;
-    out = std::copy(entry.remembered.begin(), entry.remembered.end(), out);
-  }
-  return static_cast<int>(out - buffer);
+  buffer[0] = static_cast<double>(owner_[atom]);
+  return 1 + ContactMemory::pack(atom, begin, end, buffer + 1);
 }
-
-int LawMemory::pack(int atom, double *buffer) const
-{ return pack(atom, 0, number_of_entries(atom), buffer); }
 
 int LawMemory::unpack(int atom, const double *buffer)
 {
-  const double *in = buffer;
-  owner_[atom] = static_cast<tagint>(*in++);
-  const int count = static_cast<int>(*in++);
-  for (int k = 0; k < count; ++k) {
-    Entry entry;
-    entry.partner = static_cast<tagint>(*in++);
-    for (double &component : entry.normal) component = *in++;
-    entry.demand.parts = *in++ != 0.0;
-    entry.demand.parting_speed = *in++;
-    entry.demand.least_impulse = *in++;
-    entry.impulse = *in++;
-    entry.speed = *in++;
-    for (double &value : entry.remembered) value = *in++;
-    remember(atom, entry);
-  }
-  return static_cast<int>(in - buffer);
+  owner_[atom] = static_cast<tagint>(buffer[0]);
+  return 1 + ContactMemory::unpack(atom, buffer + 1);
 }
 
 int LawMemory::pack_unsent(int atom, double *buffer)

@@ -104,9 +104,8 @@ void RegionWalls::warn() const
                      obstacle.region->id);
 }
 
-void RegionWalls::view(const std::vector<Viewpoint> &viewpoints, bool inexact_only,
-                       const std::function<void(const Viewpoint &, const WallView &)> &found,
-                       const std::function<void(const Viewpoint &, const std::string &)> &outside)
+void RegionWalls::view(const Viewpoints &viewpoints, bool inexact_only, const Found &found,
+                       const Outside &outside)
 {
   for (const Obstacle &obstacle : obstacles_) {
     if (inexact_only && obstacle.exact) continue;
@@ -231,10 +230,8 @@ void RegionWalls::correct_cap(Region *cone, const double *x, Contact &cap) const
   cap.delz = scale * gradient[2];
 }
 
-void RegionWalls::view_static(
-    const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
-    const std::function<void(const Viewpoint &, const WallView &)> &found,
-    const std::function<void(const Viewpoint &, const std::string &)> &outside)
+void RegionWalls::view_static(const Obstacle &obstacle, const Viewpoints &viewpoints,
+                              const Found &found, const Outside &outside)
 {
   std::vector<WallView> views;
   for (const Viewpoint &from : viewpoints) {
@@ -245,9 +242,7 @@ void RegionWalls::view_static(
   }
 }
 
-void RegionWalls::view_moving_now(
-    const std::vector<Viewpoint> &viewpoints,
-    const std::function<void(const Viewpoint &, const WallView &)> &found)
+void RegionWalls::view_moving_now(const Viewpoints &viewpoints, const Found &found)
 {
   std::vector<WallView> views;
   for (const Obstacle &obstacle : obstacles_) {
@@ -272,10 +267,8 @@ void RegionWalls::set_clock(const Obstacle &obstacle, int steps_ahead)
   modify->addstep_compute(update->ntimestep + 1);
 }
 
-void RegionWalls::view_moving(
-    const Obstacle &obstacle, const std::vector<Viewpoint> &viewpoints,
-    const std::function<void(const Viewpoint &, const WallView &)> &found,
-    const std::function<void(const Viewpoint &, const std::string &)> &outside)
+void RegionWalls::view_moving(const Obstacle &obstacle, const Viewpoints &viewpoints,
+                              const Found &found, const Outside &outside)
 {
   Region *region = obstacle.region;
 

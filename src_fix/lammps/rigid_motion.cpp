@@ -61,6 +61,10 @@ void RigidMotion::predict_bodies(double kick, std::vector<double> &velocity)
   for (std::size_t b = 0; b < bodies_.size(); ++b) predict_body(b, velocity);
 }
 
+// Tells whether the body of an owned member carries along what its last step in this run has left.
+bool RigidMotion::carries(int i) const
+{ return step_.continues && state_.momenta()[i].continues; }
+
 // Sets each member's part of its body's momenta, ghosts included.
 void RigidMotion::gather_momenta(double kick)
 {
@@ -68,10 +72,10 @@ void RigidMotion::gather_momenta(double kick)
   linear_.assign(size, 0.0);
   change_.assign(size, 0.0);
   carried_part_.assign(size, 0.0);
-  const bool carried = step_.continues;
   for (int i = 0; i < atom->nlocal; ++i) {
     const int b = step_.problem.bodies.body[i];
     if (b < 0) continue;
+    const bool carried = carries(i);
     const Carried &of_body = state_.momenta()[i];
     const Push &push = carried ? of_body.next : of_body.held;
     const double m = mass_of(atom, i);
@@ -99,7 +103,7 @@ void RigidMotion::take_carried(int i)
 {
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
   const int b = bodies.body[i];
-  const bool carried = step_.continues;
+  const bool carried = carries(i);
   double *const part = &carried_part_[3 * i];
   if (bodies.place[i] == bodies.start[b]) {
     const BodyInertia &inertia = inertias_[b];
@@ -334,8 +338,9 @@ void RigidMotion::keep(int i, const Push &push, const double *contact_force)
       (std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end)) +
        step_.impulse_per_force * moments * (inverse[0] + inverse[1] + inverse[2]));
   // The angular momentum is carried along, and with it what an earlier step's moments have rounded.
-  of_body.angle = std::max(angle, whole ? of_body.angle : angle_of_first_momentum(b));
+  of_body.angle = std::max(angle, carries(i) ? of_body.angle : angle_of_first_momentum(b));
   std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
+  of_body.continues = true;
 }
 
 // At the start of a run LAMMPS takes the angular momentum of a body from velocities that hold the

@@ -49,7 +49,7 @@ class RigidMotion final : public Mover, protected Pointers {
 
   bool is_incomplete(int i) const override { return members_.is_incomplete(i); }
 
-  // At the start of a run (the step does not continue one) momenta are the atoms'.
+  // At the start of a run, and of a body that is new, momenta are those of the atoms.
   void predict() override;
   void apply(const double *contact_force) override;
 
@@ -78,6 +78,7 @@ class RigidMotion final : public Mover, protected Pointers {
   };
 
   void measure_inertia() { inertias_.measure(step_.problem, members_.original_of()); }
+  bool carries(int i) const;
   void gather_momenta(double kick);
   void take_carried(int i);
   void predict_bodies(double kick, std::vector<double> &velocity);

@@ -19,13 +19,13 @@ namespace {
 // [radians] The end of a body that turns further says little about the wall that it has met.
 constexpr double HALF_A_TURN = 3.14;
 
-bool is_image(const RegionWalls::Viewpoint &from)
+bool is_image(const Viewpoint &from)
 { return from.image[0] != 0.0 || from.image[1] != 0.0 || from.image[2] != 0.0; }
 
 }    // namespace
 
 WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows,
-                                 RegionWalls &walls, GhostExchange &ranks, const Movers &movers) :
+                                 Walls &walls, GhostExchange &ranks, const Movers &movers) :
     Pointers(lmp), step_(step), rules_(rules), rows_(rows), walls_(walls), ranks_(ranks),
     movers_(movers), periods_(lmp)
 {
@@ -52,7 +52,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
 
 // Moves a point beyond a periodic boundary to the other side. Tells whether it was beyond one.
 // (LAMMPS shows the walls of a region only at that side of the boundary where they are.)
-bool WallConstraints::wrap(RegionWalls::Viewpoint &from) const
+bool WallConstraints::wrap(Viewpoint &from) const
 { return periods_.wrap(from.where, from.image); }
 
 // Points where the step takes those atoms for which the constraint of a wall may be inexact. A
@@ -76,7 +76,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
     const double *const v = &moved[3 * i];
     const double reach = followed.count(i) ? EXTREME
                                            : atom->radius[i] + (movers_.any_turns() ? margin : 0.0);
-    RegionWalls::Viewpoint end = {i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach};
+    Viewpoint end = {i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach};
     const bool may_differ = !walls_.exact() || step_.is_member(i) || followed.count(i) != 0;
     if (may_differ && reach + h * norm(v) >= clear_of_walls_[i]) viewpoints_.push_back(end);
     if (wrap(end)) viewpoints_.push_back(end);
@@ -95,10 +95,10 @@ void WallConstraints::collect(double margin)
   clear_of_walls_.assign(atom->nlocal, 0.0);
   const Viewpoints &far = viewpoints(velocity, margin + further);
   if (walls_.exact())
-    for (const RegionWalls::Viewpoint &from : far) clear_of_walls_[from.atom] = from.reach;
+    for (const Viewpoint &from : far) clear_of_walls_[from.atom] = from.reach;
   walls_.view(
       far, false,
-      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+      [&](const Viewpoint &from, const WallView &view) {
         clear_of_walls_[from.atom] = 0.0;
         const double gap = view.distance - atom->radius[from.atom];
         const double gap_now = view.distance_now - atom->radius[from.atom];
@@ -108,7 +108,7 @@ void WallConstraints::collect(double margin)
             rows_.remembers(from.atom, -view.wall, view.normal, gap_now, atom->radius[from.atom]))
           take(from, view);
       },
-      [&](const RegionWalls::Viewpoint &from, const std::string &region) {
+      [&](const Viewpoint &from, const std::string &region) {
         step_.problem_found = fmt::format("the centre of atom {} is on the wrong side of region {}",
                                           atom->tag[from.atom], region);
       });
@@ -118,14 +118,13 @@ void WallConstraints::collect(double margin)
 // A wall that moves away is out of reach at the end of the step, and may be overlapped now.
 void WallConstraints::note_overlaps_with_moving_walls()
 {
-  for (RegionWalls::Viewpoint &from : viewpoints_) from.reach = atom->radius[from.atom];
-  walls_.view_moving_now(
-      viewpoints_, [&](const RegionWalls::Viewpoint &from, const WallView &view) {
-        rules_.overlaps().note(view.distance - from.reach, from.atom, -view.wall);
-      });
+  for (Viewpoint &from : viewpoints_) from.reach = atom->radius[from.atom];
+  walls_.view_moving_now(viewpoints_, [&](const Viewpoint &from, const WallView &view) {
+    rules_.overlaps().note(view.distance - from.reach, from.atom, -view.wall);
+  });
 }
 
-void WallConstraints::take(const RegionWalls::Viewpoint &from, const WallView &view)
+void WallConstraints::take(const Viewpoint &from, const WallView &view)
 {
   const int i = from.atom;
   const double motion = view.distance_now - view.distance;
@@ -145,14 +144,14 @@ long WallConstraints::add_violated()
   const std::size_t before = step_.problem.contacts.size();
   walls_.view(
       viewpoints(velocity, 0.0), false,
-      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+      [&](const Viewpoint &from, const WallView &view) {
         const double gap = view.distance - atom->radius[from.atom];
         const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
         if (gap + opening < -step_.settings.tolerance &&
             !constraint_.count(key(from.atom, view.wall)))
           take(from, view);
       },
-      [](const RegionWalls::Viewpoint &, const std::string &) {
+      [](const Viewpoint &, const std::string &) {
       });
   return static_cast<long>(step_.problem.contacts.size() - before);
 }
@@ -163,8 +162,7 @@ bool WallConstraints::is_same_plane(std::size_t c, const double *normal) const
   return dot(&step_.problem.contacts.normal[3 * c], normal) > 1.0 - SAME;
 }
 
-long WallConstraints::add_plane(const RegionWalls::Viewpoint &from, const WallView &view,
-                                bool too_deep)
+long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, bool too_deep)
 {
   if (step_.relinearisations > GapRules::MAX_RELINEARISATIONS) return 0;
   const int i = from.atom;
@@ -213,7 +211,7 @@ long WallConstraints::relinearise(double margin)
   std::unordered_set<std::size_t> seen;
   walls_.view(
       viewpoints_at_end(margin), only_inexact(),
-      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+      [&](const Viewpoint &from, const WallView &view) {
         const auto existing = constraint_.find(key(from.atom, view.wall));
         const bool known = existing != constraint_.end();
         if (known) seen.insert(existing->second);
@@ -229,7 +227,7 @@ long WallConstraints::relinearise(double margin)
         else if (too_deep || (known && step_.rows[existing->second].followed))
           changed += add_plane(from, view, too_deep);
       },
-      [&](const RegionWalls::Viewpoint &from, const std::string &) {
+      [&](const Viewpoint &from, const std::string &) {
         beyond.push_back(from);
       });
   if (movers_.any_turns()) changed += follow_unseen(seen, beyond);
@@ -260,7 +258,7 @@ long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
                                     const Viewpoints &beyond)
 {
   std::unordered_set<int> skipped;
-  for (const RegionWalls::Viewpoint &from : beyond) skipped.insert(from.atom);
+  for (const Viewpoint &from : beyond) skipped.insert(from.atom);
   long changed = 0;
   for (const auto &[atom_and_wall, c] : constraint_) {
     const Row &row = step_.rows[c];
@@ -284,15 +282,15 @@ long WallConstraints::add_planes_within(const Viewpoints &beyond)
   double number_beyond = static_cast<double>(beyond.size());
   ranks_.reduce(&number_beyond, 1, nullptr, 0);
   if (!(number_beyond > 0.0)) return 0;
-  for (const RegionWalls::Viewpoint &from : beyond)
+  for (const Viewpoint &from : beyond)
     step_.excess = std::max(step_.excess, atom->radius[from.atom]);
   long changed = 0;
   walls_.view(
       last_inside(beyond), only_inexact(),
-      [&](const RegionWalls::Viewpoint &from, const WallView &view) {
+      [&](const Viewpoint &from, const WallView &view) {
         changed += add_plane(from, view, true);
       },
-      [](const RegionWalls::Viewpoint &, const std::string &) {
+      [](const Viewpoint &, const std::string &) {
       });
   return changed;
 }
@@ -318,9 +316,9 @@ WallConstraints::Viewpoints WallConstraints::last_inside(const Viewpoints &beyon
     std::vector<char> out(beyond.size(), 0);
     walls_.view(
         points, only_inexact(),
-        [](const RegionWalls::Viewpoint &, const WallView &) {
+        [](const Viewpoint &, const WallView &) {
         },
-        [&](const RegionWalls::Viewpoint &from, const std::string &) {
+        [&](const Viewpoint &from, const std::string &) {
           out[&from - points.data()] = 1;
         });
     for (std::size_t k = 0; k < beyond.size(); ++k) (out[k] ? outside : inside)[k] = middle[k];

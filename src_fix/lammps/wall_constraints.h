@@ -8,8 +8,8 @@
 #include "contact_rows.h"
 #include "mover.h"
 #include "periods.h"
-#include "region_walls.h"
 #include "step.h"
+#include "walls.h"
 
 #include "pointers.h"
 
@@ -25,8 +25,8 @@ class GhostExchange;
 
 class WallConstraints : protected Pointers {
  public:
-  WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows,
-                  RegionWalls &walls, GhostExchange &ranks, const Movers &movers);
+  WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows, Walls &walls,
+                  GhostExchange &ranks, const Movers &movers);
 
   // Tells whether the end of a step must be looked at: bodies turn, walls curve, or contacts may
   // hold spheres to an obstacle, about which they turn.
@@ -46,23 +46,23 @@ class WallConstraints : protected Pointers {
   long relinearise(double margin);
 
  private:
-  using Viewpoints = std::vector<RegionWalls::Viewpoint>;
+  using Viewpoints = Walls::Viewpoints;
 
   std::uint64_t key(int i, int wall) const
   { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
 
   // Tells whether only walls without exact constraints can be met at the end of a step.
   bool only_inexact() const { return !movers_.any_turns() && !periods_.any() && !rows_.may_hold(); }
-  bool wrap(RegionWalls::Viewpoint &) const;
+  bool wrap(Viewpoint &) const;
   void note_overlaps_with_moving_walls();
-  void take(const RegionWalls::Viewpoint &, const WallView &);
+  void take(const Viewpoint &, const WallView &);
   Contact contact_with(int i, int wall, double gap_now) const;
   const Viewpoints &viewpoints(const double *velocity, double beyond);
   const Viewpoints &viewpoints_at_end(double margin);
   Viewpoints last_inside(const Viewpoints &beyond);
   bool may_hold(std::size_t c, const double *normal_at_end) const;
   long hold(std::size_t c, double gap_at_end, const double *normal_at_end);
-  long add_plane(const RegionWalls::Viewpoint &, const WallView &, bool too_deep);
+  long add_plane(const Viewpoint &, const WallView &, bool too_deep);
   long add_planes_within(const Viewpoints &beyond);
   long follow_unseen(const std::unordered_set<std::size_t> &seen, const Viewpoints &beyond);
   bool is_same_plane(std::size_t c, const double *normal) const;
@@ -70,7 +70,7 @@ class WallConstraints : protected Pointers {
   Step &step_;
   GapRules &rules_;
   ContactRows &rows_;
-  RegionWalls &walls_;
+  Walls &walls_;
   GhostExchange &ranks_;
   const Movers &movers_;
   const Periods periods_;
