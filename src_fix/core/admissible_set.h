@@ -12,7 +12,7 @@
 namespace inelastic {
 
 template <typename Real> struct HalfLine {
-  Real least;    // l <= 0
+  Real least = 0;    // l <= 0
 
   // Returns the admissible impulse that is nearest to `free`.
   Real project(Real free) const { return free > least ? free : least; }

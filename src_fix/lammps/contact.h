@@ -12,18 +12,6 @@
 
 namespace LAMMPS_NS {
 
-// What a contact asks for beside that its surfaces stay apart. An inelastic one asks for nothing.
-struct Asked {
-  double least_impulse = 0.0;      // [mass length / time] <= 0: it may pull by so much
-  bool parts = false;              // its surfaces are to part, at least
-  double parting_speed = 0.0;      // with this speed [length / time]
-  double predicted_speed = 0.0;    // [length / time] with which they part without contacts
-
-  // By this the contact is solved more accurately than others (contact_set.h). A speed with which
-  // surfaces part is asked for where they collide, maybe hundreds of times: errors of it add up.
-  double refinement() const { return parts ? 1.0 / 16.0 : 1.0; }
-};
-
 struct Contact {
   // In place of a gap at which a contact is closed, which is not negative.
   static constexpr double NOT_CLOSED = -1.0;
@@ -37,8 +25,13 @@ struct Contact {
   double closed_gap =
       NOT_CLOSED;    // [length] the gap at which the contact is closed (gap_rules.h)
 
-  double to_stop = 0.0;    // [length] what the contact has to stop (gap_rules.h)
-  Asked asked = {};
+  double to_stop = 0.0;            // [length] what the contact has to stop (gap_rules.h)
+  inelastic::Demand asked = {};    // what the law asks for; an inelastic contact nothing
+  double predicted_speed = 0.0;    // [length / time] with which it parts without contacts, if asked
+
+  // By this the contact is solved more accurately than others (contact_set.h). A speed with which
+  // surfaces part is asked for where they collide, maybe hundreds of times: errors of it add up.
+  double refinement() const { return asked.parts ? 1.0 / 16.0 : 1.0; }
 
   bool is_with_wall() const { return partner < 0; }
   int wall() const { return static_cast<int>(-partner); }
@@ -54,12 +47,11 @@ struct Row {
 
 // A contact as the contact law sees it (law_contacts.h).
 struct LawState {
-  inelastic::Demand demand;
   std::array<double, inelastic::ContactLaw::MOST_REMEMBERED> remembered;
-  double impulse = 0.0;         // [mass length / time] over its rows, when the step is solved
-  double last_impulse = 0.0;    // [mass length / time] in the last step
-  bool known = false;           // something was remembered of it
-  bool kept = false;            // something is to be remembered of it
+  inelastic::Impulse impulse;    // over its rows, when the step is solved
+  double last_impulse = 0.0;     // [mass length / time] in the last step
+  bool known = false;            // something was remembered of it
+  bool kept = false;             // something is to be remembered of it
 };
 
 }    // namespace LAMMPS_NS

@@ -72,7 +72,7 @@ bool ContactOutput::is_contact(std::size_t c) const
 {
   if (step_.problem.contacts.impulse[c] != 0.0) return true;
   const LawState *const law = step_.law_state_of(c);
-  return law && law->kept && law->impulse == 0.0;
+  return law && law->kept && law->impulse.normal == 0.0;
 }
 
 void ContactOutput::clear_sums(bool virial_per_atom)

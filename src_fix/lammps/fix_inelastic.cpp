@@ -36,7 +36,7 @@ constexpr double LAYOUT = -3.0, EARLIER_LAYOUT = -2.0;
 
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), settings_(read_settings(lmp, narg, arg, groupbit)), step_(settings_),
-    ranks_(lmp, this, clock_), state_(lmp, step_), laws_(step_, state_.law_memory()),
+    ranks_(lmp, this, clock_), state_(lmp, step_), laws_(lmp, step_, state_.law_memory()),
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
     spheres_(lmp, step_, ranks_, state_), walls_(lmp, settings_.regions),
     constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
@@ -159,7 +159,7 @@ void FixInelastic::init()
   check_run();
   check_scene();
   check_.check_other_fixes();
-  if (laws_.has_law()) laws_.follow_ids(atom, world);
+  if (laws_.has_law()) laws_.follow_ids();
   state_.measure_messages(ranks_);
   maxexchange = state_.exchange_size();
   // With newton off LAMMPS makes its buffers for reverse communication as large as the pair style
@@ -480,7 +480,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   restart_global = length_.is_shortened() || laws_.has_law();
   {
     const PhaseClock::Within within(clock_, PhaseClock::APPLY);
-    if (laws_.has_law()) laws_.remember(atom, ranks_);
+    if (laws_.has_law()) laws_.remember(ranks_);
     state_.remember_contacts(ranks_);
   }
   maxexchange = state_.exchange_size();

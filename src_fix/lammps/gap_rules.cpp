@@ -108,7 +108,7 @@ double GapRules::held_gap(const Contact &contact) const
 double GapRules::most_closed(const Contact &contact) const
 {
   return std::max(step_.settings.accuracy * contact.to_stop,
-                  step_.problem.timestep * contact.asked.predicted_speed);
+                  step_.problem.timestep * contact.predicted_speed);
 }
 
 double GapRules::effective_gap(const Contact &contact) const
@@ -116,7 +116,7 @@ double GapRules::effective_gap(const Contact &contact) const
   const double gap = contact.gap_now;
   if (step_.phase == Phase::CONTACT) {
     if (overlaps_.is_bad(gap)) return 0.0;
-    if (contact.asked.least_impulse < 0.0) return held_gap(contact);
+    if (contact.asked.set.may_pull()) return held_gap(contact);
     const double closed = contact_gap(contact);
     const double parted = -step_.problem.timestep * contact.asked.parting_speed;
     return contact.asked.parts ? std::min(closed, parted) : closed;

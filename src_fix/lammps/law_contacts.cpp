@@ -49,11 +49,11 @@ void LawContacts::ask(Contact &contact, double wall_motion, int i, int j, const 
     state.remembered = last->remembered;
     state.last_impulse = last->impulse;
   }
-  const inelastic::ContactState seen = {h, contact.gap_now, speed_before - speed_of_wall,
-                                        predicted_speed};
-  Demand &demand = state.demand;
-  demand = step_.settings.law->ask(seen, state.remembered.data());
-  demand.least_impulse = std::min(0.0, demand.least_impulse + taken_before(state));
+  Demand &demand = contact.asked;
+  demand = step_.settings.law->ask(
+      seen(contact, i, j, normal, speed_before - speed_of_wall, predicted_speed),
+      state.remembered.data());
+  demand.set.least = std::min(0.0, demand.set.least + taken_before(state));
   // The velocities at the start of a run are half way through a collision of the last step, if they
   // are those with which it ended. (Spheres of bodies turn a little.)
   constexpr double SAME = 0.05;
@@ -63,34 +63,58 @@ void LawContacts::ask(Contact &contact, double wall_motion, int i, int j, const 
     demand.parting_speed = last->demand.parting_speed;
   }
   if (bad_start) demand.parts = false;
-  contact.asked = {demand.least_impulse, demand.parts, demand.parting_speed, predicted_speed};
+  contact.predicted_speed = predicted_speed;
   step_.law_states.push_back(state);
+}
+
+// The contact as the law sees it. [length / time] The speeds are those with which the surfaces
+// part.
+inelastic::ContactState LawContacts::seen(const Contact &contact, int i, int j,
+                                          const double *normal, double speed_before,
+                                          double predicted_speed) const
+{
+  const inelastic::ContactProblem &problem = step_.problem;
+  const std::vector<double> &v = problem.predicted_velocity;
+  const bool wall = contact.is_with_wall();
+  inelastic::ContactState state{};
+  state.timestep = problem.timestep;
+  state.gap = contact.gap_now;
+  state.speed_before = speed_before;
+  state.predicted_speed = predicted_speed;
+  const double along = parting_speed(v, i, j, normal);
+  for (int d = 0; d < 3; ++d) state.sliding[d] = v[3 * i + d] - v[3 * j + d] - along * normal[d];
+  state.radius = {atom->radius[i], wall ? 0.0 : atom->radius[j]};
+  state.type = {atom->type[i], wall ? 0 : atom->type[j]};
+  return state;
 }
 
 // A contact may have several rows: planes at a curved wall.
 void LawContacts::take_impulses()
 {
   for (std::size_t c = 0; has_law() && c < step_.rows.size(); ++c)
-    step_.law_states[step_.rows[c].contact].impulse += step_.problem.contacts.impulse[c];
-  for (LawState &state : step_.law_states)
-    state.kept =
-        step_.settings.law->remember(state.impulse - taken_before(state), state.remembered.data());
+    step_.law_states[step_.rows[c].contact].impulse.normal += step_.problem.contacts.impulse[c];
+  for (LawState &state : step_.law_states) {
+    inelastic::Impulse taken = state.impulse;
+    taken.normal -= taken_before(state);
+    state.kept = step_.settings.law->remember(taken, state.remembered.data());
+  }
 }
 
 // In the half kick with which a run starts velocities are at the end of the last step already; the
 // next run may start with the same half kick.
-LawEntry LawContacts::entry_of(std::size_t c, const LawState &state) const
+LawEntry LawContacts::entry_of(std::size_t c) const
 {
   const inelastic::ContactProblem &problem = step_.problem;
   const int i = problem.contacts.first[c], j = problem.contacts.second[c];
   const double *const n = &problem.contacts.normal[3 * c];
   const double before = parting_speed(step_.velocity_before, i, j, n);
   const double after = parting_speed(step_.velocity, i, j, n);
+  const LawState &state = *step_.law_state_of(c);
   LawEntry entry;
   entry.partner = step_.contact_of(c).partner;
   std::copy_n(n, 3, entry.normal.begin());
-  entry.demand = state.demand;
-  entry.impulse = state.impulse / step_.kicks();
+  entry.demand = step_.contact_of(c).asked;
+  entry.impulse = state.impulse.normal / step_.kicks();
   entry.speed = step_.kick == Kick::WHOLE ? 0.5 * (before + after) : before;
   entry.remembered = state.remembered;
   return entry;
@@ -110,7 +134,7 @@ bool LawContacts::is_pushed_apart(std::size_t c) const
 
 // Both atoms of a contact remember it: a partner that remembers nothing is another one with the
 // same ID.
-void LawContacts::follow_ids(const Atom *atom, MPI_Comm world)
+void LawContacts::follow_ids()
 {
   std::vector<tagint> mine;    // the IDs then and now of each atom, one after the other
   for (int i = 0; i < atom->nlocal; ++i)
@@ -136,7 +160,7 @@ void LawContacts::follow_ids(const Atom *atom, MPI_Comm world)
   }
 }
 
-void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
+void LawContacts::remember(GhostExchange &ranks)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   for (int i = 0; i < step_.problem.particles; ++i) {
@@ -148,14 +172,15 @@ void LawContacts::remember(const Atom *atom, GhostExchange &ranks)
     // The rows that were added later for a contact come after all first ones.
     if (step_.rows[c].contact <= last) continue;
     last = step_.rows[c].contact;
-    const LawState &state = step_.law_states[last];
-    if (!state.kept && state.demand.is_inelastic()) continue;
+    const Contact &contact = step_.contacts[last];
+    if (!step_.law_states[last].kept && contact.asked.is_inelastic()) continue;
     if (is_pushed_apart(c)) continue;
-    LawEntry entry = entry_of(c, state);
+    LawEntry entry = entry_of(c);
     memory_.remember(contacts.first[c], entry);
-    if (step_.contact_of(c).is_with_wall()) continue;
+    if (contact.is_with_wall()) continue;
     entry.partner = atom->tag[contacts.first[c]];
     for (double &component : entry.normal) component = -component;
+    step_.settings.law->turn_round(entry.remembered.data());
     memory_.remember(contacts.second[c], entry);
   }
   ranks.gather(memory_);

@@ -8,15 +8,18 @@
 #include "law_memory.h"
 #include "step.h"
 
-#include <mpi.h>
+#include "pointers.h"
 
 namespace LAMMPS_NS {
 
 class GhostExchange;
 
-class LawContacts {
+class LawContacts : protected Pointers {
  public:
-  LawContacts(Step &step, LawMemory &memory) : step_(step), memory_(memory) {}
+  LawContacts(class LAMMPS *lmp, Step &step, LawMemory &memory) :
+      Pointers(lmp), step_(step), memory_(memory)
+  {
+  }
 
   bool has_law() const { return step_.settings.law != nullptr; }
 
@@ -39,10 +42,10 @@ class LawContacts {
 
   // Before a run, or a restart file: follows the atoms whose IDs have changed since the law
   // remembered them, and forgets those that are gone. Collective.
-  void follow_ids(const Atom *atom, MPI_Comm world);
+  void follow_ids();
 
   // Keeps what the law remembers with the atoms, those of other ranks included. Collective.
-  void remember(const Atom *atom, GhostExchange &ranks);
+  void remember(GhostExchange &ranks);
 
  private:
   // The half kick with which a run starts takes the place of the second half of the last step of
@@ -56,9 +59,11 @@ class LawContacts {
   // surfaces something else than a step has parted begins anew.
   const LawEntry *find(int i, tagint partner, const double *normal, double gap, double size) const;
   bool is_pushed_apart(std::size_t c) const;
+  inelastic::ContactState seen(const Contact &contact, int i, int j, const double *normal,
+                               double speed_before, double predicted_speed) const;
 
   // What is to be remembered of the contact of row c, on its first side.
-  LawEntry entry_of(std::size_t c, const LawState &state) const;
+  LawEntry entry_of(std::size_t c) const;
 
   Step &step_;
   LawMemory &memory_;

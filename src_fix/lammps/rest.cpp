@@ -104,8 +104,7 @@ bool Rest::look(const inelastic::ProjectionResult &result)
     const int one = clusters_.of(contacts.first[c]), other = clusters_.of(contacts.second[c]);
     const bool refines = (one != Clusters::NONE && needs_refinement(motions_[one])) ||
         (other != Clusters::NONE && needs_refinement(motions_[other]));
-    contacts.refinement[c] =
-        std::min(refines ? REFINED : 1.0, step_.contact_of(c).asked.refinement());
+    contacts.refinement[c] = std::min(refines ? REFINED : 1.0, step_.contact_of(c).refinement());
     if (refines) any = 1.0;
   }
   ranks_.reduce(nullptr, 0, &any, 1);

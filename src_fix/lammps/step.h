@@ -110,7 +110,7 @@ struct Step {
   { return law_states.empty() ? nullptr : &law_states[rows[c].contact]; }
 
   // Tells whether the contact of a row may pull.
-  bool may_hold(std::size_t c) const { return contact_of(c).asked.least_impulse < 0.0; }
+  bool may_hold(std::size_t c) const { return contact_of(c).asked.set.may_pull(); }
 
   // Tells whether a row holds: it may pull, and with the present impulse it does not open.
   bool holds(std::size_t c) const

@@ -9,15 +9,18 @@
 //
 //   w = D + h n.u >= 0   or   w = h (n.u - s) >= 0,      lambda >= l,      (lambda - l) w = 0
 //
-// A law chooses s, the speed with which the surfaces must part at least, and l <= 0, the least
-// impulse. With l = 0 a contact only pushes. With l < 0 it is held: it pulls by up to -l, and opens
-// only where it pulls by as much.
+// A law chooses s, the speed with which the surfaces must part at least, and the set of impulses
+// (../core/admissible_set.h), which has l <= 0, the least one. With l = 0 a contact only pushes.
+// With l < 0 it is held: it pulls by up to -l, and opens only where it pulls by as much.
 //
 // The inelastic law (no s, l = 0) is none of these classes: a scene that names no other law asks
 // nobody.
 
 #pragma once
 
+#include "admissible_set.h"
+
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,24 +28,36 @@
 namespace inelastic {
 
 // Counts the changes of what stands in this file: laws are built for one of them.
-constexpr int CONTACT_LAW_VERSION = 1;
+constexpr int CONTACT_LAW_VERSION = 2;
 
 // A contact at the start of a step.
 struct ContactState {
   double timestep;    // h [time]
   double gap;         // D [length], negative where the surfaces overlap
-  double
-      speed_before;    // n.u before the forces of the step act [length / time], < 0: they approach
+  // n.u before the forces of the step act [length / time], < 0: they approach
+  double speed_before;
   double predicted_speed;    // n.u with these forces, without contacts [length / time]
+  // u - (n.u) n with these forces [length / time], of the two centres: neither spins nor the motion
+  // of a wall are in it
+  std::array<double, 3> sliding;
+  std::array<double, 2> radius;    // of side 1 and side 2 [length]; 0 for a wall
+  std::array<int, 2> type;         // LAMMPS's atom types; 0 for a wall
 };
 
+// What a contact asks for in a step: the gap, and which impulses it may carry.
 struct Demand {
-  bool parts =
-      false;    // whether s is asked for, too, in place of D + h n.u >= 0 where that is less
+  // Whether s is asked for, too, in place of D + h n.u >= 0 where that is less
+  bool parts = false;
   double parting_speed = 0.0;    // s [length / time], >= 0
-  double least_impulse = 0.0;    // l [mass length / time], <= 0
+  HalfLine<double> set;          // [mass length / time]
 
-  bool is_inelastic() const { return !parts && least_impulse == 0.0; }
+  bool is_inelastic() const { return !parts && !set.may_pull(); }
+};
+
+// The impulse that a contact has carried in a step, on side 1.
+struct Impulse {
+  double normal = 0.0;                   // lambda [mass length / time]
+  std::array<double, 3> tangential{};    // across n [mass length / time]; 0 for a half line
 };
 
 class ContactLaw {
@@ -59,12 +74,18 @@ class ContactLaw {
   // Returns what a contact asks for in a step. `remembered` has remembers() values.
   virtual Demand ask(const ContactState &contact, const double *remembered) const = 0;
 
-  // Takes the impulse [mass length / time] that a contact has carried in a step that is solved, and
-  // sets what is remembered of it. Returns whether that must be kept: such a contact belongs to the
+  // Takes the impulse that a contact has carried in a step that is solved, and sets what is
+  // remembered of it. Returns whether that must be kept: such a contact belongs to the
   // next step whether it touches or not, and is in the output; one that need not be kept begins
   // anew. Where a run begins, half of the last step is made again, and this takes the difference to
   // what it took before.
-  virtual bool remember(double /*impulse*/, double * /*remembered*/) const { return false; }
+  virtual bool remember(const Impulse & /*impulse*/, double * /*remembered*/) const
+  { return false; }
+
+  // Turns what is remembered round, as it is seen with the sides exchanged and n the other way:
+  // each of two particles keeps a copy of its own. Numbers along n stay. A vector across n, such as
+  // a tangential impulse, changes its sign.
+  virtual void turn_round(double * /*remembered*/) const {}
 };
 
 // Makes a law of the words that follow its name in `law NAME ...`. Returns nullptr, and says in

@@ -8,11 +8,11 @@
 namespace inelastic {
 
 Demand Gluey::ask(const ContactState &, const double *remembered) const
-{ return {false, 0.0, remembered[0]}; }
+{ return {false, 0.0, {remembered[0]}}; }
 
-bool Gluey::remember(double impulse, double *remembered) const
+bool Gluey::remember(const Impulse &impulse, double *remembered) const
 {
-  remembered[0] = std::max(-limit_, std::min(0.0, remembered[0] - impulse));
+  remembered[0] = std::max(-limit_, std::min(0.0, remembered[0] - impulse.normal));
   return remembered[0] < 0.0;
 }
 

@@ -25,7 +25,7 @@ class Gluey final : public ContactLaw {
 
   int remembers() const override { return 1; }
   Demand ask(const ContactState &contact, const double *remembered) const override;
-  bool remember(double impulse, double *remembered) const override;
+  bool remember(const Impulse &impulse, double *remembered) const override;
 
  private:
   double limit_;
