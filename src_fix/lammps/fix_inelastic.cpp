@@ -338,7 +338,7 @@ void FixInelastic::advance(int vflag, Kick kick)
         "than 0 steps",
         group->names[igroup]);
   length_.restore();
-  step_.kick = kick;
+  step_.begin(kick);
   check_.before_step();
   inelastic::ProjectionResult result = solve();
   if (rest_.look(result)) refine(result);

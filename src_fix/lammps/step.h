@@ -12,6 +12,7 @@
 #include "atom.h"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -34,36 +35,28 @@ constexpr double COINCIDENT = 1.0e-10;
 // This value is below (with a minus sign) or above every value that is compared with it.
 constexpr double EXTREME = 1.0e300;
 
-struct Step {
-  explicit Step(const Settings &of_fix) : settings(of_fix), has_bodies(of_fix.has_bodies()) {}
-
-  const Settings &settings;
-  const bool has_bodies;    // of the settings: asked for every particle
-
-  // Of the run. The room that writes a field stands behind it.
-
+// What lives as long as a run. The room that writes a field stands behind it, here and below.
+struct RunState {
   // A step of this run came before, so that momenta are carried along and its prediction can be
   // compared with what moved. (motion_check)
   bool continues = false;
   // [time] as the deck sets it; problem.timestep may be shorter (step_length)
   double regular_timestep = 0.0;
   double largest_radius = 0.0;    // [length] in the group, on all ranks (step_length)
+};
 
-  // Of the step: where forces act.
-
+// What is known of a step beside its problem. It is made anew for each step, so that nothing of the
+// last one can be taken for something of this one.
+struct StepState {
   Kick kick = Kick::WHOLE;    // (fix_inelastic)
   // The time for which forces act before the next move, in units that turn a force into a momentum.
   // (fix_inelastic)
   double impulse_per_force = 0.0;
 
-  // The problem. Particles are the owned atoms, then the ghosts. (sizes: fix_inelastic; velocities
-  // and masses: the movers; bodies: body_members, body_inertia; contacts: contact_rows, and their
-  // gaps gap_rules and push_apart; impulses: the solver)
-  inelastic::ContactProblem problem;
   std::vector<Contact> contacts;    // (contact_rows)
   std::vector<Row> rows;            // one per row of the problem (contact_rows, gap_rules)
-  std::vector<LawState>
-      law_states;    // one per contact; empty without a contact law (law_contacts)
+  // One per contact; empty without a contact law. (law_contacts)
+  std::vector<LawState> law_states;
   // 3 per slot, before forces; only with a law (the movers)
   std::vector<double> velocity_before;
   // 3 per particle, of which the first is the factor by which the forces on one that is at rest
@@ -71,15 +64,13 @@ struct Step {
   // (rest)
   std::vector<double> load_change;
 
-  // Of the step: what solves it.
-
+  // What solves it.
   std::vector<double> velocity;    // 3 per slot, the projection (the core, hold_still)
   // 3 per slot, the mean velocity during the step; only in a scene with bodies, which turn (the
   // movers)
   std::vector<double> motion_of_bodies;
 
-  // Of the step, known after constraints were collected.
-
+  // What is known after constraints were collected.
   Phase phase = Phase::CONTACT;    // (constraints, push_apart)
   bool bad_start = false;    // some overlap at the start is beyond the regular ones (overlap_watch)
   // Regular overlaps are given back by the push out of bad ones alone. (fix_inelastic)
@@ -94,6 +85,34 @@ struct Step {
   // What went wrong on this rank while collecting; empty if nothing. (pair_constraints,
   // wall_constraints)
   std::string problem_found;
+};
+
+struct Step : RunState, StepState {
+  explicit Step(const Settings &of_fix) : settings(of_fix), has_bodies(of_fix.has_bodies()) {}
+
+  const Settings &settings;
+  const bool has_bodies;    // of the settings: asked for every particle
+
+  // The problem. Particles are the owned atoms, then the ghosts. Bodies are those since the last
+  // neighbour list, all else is of the step. (sizes: fix_inelastic; velocities and masses: the
+  // movers; bodies: body_members, body_inertia; contacts: contact_rows, and their gaps gap_rules
+  // and push_apart; impulses: the solver)
+  inelastic::ContactProblem problem;
+
+  // Forgets the last step. Arrays keep their room.
+  void begin(Kick of_step)
+  {
+    StepState last;
+    std::swap(last, static_cast<StepState &>(*this));
+    kick = of_step;
+    const auto keep_room = [&](auto... arrays) {
+      ((this->*arrays).swap(last.*arrays), ...);
+      ((this->*arrays).clear(), ...);
+    };
+    keep_room(&StepState::contacts, &StepState::rows, &StepState::law_states,
+              &StepState::velocity_before, &StepState::load_change, &StepState::velocity,
+              &StepState::motion_of_bodies);
+  }
 
   // The part of a whole kick for which the forces act.
   double kicks() const { return kick == Kick::WHOLE ? 1.0 : 0.5; }
