@@ -21,6 +21,41 @@ namespace {
     return sizeof(Real) == sizeof(double) ? 0.0 : PART * largest_change;
   }
 
+  // If double precision refuses so many residuals that single precision finds within the tolerance,
+  // round-off shows and this search is given up. (It also refuses where a constraint was idle for
+  // too long, once or twice in a solve.)
+  constexpr long MOST_FAILURES = 8;
+  // Idle constraints are looked at in every so many iterations. A constraint is idle above so many
+  // residuals, or tolerances where they are more: gaps change by some residuals until the end.
+  // (With tolerances alone a bed at rest moved up to four times as fast, measured: contacts that
+  // closed in the step came in late.)
+  constexpr long LOOK_EVERY = 20;
+  constexpr double IDLE_GAP = 5.0;
+
+  // Changes of velocity, and with them the targets, move most in the first iterations of a search.
+  constexpr long TARGETS_EVERY = 20;
+  bool sets_targets(long iteration)
+  {
+    return iteration == 2 || iteration == 4 || iteration == 8 || iteration == 14 ||
+        iteration % TARGETS_EVERY == 0;
+  }
+
+  // In a chain residuals add up, and what is left of a velocity is many times what is left of a
+  // gap. So a search goes on where velocities differ from those that a half to two thirds as many
+  // iterations had found by more than a fortieth of what contacts change: this part of the
+  // sixteenth that targets are of it (contact_targets.cpp; of bodies a third as much).
+  constexpr double MOST_MOVED = 0.4;
+
+  // Tells whether velocities have come to what they end with. Collective.
+  template <typename Real>
+  bool has_settled(PackedIterations<Real> &iterations, double accuracy, Host &host)
+  {
+    iterations.set_targets();
+    double moved = iterations.moved_since_kept(accuracy);
+    host.reduce(nullptr, 0, &moved, 1);
+    return moved <= MOST_MOVED;
+  }
+
   // The weights of accelerated_gradient.h.
   class Momentum {
    public:
@@ -130,29 +165,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
                                              ContactProblem &problem, const SolverLimits &limits,
                                              const Scales &scales, Host &host, SolverResult &result)
 {
-  // If double precision refuses so many residuals that single precision finds within the tolerance,
-  // round-off shows and this search is given up. (It also refuses where a constraint was idle for
-  // too long, once or twice in a solve.)
-  constexpr long MOST_FAILURES = 8;
-  // Idle constraints are looked at in every so many iterations. A constraint is idle above so many
-  // residuals, or tolerances where they are more: gaps change by some residuals until the end.
-  // (With tolerances alone a bed at rest moved up to four times as fast, measured: contacts that
-  // closed in the step came in late.)
-  constexpr long LOOK_EVERY = 20;
-  constexpr double IDLE_GAP = 5.0;
   constexpr bool SINGLE = sizeof(Real) < sizeof(double);
-
-  // Changes of velocity, and with them the targets, move most in the first iterations of a search.
-  constexpr long TARGETS_EVERY = 20;
-  const auto sets_targets = [](long iteration) {
-    return iteration == 2 || iteration == 4 || iteration == 8 || iteration == 14 ||
-        iteration % TARGETS_EVERY == 0;
-  };
-  // In a chain residuals add up, and what is left of a velocity is many times what is left of a
-  // gap. So a search goes on where velocities differ from those that a half to two thirds as many
-  // iterations had found by more than a fortieth of what contacts change: this part of the
-  // sixteenth that targets are of it (contact_targets.cpp; of bodies a third as much).
-  constexpr double MOST_MOVED = 0.4;
   const bool by_velocity = limits.accuracy > 0.0 && limits.coarseness == 1.0;
 
   iterations.prepare(problem, diagonal_, gap_,
@@ -179,12 +192,9 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
 
     blur = least_residual<Real>(passed.farthest);
     bool solved = passed.unsolved_beyond_blur <= 1.0 && result.iterations >= next_check;
-    if (solved && by_velocity) {
-      iterations.set_targets();
-      double moved = iterations.moved_since_kept(limits.accuracy);
-      host.reduce(nullptr, 0, &moved, 1);
-      solved = moved <= MOST_MOVED;
-      if (!solved) next_check = result.iterations + std::max(3L, result.iterations / 10);
+    if (solved && by_velocity && !has_settled(iterations, limits.accuracy, host)) {
+      solved = false;
+      next_check = result.iterations + std::max(3L, result.iterations / 10);
     }
     if (solved) {
       iterations.impulses_before(scales, impulse);

@@ -194,33 +194,11 @@ bool Rest::is_held(int i, const Motion &motion) const
 
 void Rest::measure_clusters()
 {
-  const inelastic::ContactProblem &problem = step_.problem;
-  enum { MASS, CENTRE, MOMENTUM = 4, ANGULAR = 7, INERTIA = 10, SPEEDS = 16, STEPS, NUMBER, SUMS };
-  enum { SUPPORTED, DRIVEN, MAXIMA };
   std::vector<double> sums(SUMS * clusters_.size(), 0.0);
   std::vector<double> maxima(MAXIMA * clusters_.size(), -EXTREME);
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!counts(i)) continue;
-    double *const s = &sums[SUMS * static_cast<std::size_t>(clusters_.of(i))];
-    const double mass = mass_of(atom, i);
-    const double *const x = atom->x[i], *const v = velocity(i);
-    double moment[3];
-    cross(x, v, moment);
-    const double square = dot(x, x);
-    s[MASS] += mass;
-    for (int d = 0; d < 3; ++d) {
-      s[CENTRE + d] += mass * x[d];
-      s[MOMENTUM + d] += mass * v[d];
-      s[ANGULAR + d] += mass * moment[d];
-      s[INERTIA + d] += mass * (square - x[d] * x[d]);
-    }
-    s[INERTIA + 3] -= mass * x[0] * x[1];
-    s[INERTIA + 4] -= mass * x[0] * x[2];
-    s[INERTIA + 5] -= mass * x[1] * x[2];
-    s[SPEEDS] += norm(&problem.predicted_velocity[3 * static_cast<std::size_t>(i)]);
-    s[STEPS] += state_.quiet_steps(i);
-    s[NUMBER] += 1.0;
-  }
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (counts(i)) add_particle(i, &sums[SUMS * static_cast<std::size_t>(clusters_.of(i))]);
+  const inelastic::ContactProblem &problem = step_.problem;
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
     const bool one = clusters_.is_mobile(i), other = clusters_.is_mobile(j);
@@ -233,40 +211,68 @@ void Rest::measure_clusters()
   }
   clusters_.over_ranks(SUMS, sums, MAXIMA, maxima);
   motions_.assign(clusters_.size(), ClusterMotion{});
-  for (std::size_t k = 0; k < motions_.size(); ++k) {
-    const double *const s = &sums[SUMS * k], *const m = &maxima[MAXIMA * k];
-    ClusterMotion &cluster = motions_[k];
-    if (!(s[MASS] > 0.0)) continue;
-    cluster.mass = s[MASS];
-    cluster.without_contacts = s[SPEEDS] / s[NUMBER];
-    // Of most of its particles: single ones that come to it, and have not been quiet, do not begin
-    // the count anew.
-    cluster.quiet_steps = std::round(s[STEPS] / s[NUMBER]);
-    cluster.supported = m[SUPPORTED] > 0.0;
-    cluster.driven = m[DRIVEN] > 0.0;
-    for (int d = 0; d < 3; ++d) {
-      cluster.centre[d] = s[CENTRE + d] / s[MASS];
-      cluster.velocity[d] = s[MOMENTUM + d] / s[MASS];
-    }
-    double square = dot(cluster.velocity.data(), cluster.velocity.data());
-    // Through periodic boundaries a cluster has no centre.
-    if (!Periods(lmp).any()) {
-      double of_centre[3], about_centre[3], inertia[6];
-      cross(cluster.centre.data(), s + MOMENTUM, of_centre);
-      const double *const x = cluster.centre.data();
-      const double far = dot(x, x);
-      for (int d = 0; d < 3; ++d) {
-        about_centre[d] = s[ANGULAR + d] - of_centre[d];
-        inertia[d] = s[INERTIA + d] - s[MASS] * (far - x[d] * x[d]);
-      }
-      inertia[3] = s[INERTIA + 3] + s[MASS] * x[0] * x[1];
-      inertia[4] = s[INERTIA + 4] + s[MASS] * x[0] * x[2];
-      inertia[5] = s[INERTIA + 5] + s[MASS] * x[1] * x[2];
-      solve_symmetric(inertia, s[MASS] * far, about_centre, cluster.angular_velocity.data());
-      square += dot(about_centre, cluster.angular_velocity.data()) / s[MASS];
-    }
-    cluster.speed = std::sqrt(std::max(0.0, square));
+  for (std::size_t k = 0; k < motions_.size(); ++k)
+    motions_[k] = motion_of_cluster(&sums[SUMS * k], &maxima[MAXIMA * k]);
+}
+
+// Adds an owned particle to the sums of its cluster.
+void Rest::add_particle(int i, double *s) const
+{
+  const double mass = mass_of(atom, i);
+  const double *const x = atom->x[i], *const v = velocity(i);
+  double moment[3];
+  cross(x, v, moment);
+  const double square = dot(x, x);
+  s[MASS] += mass;
+  for (int d = 0; d < 3; ++d) {
+    s[CENTRE + d] += mass * x[d];
+    s[MOMENTUM + d] += mass * v[d];
+    s[ANGULAR + d] += mass * moment[d];
+    s[INERTIA + d] += mass * (square - x[d] * x[d]);
   }
+  s[INERTIA + 3] -= mass * x[0] * x[1];
+  s[INERTIA + 4] -= mass * x[0] * x[2];
+  s[INERTIA + 5] -= mass * x[1] * x[2];
+  s[SPEEDS] += norm(&step_.problem.predicted_velocity[3 * static_cast<std::size_t>(i)]);
+  s[STEPS] += state_.quiet_steps(i);
+  s[NUMBER] += 1.0;
+}
+
+// The motion of a cluster from its sums and maxima over all ranks.
+Rest::ClusterMotion Rest::motion_of_cluster(const double *s, const double *m) const
+{
+  ClusterMotion cluster;
+  if (!(s[MASS] > 0.0)) return cluster;
+  cluster.mass = s[MASS];
+  cluster.without_contacts = s[SPEEDS] / s[NUMBER];
+  // Of most of its particles: single ones that come to it, and have not been quiet, do not begin
+  // the count anew.
+  cluster.quiet_steps = std::round(s[STEPS] / s[NUMBER]);
+  cluster.supported = m[SUPPORTED] > 0.0;
+  cluster.driven = m[DRIVEN] > 0.0;
+  for (int d = 0; d < 3; ++d) {
+    cluster.centre[d] = s[CENTRE + d] / s[MASS];
+    cluster.velocity[d] = s[MOMENTUM + d] / s[MASS];
+  }
+  double square = dot(cluster.velocity.data(), cluster.velocity.data());
+  // Through periodic boundaries a cluster has no centre.
+  if (!Periods(lmp).any()) {
+    double of_centre[3], about_centre[3], inertia[6];
+    cross(cluster.centre.data(), s + MOMENTUM, of_centre);
+    const double *const x = cluster.centre.data();
+    const double far = dot(x, x);
+    for (int d = 0; d < 3; ++d) {
+      about_centre[d] = s[ANGULAR + d] - of_centre[d];
+      inertia[d] = s[INERTIA + d] - s[MASS] * (far - x[d] * x[d]);
+    }
+    inertia[3] = s[INERTIA + 3] + s[MASS] * x[0] * x[1];
+    inertia[4] = s[INERTIA + 4] + s[MASS] * x[0] * x[2];
+    inertia[5] = s[INERTIA + 5] + s[MASS] * x[1] * x[2];
+    solve_symmetric(inertia, s[MASS] * far, about_centre, cluster.angular_velocity.data());
+    square += dot(about_centre, cluster.angular_velocity.data()) / s[MASS];
+  }
+  cluster.speed = std::sqrt(std::max(0.0, square));
+  return cluster;
 }
 
 // What needs the motion of the clusters: what resists it, and how fast held particles are beside

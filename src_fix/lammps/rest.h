@@ -84,7 +84,12 @@ class Rest : protected Pointers {
   Motion motion_of(int i) const;
   bool is_held(int i, const Motion &motion) const;
   double unit(int i, const Motion &motion) const;
+  // Of a cluster: sums over its particles, and maxima over its contacts.
+  enum { MASS, CENTRE, MOMENTUM = 4, ANGULAR = 7, INERTIA = 10, SPEEDS = 16, STEPS, NUMBER, SUMS };
+  enum { SUPPORTED, DRIVEN, MAXIMA };
   void measure_clusters();
+  void add_particle(int i, double *sums) const;
+  ClusterMotion motion_of_cluster(const double *sums, const double *maxima) const;
   void measure_clusters_by_motion();
   bool is_quiet(const ClusterMotion &cluster) const;
   bool moves(const ClusterMotion &cluster) const;
