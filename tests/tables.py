@@ -231,7 +231,7 @@ def turning(seeds: int) -> Iterator[str]:
     phases = {"steps_agitated": 400, "steps_settling": 200}
     phases |= {"steps_resting": 0, "steps_tightening": 0, "steps_measuring": 0}
     with tempfile.TemporaryDirectory() as name:
-        plugins = [build(Path(name) / f"{len(cuts)}", cuts) for cuts in (TURNING, [])]
+        plugins = [build(Path(name) / "without", TURNING), build(Path(name) / "with", {})]
         for ratio in (1.05, 1.5, 2.0):
             runs: list[list[Projections]] = [[], []]
             for seed in range(1, seeds + 1):
