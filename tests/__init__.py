@@ -1,4 +1,4 @@
-"""The tests, what they share, the benchmark and the documentation's tables.
+"""The tests, what helps them (helpers), the benchmark and the documentation's tables.
 
-All is imported by full names, such as tests.fix.scenes, from the repository's folder.
+All is imported by full names, such as tests.helpers.scenes, from the repository's folder.
 """

@@ -28,11 +28,11 @@ from PIL import Image
 from lammps_inelastic.analysis import ParticleDump, draw_packing, read_run_log
 from lammps_inelastic.analysis.pictures import few_colours
 from lammps_inelastic.analysis.run_log import Run as RunOfLog
-from tests.beds import BEDS, at_rest
 from tests.benchmark.scenes_without import TURNING, build
-from tests.convergence import ACCURACIES, STEPS, TOLERANCES
-from tests.convergence import SCENES as EXACT
-from tests.pouring import (
+from tests.helpers.beds import BEDS, at_rest
+from tests.helpers.convergence import ACCURACIES, STEPS, TOLERANCES
+from tests.helpers.convergence import SCENES as EXACT
+from tests.helpers.pouring import (
     Packing,
     Projections,
     measure,
@@ -42,7 +42,7 @@ from tests.pouring import (
     shipped_deck,
     summed,
 )
-from tests.statics import bulk_stress, statics_of_run
+from tests.helpers.statics import bulk_stress, statics_of_run
 
 GRAVITY, RADIUS = 9.81, 0.055
 # So that every bed of dimers covers the paper's box

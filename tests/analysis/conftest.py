@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.analysis.written_dumps import (
+from tests.helpers.written_dumps import (
     CONTACT_COLUMNS,
     PARTICLE_COLUMNS,
     Rows,

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from lammps_inelastic.analysis import Cell, InputError
 from lammps_inelastic.analysis.geometry import FloatArray, IntArray, inside_of
-from tests.analysis.replicas import moves_within
+from tests.helpers.replicas import moves_within
 
 # The same examples on every machine.
 RANDOM = settings(derandomize=True, deadline=None, max_examples=60)

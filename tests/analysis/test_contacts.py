@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import ContactFrame, DumpError, iterate_contact_frames
-from tests.analysis.written_dumps import Writer
+from tests.helpers.written_dumps import Writer
 
 PAIR = [3, 8, 0.1, 0.2, 0.3, 0.0, 1.0, 0.0, -1.0000000000000001e-05, 1.0 / 3.0]
 WALL = [8, -3, 0.5, 0.0, 0.5, 0.0, 1.0, 0.0, 2e-6, 0.25]

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from lammps_inelastic.analysis import DumpError, ParticleDump, iterate_contact_frames
 from lammps_inelastic.workflow.main import main
-from tests.analysis.written_dumps import CONTACT_COLUMNS, PARTICLE_COLUMNS, frame_text
+from tests.helpers.written_dumps import CONTACT_COLUMNS, PARTICLE_COLUMNS, frame_text
 
 # The same examples on every machine; a folder may serve all examples of a test, each writes anew.
 FUZZED = settings(

@@ -19,7 +19,7 @@ from lammps_inelastic.analysis import (
     plateau,
     plot_evolution,
 )
-from tests.analysis.written_dumps import Rows, Writer
+from tests.helpers.written_dumps import Rows, Writer
 
 BOX = [[0, 1], [0, 1], [0, 1]]
 

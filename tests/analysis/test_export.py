@@ -40,7 +40,7 @@ from lammps_inelastic.analysis import (
     write_xyz,
 )
 from lammps_inelastic.analysis.geometry import FloatArray
-from tests.analysis.touching_spheres import CELLS, PERIODIC, scene
+from tests.helpers.touching_spheres import CELLS, PERIODIC, scene
 
 UNIT = [[0, 1]] * 3
 ONE = Spheres([[0.5] * 3], [0.5])

@@ -14,7 +14,7 @@ import trimesh
 from PIL import Image
 
 from lammps_inelastic.workflow.main import main
-from tests.analysis.written_dumps import Rows, Writer
+from tests.helpers.written_dumps import Rows, Writer
 
 CENTRES = np.array([(0.3, 1, 0.5), (0.4, 1, 0.5), (0.6, 1.5, 0.5)])
 RADIUS = 0.125

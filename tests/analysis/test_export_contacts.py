@@ -24,7 +24,7 @@ from lammps_inelastic.analysis import (
     write_contacts_csv,
     write_contacts_vtk,
 )
-from tests.analysis.touching_spheres import CELLS, PERIODIC, Scene, lengths, scene, turned
+from tests.helpers.touching_spheres import CELLS, PERIODIC, Scene, lengths, scene, turned
 
 # Sums and differences of numbers below 10.
 ROUND_OFF = 1e-13

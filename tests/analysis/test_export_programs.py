@@ -19,8 +19,8 @@ from lammps_inelastic.analysis import (
     write_vtk,
     write_xyz,
 )
-from tests.analysis.touching_spheres import CELLS, Scene, lengths, scene, turned
-from tests.conftest import missing
+from tests.helpers.programs import missing
+from tests.helpers.touching_spheres import CELLS, Scene, lengths, scene, turned
 
 pytestmark = pytest.mark.slow
 

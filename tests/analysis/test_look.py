@@ -23,7 +23,7 @@ from lammps_inelastic.analysis import (
 )
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.measure import SEED, _packing_fractions
-from tests.analysis.written_dumps import Writer
+from tests.helpers.written_dumps import Writer
 
 RADIUS, EXCESS = 0.1, 1e-4
 CELLS = 5

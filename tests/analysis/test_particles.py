@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import DumpError, InputError, ParticleDump, read_particle_frame
-from tests.analysis.written_dumps import Writer
+from tests.helpers.written_dumps import Writer
 
 FIRST = [1, 1, 0.12345678901234567, 0.1, 0.5, 0.0, -1.0 / 3.0, 0.0, 0.055]
 SECOND = [2, 1, 0.7, 1e-17, 0.5, 1e-300, 0.0, 2.0, 0.11]

@@ -39,7 +39,7 @@ from lammps_inelastic.analysis import (
     wall_profile_monte_carlo,
 )
 from lammps_inelastic.analysis.geometry import FloatArray
-from tests.analysis.replicas import (
+from tests.helpers.replicas import (
     CELLS,
     PLANES,
     TURN,

@@ -21,8 +21,8 @@ from lammps_inelastic.analysis import (
     read_particle_frame,
 )
 from lammps_inelastic.analysis.geometry import FloatArray
-from tests.analysis.replicas import CELLS, PLANES, Packing, in_plane, in_space, size_of_box, union
-from tests.analysis.written_dumps import CONTACT_COLUMNS
+from tests.helpers.replicas import CELLS, PLANES, Packing, in_plane, in_space, size_of_box, union
+from tests.helpers.written_dumps import CONTACT_COLUMNS
 
 COORDINATES = ("x y z", "xu yu zu", "xs ys zs", "xsu ysu zsu")
 EVERY = [

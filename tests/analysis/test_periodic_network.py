@@ -23,7 +23,7 @@ from lammps_inelastic.analysis import (
     group_spheres,
 )
 from lammps_inelastic.analysis.geometry import FloatArray
-from tests.analysis.replicas import CELLS, PLANES, Packing, in_plane, in_space
+from tests.helpers.replicas import CELLS, PLANES, Packing, in_plane, in_space
 
 GAP = 0.25
 EVERY = [

@@ -20,7 +20,7 @@ from PIL import Image
 from scipy import ndimage
 
 from lammps_inelastic.analysis import Cell, PackingView, Spheres, group_spheres, write_view
-from tests.fix.lammps_run import LAUNCHER
+from tests.helpers.lammps_run import LAUNCHER
 
 pytestmark = pytest.mark.slow
 

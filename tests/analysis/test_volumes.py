@@ -21,7 +21,7 @@ from lammps_inelastic.analysis import (
     sphere_volumes_in_box,
 )
 from lammps_inelastic.analysis.geometry import FloatArray
-from tests.analysis.integration import ball_in_box, dimer_in_box, integrate
+from tests.helpers.integration import ball_in_box, dimer_in_box, integrate
 
 UNIT = [[0, 1]] * 3
 BALL = 4 / 3 * np.pi

@@ -11,8 +11,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests import building
-from tests.pouring import NO_STEPS, Projections, projections, run_deck, summed
+from tests.helpers import building
+from tests.helpers.pouring import NO_STEPS, Projections, projections, run_deck, summed
 
 ROOT = Path(__file__).parents[2]
 

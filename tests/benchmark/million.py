@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 from lammps_inelastic.analysis import ParticleDump, draw_packing
-from tests.pouring import NO_STEPS, projections, run_deck, shipped_deck, summed
-from tests.pouring import measure as measure_packing
+from tests.helpers.pouring import NO_STEPS, projections, run_deck, shipped_deck, summed
+from tests.helpers.pouring import measure as measure_packing
 
 PARTICLES = 1_000_000
 RANKS = 2

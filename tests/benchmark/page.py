@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from lammps_inelastic.analysis import PackingView, Spheres, contacts_by_distance, write_view
-from tests.conftest import BROWSER, OPTIONS
+from tests.helpers.programs import BROWSER, OPTIONS
 
 SPHERES, CONTACTS = 10_000, 28_000
 SECONDS, WARM_UP = 6.0, 2.0

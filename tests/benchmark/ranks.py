@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import iterate_contact_frames, read_particle_frame
 from tests.benchmark.million import diameter_of
-from tests.pouring import NO_STEPS, Projections, projections, run_deck, shipped_deck, summed
+from tests.helpers.pouring import NO_STEPS, Projections, projections, run_deck, shipped_deck, summed
 
 TIME = 2.0
 TOLERANCE = 0.005  # radii

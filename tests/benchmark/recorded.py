@@ -24,7 +24,7 @@ from lammps_inelastic.workflow.tradeoff.states import (
     problems_of,
     timed,
 )
-from tests.pouring import NO_STEPS, run_deck, shipped_deck
+from tests.helpers.pouring import NO_STEPS, run_deck, shipped_deck
 
 TOLERANCES = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
 UZAWA_TOLERANCES = (5e-3, 5e-4)  # it takes about ten times as long for each digit

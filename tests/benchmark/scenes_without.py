@@ -20,9 +20,9 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from tests import building
-from tests.cpp_functions import give_bodies
-from tests.fix.lammps_run import without_launcher
+from tests.helpers import building
+from tests.helpers.cpp_functions import give_bodies
+from tests.helpers.lammps_run import without_launcher
 
 ROOT = Path(__file__).parents[2]
 REPEATS = 9

@@ -17,11 +17,10 @@ from tests.benchmark.scenes_without import (
     run,
     scene,
 )
-from tests.cpp_functions import functions, give_bodies
-from tests.fix.bodies import body_scene, dimer, placed
-from tests.fix.lammps_run import run_lmp
-from tests.fix.scenes import scene as scene_of
-from tests.fix.test_plugin import plugin_file
+from tests.helpers.bodies import body_scene, dimer, placed
+from tests.helpers.cpp_functions import functions, give_bodies
+from tests.helpers.lammps_run import plugin_file, run_lmp
+from tests.helpers.scenes import scene as scene_of
 
 RADIUS = 0.05
 EPS = 0.001 * RADIUS

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lammps_inelastic import core
-from tests.core.contact_problems import Problem, bricks, column, heap
-from tests.grainwise import (
+from tests.helpers.contact_problems import Problem, bricks, column, heap
+from tests.helpers.grainwise import (
     ACCURACY,
     QUIET,
     clarabel_impulses,

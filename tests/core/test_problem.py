@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from tests.core.contact_problems import UP, WALL, Floats, heap, problem
+from tests.helpers.contact_problems import UP, WALL, Floats, heap, problem
 
 NOT_FINITE = [np.nan, np.inf, -np.inf]
 

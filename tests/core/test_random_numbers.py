@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from tests.core.contact_problems import Floats
+from tests.helpers.contact_problems import Floats
 
 WORD = 2**32
 

@@ -9,8 +9,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tests.core.contact_problems import WALL, Floats, Problem, assert_within, in_bodies, no_bodies
-from tests.core.reference_solver import NotSolvedError, reference
+from tests.helpers.contact_problems import (
+    WALL,
+    Floats,
+    Problem,
+    assert_within,
+    in_bodies,
+    no_bodies,
+)
+from tests.helpers.reference_solver import NotSolvedError, reference
 
 # The same examples on every machine.
 RANDOM = settings(derandomize=True, deadline=None, max_examples=400)

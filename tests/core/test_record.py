@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from tests.docs.blocks import blocks_of
+from tests.helpers.blocks import blocks_of
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
 

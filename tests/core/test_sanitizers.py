@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.building import REPOSITORY, cmake, generator, run
+from tests.helpers.building import REPOSITORY, cmake, generator, run
 
 
 @pytest.mark.slow

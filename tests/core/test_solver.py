@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import isotonic_regression
 
 from lammps_inelastic import core
-from tests.core.contact_problems import (
+from tests.helpers.contact_problems import (
     UP,
     WALL,
     Contact,

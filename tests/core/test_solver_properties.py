@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from tests.core.contact_problems import (
+from tests.helpers.contact_problems import (
     WALL,
     Problem,
     assert_within,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from tests.core.contact_problems import (
+from tests.helpers.contact_problems import (
     Problem,
     assert_within,
     bricks,
@@ -19,7 +19,7 @@ from tests.core.contact_problems import (
     problem,
     row,
 )
-from tests.core.reference_solver import reference
+from tests.helpers.reference_solver import reference
 
 # [diameters] A ten-thousand-millionth of one step's motion, not far above what float64 resolves.
 TOLERANCE = 1e-13

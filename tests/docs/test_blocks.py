@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from .blocks import Block, blocks_of, prints, unexplained
+from tests.helpers.blocks import Block, blocks_of, prints, unexplained
 
 ROOT = Path(__file__).parents[2]
 # The reference has tests of its own, which know its tables, its syntax and its decks.
@@ -55,7 +55,7 @@ def run_page(blocks: list[Block], folder: Path) -> str:
     environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
     environment |= {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"}
     run = subprocess.run(
-        [sys.executable, "-m", "tests.docs.page_run", "blocks.json", "results.json"],
+        [sys.executable, "-m", "tests.helpers.page_run", "blocks.json", "results.json"],
         cwd=folder,
         env=environment,
         capture_output=True,

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from .blocks import Block, blocks_of
-from .notebook import PAGES, TUTORIALS, notebook_of
+from tests.helpers.blocks import Block, blocks_of
+from tests.notebook import PAGES, TUTORIALS, notebook_of
+
 from .test_blocks import run_page
 
 
@@ -21,7 +22,7 @@ def code_of(page: Path) -> list[str]:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_notebook_is_its_page(page: Path) -> None:
     assert page.with_suffix(".ipynb").read_text() == notebook_of(page.read_text(), PAGES[page]), (
-        "run python -m tests.docs.notebook"
+        "run python -m tests.notebook"
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fix.lammps_run import Run, Runner, run_lmp
+from tests.helpers.lammps_run import Run, Runner, run_lmp
 
 
 @pytest.fixture

@@ -15,9 +15,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.fix.lammps_run import OF_A_LAUNCHER
+from tests.helpers.lammps_run import OF_A_LAUNCHER
 
-SERVER = Path(__file__).with_name("argument_server.py")
+SERVER = Path(__file__).parents[1] / "helpers" / "argument_server.py"
 # [s] An answer takes 0.01.
 PATIENCE = 30.0
 # The same examples on every machine; all examples share the server.

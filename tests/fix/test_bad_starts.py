@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     deepest_in_box,
     deepest_pair,

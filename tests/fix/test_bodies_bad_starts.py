@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     BENT,
     BODY_THERMO,
     DUMP_BODY_SPHERES,
@@ -19,8 +19,8 @@ from tests.fix.bodies import (
     placed,
     random_bodies,
 )
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import deepest_in_box, deepest_pair, mass, read_dump
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import deepest_in_box, deepest_pair, mass, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     BENT,
     DUMP_BODY_SPHERES,
     INERTIAS,
@@ -23,8 +23,8 @@ from tests.fix.bodies import (
     random_bodies,
     rigid_velocities,
 )
-from tests.fix.lammps_run import Runner, run_lmp
-from tests.fix.scenes import DIVISIONS, FloatArray, deepest_pair, read_dump
+from tests.helpers.lammps_run import Runner, run_lmp
+from tests.helpers.scenes import DIVISIONS, FloatArray, deepest_pair, read_dump
 
 RADIUS = 0.055
 EXACT = 5e-9 * RADIUS

@@ -16,8 +16,8 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from tests.fix.lammps_run import Runner
-from tests.pouring import FEW_STEPS
+from tests.helpers.lammps_run import Runner
+from tests.helpers.pouring import FEW_STEPS
 
 TIGHT = 0.00002  # [radii] the decks' tolerance in the last phase
 

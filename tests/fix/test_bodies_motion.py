@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     BENT,
     BODY_THERMO,
     DUMP_BODIES,
@@ -24,8 +24,8 @@ from tests.fix.bodies import (
     placed,
     rigid_velocities,
 )
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     FloatArray,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     DUMP_BODY_SPHERES,
     INERTIAS,
     ROD,
@@ -21,8 +21,8 @@ from tests.fix.bodies import (
     random_bodies,
     rigid_velocities,
 )
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import FloatArray, deepest_in_box, deepest_pair, read_dump
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import FloatArray, deepest_in_box, deepest_pair, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS

@@ -11,15 +11,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     DUMP_BODY_SPHERES,
     TETRAHEDRON,
     body_scene,
     dimer,
     random_bodies,
 )
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import FloatArray, mass, read_dump
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import FloatArray, mass, read_dump
 
 RADIUS = 0.055
 EPS = 0.0005 * RADIUS

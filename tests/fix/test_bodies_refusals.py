@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     BENT,
     DUMP_BODY_SPHERES,
     INERTIAS,
@@ -22,8 +22,8 @@ from tests.fix.bodies import (
     random_bodies,
     rigid_velocities,
 )
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import mass, read_dump
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import mass, read_dump
 
 RADIUS = 0.05
 EPS = 0.0005 * RADIUS

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     DUMP_BODIES,
     DUMP_BODY_SPHERES,
     INERTIAS,
@@ -22,8 +22,8 @@ from tests.fix.bodies import (
     random_bodies,
     rigid_velocities,
 )
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DUMP_CONTACTS,
     DUMP_FORCES,
     GRAVITY,

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.exact_scenes import MASS, spheres_of
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import DUMP_CONTACTS, DUMP_PARTICLES, read_dump
+from tests.helpers.exact_scenes import MASS, spheres_of
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import DUMP_CONTACTS, DUMP_PARTICLES, read_dump
 
 # Of the default
 ACCURACY = 1e-3

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.exact_scenes import RADIUS, STEP, spheres_of
-from tests.fix.lammps_run import Run, Runner
-from tests.fix.scenes import DUMP_PARTICLES, read_dump
+from tests.helpers.exact_scenes import RADIUS, STEP, spheres_of
+from tests.helpers.lammps_run import Run, Runner
+from tests.helpers.scenes import DUMP_PARTICLES, read_dump
 
 SPEED = 1.0  # of the lid
 EPS = 1e-3  # of spheres_of

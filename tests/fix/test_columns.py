@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.fix.exact_scenes import Column
+from tests.helpers.exact_scenes import Column
 
 KINDS: dict[str, dict[str, Any]] = {
     "stands": {},

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from tests.fix.lammps_run import Runner, run_lmp
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Runner, run_lmp
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     FloatArray,

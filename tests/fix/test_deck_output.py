@@ -11,7 +11,7 @@ import pytest
 
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.shipped import DECKS, PACK
-from tests.fix.lammps_run import Runner, run_lmp
+from tests.helpers.lammps_run import Runner, run_lmp
 
 POURED = {
     "particles": 20,

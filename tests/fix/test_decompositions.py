@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from tests.fix.bodies import Bodies, body_scene, dimer, random_bodies
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.bodies import Bodies, body_scene, dimer, random_bodies
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DIVISIONS,
     DUMP_CONTACTS,
     DUMP_FORCES,
@@ -146,7 +146,7 @@ def test_atoms_outside_the_group_are_ignored(tmp_path: Path, lmp: Runner) -> Non
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
     """Return the bed's frames on one rank, with LAMMPS's defaults."""
-    from tests.fix.lammps_run import run_lmp
+    from tests.helpers.lammps_run import run_lmp
 
     folder = tmp_path_factory.mktemp("reference")
     deck = scene(bed(), RADIUS, folder, tolerance=EXACT, box=BOX)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.fix.bodies import body_scene, dimer, random_bodies
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import DUMP_CONTACTS, DUMP_FORCES, DUMP_PARTICLES, random_points, scene
+from tests.helpers.bodies import body_scene, dimer, random_bodies
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import DUMP_CONTACTS, DUMP_FORCES, DUMP_PARTICLES, random_points, scene
 
 RADIUS = 0.06
 EPS = 0.0005 * RADIUS

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from tests.fix.exact_scenes import MASS, RADIUS, SETTLED, WEIGHT, path, spheres_of
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import DUMP_PARTICLES, GRAVITY, FloatArray
+from tests.helpers.exact_scenes import MASS, RADIUS, SETTLED, WEIGHT, path, spheres_of
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import DUMP_PARTICLES, GRAVITY, FloatArray
 
 # Of the approach of a pair that meets across a gap: half as much again as the accuracy.
 LEFT = 1.5e-3

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     DUMP_BODY_SPHERES,
     Bodies,
     body_scene,
     dimer,
     placed,
 )
-from tests.fix.lammps_run import Run, Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Run, Runner
+from tests.helpers.scenes import (
     DIVISIONS,
     DUMP_CONTACTS,
     DUMP_PARTICLES,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import ParticleDump, iterate_contact_frames, read_run_log
-from tests.fix.lammps_run import run_lmp
 from tests.fix.test_response_deck import PACKING, PARTICLES, RADIUS, shipped
+from tests.helpers.lammps_run import run_lmp
 
 WEIGHT = PARTICLES * math.pi / 6 * (2 * RADIUS) ** 3 * 9.81
 

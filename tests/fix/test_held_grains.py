@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from tests.fix.exact_scenes import FLOOR, RADIUS, STEP, WEIGHT, attraction, path, spheres_of
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import DUMP_PARTICLES, GRAVITY, FloatArray
+from tests.helpers.exact_scenes import FLOOR, RADIUS, STEP, WEIGHT, attraction, path, spheres_of
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import DUMP_PARTICLES, GRAVITY, FloatArray
 
 EPS = 1e-3
 KICK = GRAVITY * STEP

@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lammps_inelastic.analysis import Spheres, largest_pair_overlap
-from tests.fix.lammps_run import Run, Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Run, Runner
+from tests.helpers.scenes import (
     DUMP_CONTACTS,
     DUMP_PARTICLES,
     GRAVITY,

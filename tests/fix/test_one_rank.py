@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.fix.bodies import body_scene, dimer, placed
-from tests.fix.lammps_run import BIN, OF_A_LAUNCHER, Runner
-from tests.fix.scenes import scene
-from tests.fix.test_plugin import ELSEWHERE, HERE, plugin_file
+from tests.fix.test_plugin import ELSEWHERE, HERE
 from tests.fix.test_refusals import BOX, EPS, POINTS, RADIUS, deck
+from tests.helpers.bodies import body_scene, dimer, placed
+from tests.helpers.lammps_run import BIN, OF_A_LAUNCHER, Runner, plugin_file
+from tests.helpers.scenes import scene
 
 Refused = Callable[..., str]
 # [s] A run takes one; a rank that waited for another would wait for ever.

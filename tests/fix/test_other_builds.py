@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.building import REPOSITORY, TOOLS, cmake, generator, run
-from tests.fix.lammps_run import Runner
-from tests.pouring import FEW_STEPS
+from tests.helpers.building import REPOSITORY, TOOLS, cmake, generator, run
+from tests.helpers.lammps_run import Runner
+from tests.helpers.pouring import FEW_STEPS
 
 SCRIPT = REPOSITORY / "src_fix" / "lammps" / "lammps_to_build_for.cmake"
 # The release of the year before, and the MPI that its wheel needs beside it.

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from lammps_inelastic.plugin import include_folder
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import DUMP_PARTICLES, read_dump, scene
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import DUMP_PARTICLES, read_dump, scene
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "laws.md"
 RADIUS = 0.5

@@ -15,9 +15,9 @@ import pytest
 
 from lammps_inelastic.workflow.decks import Deck, Rule, as_value, read_rule
 from lammps_inelastic.workflow.shipped import DECKS, PACK
-from tests.fix.lammps_run import OF_A_LAUNCHER, Runner, run_lmp
+from tests.helpers.lammps_run import OF_A_LAUNCHER, Runner, run_lmp
 
-SERVER = Path(__file__).with_name("table_server.py")
+SERVER = Path(__file__).parents[1] / "helpers" / "table_server.py"
 TABLE = re.compile(r'^parameters """\n(.*?)"""', re.MULTILINE | re.DOTALL)
 
 Ask = Callable[..., list[str]]

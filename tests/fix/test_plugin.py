@@ -5,19 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from importlib.metadata import distribution, entry_points
+from importlib.metadata import distribution
 from pathlib import Path
 
-from tests.fix.lammps_run import LAUNCHER, Runner
+from tests.helpers.lammps_run import LAUNCHER, Runner, plugin_file
 
 HERE = b"stable_22Jul2025_update4"
 ELSEWHERE = b"stable_22Jul2025_update2"
-
-
-def plugin_file() -> Path:
-    """The file that the entry point leads LAMMPS to."""
-    (entry,) = entry_points(group="lammps.plugins", name="inelastic")
-    return Path(entry.load()()) / "inelasticplugin.so"
 
 
 def test_everything_is_in_one_package() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic import core
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import FloatArray, mass, read_dump, scene
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import FloatArray, mass, read_dump, scene
 
 COUNT = 300
 RADII = np.linspace(0.01, 0.03, COUNT)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     FloatArray,

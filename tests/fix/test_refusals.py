@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fix.bodies import body_scene, dimer, placed
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.bodies import body_scene, dimer, placed
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     deepest_in_box,
     deepest_pair,

@@ -17,7 +17,7 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from tests.fix.lammps_run import Runner, run_lmp
+from tests.helpers.lammps_run import Runner, run_lmp
 
 PARTICLES, RADIUS = 250, 0.055
 PACKING = {

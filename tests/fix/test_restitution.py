@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.bodies import DUMP_BODY_SPHERES, body_scene, dimer, placed, rigid_velocities
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.bodies import DUMP_BODY_SPHERES, body_scene, dimer, placed, rigid_velocities
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     deepest_pair,

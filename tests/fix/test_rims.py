@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.exact_scenes import path, spheres_of
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import DUMP_PARTICLES
+from tests.helpers.exact_scenes import path, spheres_of
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import DUMP_PARTICLES
 
 EPS, RIM = 1e-4, 1.5  # the sphere's radius is 0.5
 

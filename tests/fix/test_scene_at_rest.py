@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from tests.fix.bodies import INERTIAS, body_scene, dimer, random_bodies
-from tests.fix.lammps_run import Run, Runner
-from tests.fix.scenes import DUMP_PARTICLES, GRAVITY, mass, random_points, read_dump, scene
+from tests.helpers.bodies import INERTIAS, body_scene, dimer, random_bodies
+from tests.helpers.lammps_run import Run, Runner
+from tests.helpers.scenes import DUMP_PARTICLES, GRAVITY, mass, random_points, read_dump, scene
 
 RADIUS = 0.05
 STEP = 0.005

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from tests.fix.lammps_run import Run, Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Run, Runner
+from tests.helpers.scenes import (
     DUMP_CONTACTS,
     DUMP_PARTICLES,
     GRAVITY,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     DUMP_BODY_SPHERES,
     Bodies,
     body_scene,
@@ -21,8 +21,8 @@ from tests.fix.bodies import (
     random_bodies,
     rigid_velocities,
 )
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     FloatArray,
     Frame,

@@ -15,7 +15,7 @@ from lammps_inelastic.analysis import (
     largest_pair_overlap,
     read_particle_frame,
 )
-from tests.fix.lammps_run import LAUNCHER, Runner
+from tests.helpers.lammps_run import LAUNCHER, Runner
 
 VARIABLES = {
     "steps_agitated": 300,

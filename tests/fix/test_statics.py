@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import iterate_contact_frames
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import (
     DEFAULT_BOX,
     DUMP_CONTACTS,
     DUMP_FORCES,

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.fix.lammps_run import Runner
 from tests.fix.test_record import pile
+from tests.helpers.lammps_run import Runner
 
 PHASES = ("collect", "solve", "communicate", "check", "apply")
 

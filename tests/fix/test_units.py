@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.bodies import BENT, INERTIAS, body_scene, dimer, random_bodies
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import GRAVITY, FloatArray, read_dump
+from tests.helpers.bodies import BENT, INERTIAS, body_scene, dimer, random_bodies
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import GRAVITY, FloatArray, read_dump
 
 RADIUS = 0.05
 EPS = 0.0005 * RADIUS

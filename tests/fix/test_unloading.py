@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.fix.exact_scenes import UNLOADING, Column, assert_nothing_leaps, settling_bed
-from tests.fix.lammps_run import run_lmp
-from tests.fix.scenes import GRAVITY
+from tests.helpers.exact_scenes import UNLOADING, Column, assert_nothing_leaps, settling_bed
+from tests.helpers.lammps_run import run_lmp
+from tests.helpers.scenes import GRAVITY
 
 
 @pytest.mark.parametrize("weights", [10.0, 1e2, 1e3, 1e4, 1e5, 1e6])

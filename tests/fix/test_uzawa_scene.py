@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.lammps_run import Runner
-from tests.fix.scenes import DUMP_PARTICLES, deepest_pair, read_dump
+from tests.helpers.lammps_run import Runner
+from tests.helpers.scenes import DUMP_PARTICLES, deepest_pair, read_dump
 
 EPS = 0.017641176236424871
 DIAMETER = 5.8242453498381188

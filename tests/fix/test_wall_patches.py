@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.wall_patches import (
+from tests.helpers.wall_patches import (
     Disc,
     FloatArray,
     Motion,

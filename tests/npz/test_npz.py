@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.building import REPOSITORY, cmake, generator, run
+from tests.helpers.building import REPOSITORY, cmake, generator, run
 
 # As in npz_test.cpp.
 ARRAYS = {

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.fix.bodies import BENT, BODY_STYLE, ROD, TETRAHEDRON, dimer
+from tests.helpers.bodies import BENT, BODY_STYLE, ROD, TETRAHEDRON, dimer
 from tests.random_scenes.scene_walls import AXES, FloatArray, Shape, moves, views
 
 # Acceleration of a unit of mass by a unit of force, and pressure of a unit of energy per volume

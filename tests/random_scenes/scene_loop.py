@@ -9,9 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.building import sanitized_plugin, sanitizer_libraries
-from tests.fix.lammps_run import without_launcher
-from tests.fix.test_plugin import plugin_file
+from tests.helpers.building import sanitized_plugin, sanitizer_libraries
+from tests.helpers.lammps_run import plugin_file, without_launcher
 from tests.random_scenes.scene_checker import Report, check
 from tests.random_scenes.scene_generator import ITERATIONS, Scene, random_scene
 from tests.random_scenes.scene_run import TIMEOUT, answer, finding

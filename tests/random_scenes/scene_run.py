@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.fix.lammps_run import BIN, OF_A_LAUNCHER, cores_for
+from tests.helpers.lammps_run import BIN, OF_A_LAUNCHER, cores_for
 
 TIMEOUT = 60.0
 

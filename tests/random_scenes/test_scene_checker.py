@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fix.bodies import BENT, body_scene, dimer, random_bodies, rigid_velocities
-from tests.fix.scenes import random_points, scene
+from tests.helpers.bodies import BENT, body_scene, dimer, random_bodies, rigid_velocities
+from tests.helpers.scenes import random_points, scene
 from tests.random_scenes.scene_checker import Report, check, read_thermo
 from tests.random_scenes.scene_generator import BODY_COLUMNS, CONTACTS, computes, redump
 from tests.random_scenes.scene_loop import installed

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.beds import BEDS, ROUNDS, at_rest
+from tests.helpers.beds import BEDS, ROUNDS, at_rest
 
 pytestmark = pytest.mark.validation
 

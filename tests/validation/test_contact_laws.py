@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from tests.fix.lammps_run import Run, run_lmp
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Run, run_lmp
+from tests.helpers.scenes import (
     DUMP_CONTACTS,
     GRAVITY,
     FloatArray,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from tests.pouring import run_deck, shipped_deck
-from tests.statics import floppy_modes, statics_of_run
+from tests.helpers.pouring import run_deck, shipped_deck
+from tests.helpers.statics import floppy_modes, statics_of_run
 from tests.tables import shaken_alike
 
 pytestmark = pytest.mark.validation

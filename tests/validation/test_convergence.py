@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.convergence import SCENES, STEPS, TOLERANCES
+from tests.helpers.convergence import SCENES, STEPS, TOLERANCES
 
 pytestmark = pytest.mark.validation
 

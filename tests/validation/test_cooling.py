@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.lammps_run import run_lmp
-from tests.fix.scenes import FloatArray, mass, random_points, scene
+from tests.helpers.lammps_run import run_lmp
+from tests.helpers.scenes import FloatArray, mass, random_points, scene
 
 pytestmark = pytest.mark.validation
 

@@ -8,8 +8,8 @@ import pytest
 
 from lammps_inelastic.core import read_record
 from lammps_inelastic.workflow.tradeoff.states import records_in
-from tests.grainwise import assert_kept, compare, part_of
-from tests.pouring import run_deck
+from tests.helpers.grainwise import assert_kept, compare, part_of
+from tests.helpers.pouring import run_deck
 
 pytestmark = pytest.mark.validation
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fix.bodies import (
+from tests.helpers.bodies import (
     DUMP_BODY_SPHERES,
     INERTIAS,
     TETRAHEDRON,
@@ -26,8 +26,8 @@ from tests.fix.bodies import (
     placed,
     random_bodies,
 )
-from tests.fix.lammps_run import Run, run_lmp
-from tests.fix.scenes import (
+from tests.helpers.lammps_run import Run, run_lmp
+from tests.helpers.scenes import (
     DEFAULT_BOX,
     DUMP_CONTACTS,
     DUMP_PARTICLES,

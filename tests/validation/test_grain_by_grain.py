@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.grainwise import assert_kept, compare_folder
-from tests.pouring import recording, run_deck, shipped_deck
+from tests.helpers.grainwise import assert_kept, compare_folder
+from tests.helpers.pouring import recording, run_deck, shipped_deck
 
 pytestmark = pytest.mark.validation
 

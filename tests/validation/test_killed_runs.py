@@ -17,8 +17,8 @@ import pytest
 
 from tests.fix import test_bodies_continuation as of_bodies
 from tests.fix import test_continuation as of_spheres
-from tests.fix.lammps_run import BIN, OF_A_LAUNCHER, run_lmp
-from tests.fix.scenes import FloatArray
+from tests.helpers.lammps_run import BIN, OF_A_LAUNCHER, run_lmp
+from tests.helpers.scenes import FloatArray
 
 pytestmark = pytest.mark.validation
 

@@ -16,16 +16,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.building import sanitized_plugin, sanitizer_libraries
 from tests.fix import test_bodies_continuation as of_bodies
 from tests.fix import test_continuation as of_spheres
 from tests.fix import test_determinism as moving
 from tests.fix import test_scene_changes as scene_changes
-from tests.fix.bodies import DUMP_BODIES
-from tests.fix.lammps_run import BIN, run_lmp, without_launcher
-from tests.fix.scenes import DUMP_CONTACTS, DUMP_FORCES, DUMP_PARTICLES
-from tests.fix.test_plugin import plugin_file
 from tests.fix.test_refusals import deck
+from tests.helpers.bodies import DUMP_BODIES
+from tests.helpers.building import sanitized_plugin, sanitizer_libraries
+from tests.helpers.lammps_run import BIN, plugin_file, run_lmp, without_launcher
+from tests.helpers.scenes import DUMP_CONTACTS, DUMP_FORCES, DUMP_PARTICLES
 
 pytestmark = pytest.mark.validation
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import ParticleDump, largest_pair_overlap
-from tests.pouring import Packing, measure, run_deck, shipped_deck
+from tests.helpers.pouring import Packing, measure, run_deck, shipped_deck
 
 pytestmark = pytest.mark.validation
 

@@ -14,9 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fix.lammps_run import Run, run_lmp
-from tests.fix.scenes import DUMP_FORCES, DUMP_PARTICLES, FloatArray, deepest_pair, read_dump, scene
-from tests.wall_patches import (
+from tests.helpers.lammps_run import Run, run_lmp
+from tests.helpers.scenes import (
+    DUMP_FORCES,
+    DUMP_PARTICLES,
+    FloatArray,
+    deepest_pair,
+    read_dump,
+    scene,
+)
+from tests.helpers.wall_patches import (
     AXES,
     REST,
     SAMPLES,

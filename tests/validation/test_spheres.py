@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from lammps_inelastic import core
 from lammps_inelastic.analysis import ParticleDump, Spheres, largest_pair_overlap
 from lammps_inelastic.workflow.tradeoff.states import records_in
-from tests.pouring import (
+from tests.helpers.pouring import (
     measure,
     recording,
     run_deck,

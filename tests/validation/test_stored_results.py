@@ -10,9 +10,9 @@ import pytest
 from lammps_inelastic.workflow.decks import Deck
 from lammps_inelastic.workflow.provenance import code
 from lammps_inelastic.workflow.same_runs import FILE
-from tests import building
 from tests.benchmark.earlier import check_out
-from tests.pouring import FEW_STEPS, NO_STEPS, run_deck, shipped_deck
+from tests.helpers import building
+from tests.helpers.pouring import FEW_STEPS, NO_STEPS, run_deck, shipped_deck
 
 pytestmark = pytest.mark.validation
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fix.exact_scenes import (
+from tests.helpers.exact_scenes import (
     BED_TOLERANCE,
     FASTEST,
     MASS,
@@ -24,8 +24,8 @@ from tests.fix.exact_scenes import (
     settling_bed,
     spheres_of,
 )
-from tests.fix.lammps_run import run_lmp
-from tests.fix.scenes import DUMP_PARTICLES, GRAVITY, FloatArray
+from tests.helpers.lammps_run import run_lmp
+from tests.helpers.scenes import DUMP_PARTICLES, GRAVITY, FloatArray
 
 pytestmark = pytest.mark.validation
 

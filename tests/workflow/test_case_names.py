@@ -28,7 +28,7 @@ from lammps_inelastic.workflow.store import (
 )
 from lammps_inelastic.workflow.study import Case, Study, read_study
 from lammps_inelastic.workflow.study.case_name import name_in, name_of
-from tests.workflow.study_run import numbers_of, run_few, same
+from tests.helpers.study_run import numbers_of, run_few, same
 
 KEPT = Path(__file__).parents[2] / "results"
 # A name on an encrypted disk (eCryptfs).

@@ -14,8 +14,8 @@ from lammps_inelastic.workflow.finished import FINISHED
 from lammps_inelastic.workflow.folder import FAILED, Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.study import read_study
-from tests.workflow.few_spheres import TINY
-from tests.workflow.study_run import inelastic, numbers_of, run_few, same, warning
+from tests.helpers.few_spheres import TINY
+from tests.helpers.study_run import inelastic, numbers_of, run_few, same, warning
 
 
 @pytest.fixture(scope="module")

@@ -21,9 +21,9 @@ import pytest
 from lammps_inelastic.workflow.export import FILES as EXPORTS
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.store import read_studies
-from tests.small_disk import mounted
-from tests.workflow.few_spheres import TINY
-from tests.workflow.study_run import inelastic, run_few
+from tests.helpers.few_spheres import TINY
+from tests.helpers.small_disk import mounted
+from tests.helpers.study_run import inelastic, run_few
 
 # What each of them needs to be small: 30 spheres, and no more than 27,000 voxels.
 MORE = {"tiff": ["--voxel", "0.1"], "raw": ["--voxel", "0.1"]}

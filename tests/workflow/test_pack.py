@@ -28,8 +28,8 @@ from lammps_inelastic.analysis import (
 from lammps_inelastic.workflow import Ball, Box, Cluster, Cylinder, Dimer, Packing, Sphere, pack
 from lammps_inelastic.workflow.errors import PackingError, WorkflowError
 from lammps_inelastic.workflow.main import main
-from tests.fix.lammps_run import LAUNCHER, run_lmp
-from tests.small_disk import mounted
+from tests.helpers.lammps_run import LAUNCHER, run_lmp
+from tests.helpers.small_disk import mounted
 from tests.workflow.test_pack_arguments import outside
 
 ROOT = Path(__file__).parents[2]

@@ -9,8 +9,8 @@ import numpy as np
 from lammps_inelastic.analysis import ContactFrame, ParticleDump
 from lammps_inelastic.workflow.pictures import MOST_PIXELS, pictures_of
 from lammps_inelastic.workflow.study import Outputs
-from tests.analysis.test_pictures import check_legend, pixels_of
-from tests.analysis.written_dumps import frame_text
+from tests.helpers.pixels import check_legend, pixels_of
+from tests.helpers.written_dumps import frame_text
 
 
 def test_each_colour_of_a_kept_picture_can_be_told_from_the_others(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from lammps_inelastic.workflow.report.sections.provenance import codes_line
 from lammps_inelastic.workflow.same_runs import FILE, SameRuns, same_runs
 from lammps_inelastic.workflow.store import Result, read_result, write_result
 from lammps_inelastic.workflow.study import read_study
-from tests.workflow.study_run import run_few
+from tests.helpers.study_run import run_few
 
 
 def git(folder: Path, *arguments: str) -> str:

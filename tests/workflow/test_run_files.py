@@ -22,9 +22,9 @@ from lammps_inelastic.workflow.finished import other_run
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.measure import measure_case
 from lammps_inelastic.workflow.study import Outputs, ProfileOutput, read_study
-from tests.pouring import NO_STEPS
-from tests.workflow.few_spheres import TINY
-from tests.workflow.study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same, warning
+from tests.helpers.few_spheres import TINY
+from tests.helpers.pouring import NO_STEPS
+from tests.helpers.study_run import BIN, ENVIRONMENT, inelastic, numbers_of, same, warning
 
 PARTICLES, CONTACTS, LOG = "particles.lammpsdump", "contacts.lammpsdump", "log.lammps"
 BOX = ["--box", "0", "1", "0", "0.5", "0", "1"]

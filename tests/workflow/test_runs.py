@@ -19,8 +19,8 @@ from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.schema import SCHEMA
 from lammps_inelastic.workflow.study import Case, read_study
-from tests.workflow.few_spheres import TINY, write_data
-from tests.workflow.study_run import (
+from tests.helpers.few_spheres import TINY, write_data
+from tests.helpers.study_run import (
     ENVIRONMENT,
     PATIENCE,
     command,

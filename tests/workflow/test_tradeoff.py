@@ -50,10 +50,10 @@ from lammps_inelastic.workflow.tradeoff.states import (
     write_states,
 )
 from lammps_inelastic.workflow.tradeoff.table import as_csv, out_of_bed
-from tests.core.contact_problems import Problem, no_bodies
-from tests.core.reference_solver import reference
-from tests.workflow.few_spheres import write_data
-from tests.workflow.study_run import (
+from tests.helpers.contact_problems import Problem, no_bodies
+from tests.helpers.few_spheres import write_data
+from tests.helpers.reference_solver import reference
+from tests.helpers.study_run import (
     ENVIRONMENT,
     PATIENCE,
     command,

@@ -29,9 +29,9 @@ from lammps_inelastic.workflow.view import (
     page_of_values,
     view_of,
 )
-from tests.analysis.test_view import array_of, packing_in
-from tests.analysis.written_dumps import frame_text
-from tests.workflow.few_spheres import TINY
+from tests.helpers.few_spheres import TINY
+from tests.helpers.view_page import array_of, packing_in
+from tests.helpers.written_dumps import frame_text
 
 # Two dimers: one lies along x, on the floor, the other stands on it, and moves.
 COLUMNS = "id mol type x y z vx vy vz radius"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fix.lammps_run import OF_A_LAUNCHER
+from tests.helpers.lammps_run import OF_A_LAUNCHER
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tests.fix.bodies import Bodies, body_scene, dimer, random_bodies
-from tests.fix.lammps_run import Run, run_lmp
-from tests.fix.scenes import GRAVITY, FloatArray, mass, random_points, read_dump, scene
+from tests.helpers.bodies import Bodies, body_scene, dimer, random_bodies
+from tests.helpers.lammps_run import Run, run_lmp
+from tests.helpers.scenes import GRAVITY, FloatArray, mass, random_points, read_dump, scene
 
 RADIUS = 0.5
 MASS = float(mass(RADIUS))

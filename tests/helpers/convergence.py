@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from tests.fix.bodies import DUMP_BODY_SPHERES, body_scene, dimer, placed, rigid_velocities
-from tests.fix.lammps_run import run_lmp
-from tests.fix.scenes import (
+from tests.helpers.bodies import DUMP_BODY_SPHERES, body_scene, dimer, placed, rigid_velocities
+from tests.helpers.lammps_run import run_lmp
+from tests.helpers.scenes import (
     DUMP_PARTICLES,
     GRAVITY,
     FloatArray,

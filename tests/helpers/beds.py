@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.pouring import run_deck
+from tests.helpers.pouring import run_deck
 
 DIAMETER, GRAVITY = 0.1, 9.81
 # Frictionless beds give way here and there long after the fall. A bed is at rest when the fix says

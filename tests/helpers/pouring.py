@@ -22,7 +22,7 @@ from lammps_inelastic.analysis import (
     measure_packing,
     read_particle_frame,
 )
-from tests.fix.lammps_run import without_launcher
+from tests.helpers.lammps_run import without_launcher
 
 BULK = np.array([[0.25, 0.75]] * 3)  # the paper's box
 

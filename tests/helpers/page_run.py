@@ -1,6 +1,6 @@
 """Runs the blocks of a page, or writes them to files, in the folder where it is started.
 
-    python -m tests.docs.page_run BLOCKS.json RESULTS.json
+    python -m tests.helpers.page_run BLOCKS.json RESULTS.json
 
 Blocks are lists of language, text, and file or null. Results are lists of the exit code and of what
 was printed; they end with the first block that fails.

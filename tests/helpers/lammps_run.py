@@ -132,8 +132,13 @@ def run_lmp(
 
 @cache
 def _started_by_launcher() -> tuple[str, dict[str, str]]:
+    return without_launcher(plugin_file().parent)
+
+
+def plugin_file() -> Path:
+    """The file that the entry point leads LAMMPS to."""
     (entry,) = entry_points(group="lammps.plugins", name="inelastic")
-    return without_launcher(Path(entry.load()()))
+    return Path(entry.load()()) / "inelasticplugin.so"
 
 
 def without_launcher(plugin: Path) -> tuple[str, dict[str, str]]:

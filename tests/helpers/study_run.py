@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from lammps_inelastic.workflow.study import read_study
-from tests.workflow.few_spheres import TINY
+from tests.helpers.few_spheres import TINY
 
 BIN = Path(sys.executable).parent
 # An mpiexec around pytest must not reach the runs (they would join its job).

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from tests.fix.scenes import FloatArray, mass, scene
+from tests.helpers.scenes import FloatArray, mass, scene
 
 INERTIAS = ("point", "solid")
 BODY_STYLE = "atom_style hybrid sphere 1 molecular"

@@ -1,6 +1,6 @@
 """The notebooks of pages: their texts and their blocks as cells.
 
-python -m tests.docs.notebook        # writes docs/tutorials/first-hour.ipynb and pack.ipynb
+python -m tests.notebook        # writes docs/tutorials/first-hour.ipynb and pack.ipynb
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import json
 import re
 from pathlib import Path
 
-from .blocks import BLOCK, Block, blocks_of
+from tests.helpers.blocks import BLOCK, Block, blocks_of
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 TUTORIALS = ROOT / "docs" / "tutorials"
 # A notebook starts in its own folder, a reader of the page in the clone.
 IN_CLONE = "%cd ../.."

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from lammps_inelastic.analysis import Cell, Spheres, group_spheres
 from lammps_inelastic.analysis.geometry import FloatArray, IntArray
-from tests.analysis.integration import dimer_in_box, integrate, quadrant, root
+from tests.helpers.integration import dimer_in_box, integrate, quadrant, root
 
 Shape = Callable[[np.random.Generator], tuple[FloatArray, FloatArray]]
 # The periods in which spheres are handed over are up to this number away.

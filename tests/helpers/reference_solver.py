@@ -6,7 +6,7 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from tests.core.contact_problems import Problem
+from tests.helpers.contact_problems import Problem
 
 
 class NotSolvedError(Exception):

@@ -1,0 +1,1 @@
+"""What tests, the benchmark and the tables share: no test is here."""
