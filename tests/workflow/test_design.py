@@ -1,4 +1,4 @@
-"""DESIGN.md and CONTRIBUTING.md name files that exist, and DESIGN.md names every source file."""
+"""DESIGN.md and CONTRIBUTING.md name files that exist, and DESIGN.md lists every source file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 CODE = re.compile(r"`([^`\s]+)`")
 HEADING = re.compile(r"#+ `([^`]+)`$")
 # A folder, or a file of a kind that the repository holds; runs leave files with other endings.
-PATH = re.compile(r"[\w./{},-]*(?:/|\.(?:cpp|h|\{h,cpp\}|in|j2|md|py|pyi|toml|txt))")
+PATH = re.compile(r"[\w./{},-]*(?:/|\.(?:cmake|cpp|h|\{h,cpp\}|html|in|j2|md|py|pyi|toml|txt))")
 # A part of a path that the reader chooses.
 OPEN = "NAME"
 SOURCES = (
@@ -63,6 +63,74 @@ def test_every_source_file_is_named() -> None:
     sources = [path for pattern in SOURCES for path in sorted(ROOT.glob(pattern))]
     assert len(sources) > 100
     assert [str(path.relative_to(ROOT)) for path in sources if path not in named] == []
+
+
+# Folders whose section on the page lists their files, each and no other ones.
+LISTED = (
+    "src_fix/core",
+    "src_fix/laws",
+    "src_fix/npz",
+    "src_fix/lammps",
+    "src_fix/python",
+    "src_fix/plugin",
+    "analysis",
+    "inputs",
+    "tests",
+    "tests/helpers",
+    "tests/random_scenes",
+    "tests/benchmark",
+)
+# Names that say what the files are: of any folder, and of those of the tests.
+OF_ANY, OF_TESTS = re.compile(r"README\.md"), re.compile(r"(test_.*|__init__)\.py")
+
+
+def listed_in(text: str, room: str) -> set[str]:
+    """Return the files that the section of a folder names, without those of folders in it."""
+    (section,) = re.findall(rf"^#+ `{re.escape(room)}`$(.*?)(?=^#|\Z)", text, re.S | re.M)
+    named = [code for code in CODE.findall(section) if "/" not in code and OPEN not in code]
+    return {path for code in named if PATH.fullmatch(code) for path in expanded(code)}
+
+
+def differences(room: str, listed: set[str], there: set[str]) -> str:
+    """Return one line about what a list and a folder do not have in common, or nothing."""
+    known = OF_TESTS if room.startswith("tests") else OF_ANY
+    there = {name for name in there if not known.fullmatch(name)}
+    parts = {"not on the page": there - listed, "not in the folder": listed - there}
+    said = [f"{', '.join(sorted(names))} ({where})" for where, names in parts.items() if names]
+    return f"DESIGN.md, {room}: {'; '.join(said)}" if said else ""
+
+
+@pytest.mark.parametrize("room", LISTED)
+def test_a_folder_holds_what_its_section_lists(room: str) -> None:
+    there = {path.name for path in (ROOT / room).iterdir() if PATH.fullmatch(path.name)}
+    assert there
+    if wrong := differences(room, listed_in((ROOT / "DESIGN.md").read_text(), room), there):
+        pytest.fail(wrong, pytrace=False)
+
+
+def test_a_file_too_few_and_one_too_many() -> None:
+    text = "### `tests/a`\n- `x.{h,cpp}`, `b/y.py`: `Step::x`.\n### `tests/ab`\n- `z.py`: `a`.\n"
+    listed = listed_in(text, "tests/a")
+    assert listed == {"x.h", "x.cpp"}
+    assert differences("tests/a", listed, {"x.h", "x.cpp", "test_x.py"}) == ""
+    assert differences("tests/a", listed, {"x.h", "w.py"}) == (
+        "DESIGN.md, tests/a: w.py (not on the page); x.cpp (not in the folder)"
+    )
+    assert differences("a", listed, {"x.h", "x.cpp", "test_x.py"}) == (
+        "DESIGN.md, a: test_x.py (not on the page)"
+    )
+
+
+def test_helpers_are_told_from_tests() -> None:
+    """Folders of tests hold tests and their fixtures alone, and that of the helpers no test."""
+    programs = {"helpers", "random_scenes", "benchmark"}
+    tests = [path for path in (ROOT / "tests").glob("*/*.py") if path.parent.name not in programs]
+    allowed = re.compile(r"(test_.*|conftest|__init__)\.py")
+    helpers = sorted((ROOT / "tests" / "helpers").glob("*.py"))
+    assert len(tests) > 100
+    assert [str(path.relative_to(ROOT)) for path in tests if not allowed.fullmatch(path.name)] == []
+    of_a_test = re.compile(r"^def test_|^from tests\.\w+(\.| import )test_", re.M)
+    assert [path.name for path in helpers if of_a_test.search(path.read_text())] == []
 
 
 def test_paths_are_told_from_other_words() -> None:
