@@ -22,7 +22,7 @@ from lammps_inelastic.analysis import (
     read_particle_frame,
 )
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.measure import SEED, _packing_fractions
+from lammps_inelastic.workflow.results.measure import SEED, _packing_fractions
 from tests.helpers.written_dumps import Writer
 
 RADIUS, EXCESS = 0.1, 1e-4
@@ -315,7 +315,7 @@ def test_colours_are_the_contacts_of_bodies(dimers: Path, monkeypatch: pytest.Mo
     ) -> None:
         drawn["contacts"], drawn["contacts_per_colour"] = contacts.tolist(), contacts_per_colour
 
-    monkeypatch.setattr("lammps_inelastic.workflow.pictures.draw_packing", remember)
+    monkeypatch.setattr("lammps_inelastic.workflow.looking.pictures.draw_packing", remember)
     assert main(["look", str(dimers), *MIDDLE]) == 0
     # Of the last frame, sphere by sphere in the order of the ids.
     assert drawn == {"contacts": [4, 7, 7, 4] * 2, "contacts_per_colour": 2}

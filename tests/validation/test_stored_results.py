@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from lammps_inelastic.workflow.decks import Deck
-from lammps_inelastic.workflow.provenance import code
-from lammps_inelastic.workflow.same_runs import FILE
+from lammps_inelastic.workflow.provenance.run_record import code
+from lammps_inelastic.workflow.provenance.same_runs import FILE
 from tests.benchmark.earlier import check_out
 from tests.helpers import building
 from tests.helpers.pouring import FEW_STEPS, NO_STEPS, run_deck, shipped_deck

@@ -14,18 +14,18 @@ from typing import Any
 import pytest
 
 from lammps_inelastic.workflow.errors import StudyError
-from lammps_inelastic.workflow.finished import FINISHED
-from lammps_inelastic.workflow.folder import Folder, write_json
 from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.provenance.finished import FINISHED
 from lammps_inelastic.workflow.report import read_data
-from lammps_inelastic.workflow.shipped import STUDIES, STUDIES_FOLDER
-from lammps_inelastic.workflow.store import (
+from lammps_inelastic.workflow.results.store import (
     StoredStudy,
     read_result,
     read_studies,
     write_result,
     write_studies,
 )
+from lammps_inelastic.workflow.running.folder import Folder, write_json
+from lammps_inelastic.workflow.shipped import STUDIES, STUDIES_FOLDER
 from lammps_inelastic.workflow.study import Case, Study, read_study
 from lammps_inelastic.workflow.study.case_name import name_in, name_of
 from tests.helpers.study_run import numbers_of, run_few, same
@@ -169,7 +169,8 @@ def test_stored_results_in_the_form_of_02(
     for case in cases:
         shutil.copyfile(KEPT / "counting" / f"{case.name}.h5", old / f"{case.name_before}.h5")
     assert any(len(path.stem) > 160 and "seed" not in path.stem for path in old.iterdir())
-    monkeypatch.setattr("lammps_inelastic.workflow.cli.reproduce.write_report", lambda *_: None)
+    page = "lammps_inelastic.workflow.report.report_files"
+    monkeypatch.setattr(f"{page}.write_report", lambda *_: None)
     out = tmp_path / "out"
     arguments = ["--stored-only", "--results", str(old.parent), "--out", str(out)]
     assert main(["reproduce", *arguments]) == 0

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.finished import FINISHED
-from lammps_inelastic.workflow.folder import FAILED, Folder
 from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.provenance.finished import FINISHED
+from lammps_inelastic.workflow.running.folder import FAILED, Folder
 from lammps_inelastic.workflow.study import read_study
 from tests.helpers.few_spheres import TINY
 from tests.helpers.study_run import inelastic, numbers_of, run_few, same, warning

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,14 +16,9 @@ HEADING = re.compile(r"#+ `([^`]+)`$")
 PATH = re.compile(r"[\w./{},-]*(?:/|\.(?:cmake|cpp|h|\{h,cpp\}|html|in|j2|md|py|pyi|toml|txt))")
 # A part of a path that the reader chooses.
 OPEN = "NAME"
-SOURCES = (
-    "src_fix/core/*.cpp",
-    "src_fix/core/*.h",
-    "src_fix/lammps/*.cpp",
-    "src_fix/lammps/*.h",
-    "workflow/*.py",
-    "analysis/*.py",
-)
+# The rooms of the sources, with all that is below them.
+ROOMS = ("src_fix", "analysis", "workflow")
+ENDINGS = (".cpp", ".h", ".py", ".pyi")
 
 
 def expanded(path: str) -> list[str]:
@@ -58,11 +54,48 @@ def test_every_file_that_is_named_exists(name: str) -> None:
     assert [link for link in links if not (ROOT / link).exists()] == []
 
 
-def test_every_source_file_is_named() -> None:
-    named = {place for _, places in named_in((ROOT / "DESIGN.md").read_text()) for place in places}
-    sources = [path for pattern in SOURCES for path in sorted(ROOT.glob(pattern))]
-    assert len(sources) > 100
-    assert [str(path.relative_to(ROOT)) for path in sources if path not in named] == []
+def listed_in(text: str) -> set[Path]:
+    """Return what the sections of the rooms list: each file in the section of its own folder."""
+    rooms = text[text.index("## Rooms") : text.index("## One step")]
+    return {places[0] for _, places in named_in(rooms)}
+
+
+def is_listed(path: Path, listed: set[Path]) -> bool:
+    """Say whether a file is listed, or its folder is, as one of files that are all alike."""
+    return path in listed or path.parent in listed
+
+
+def sources() -> list[Path]:
+    """Return the source files, but for an `__init__.py` that only says what its folder is for."""
+    found = [path for room in ROOMS for path in (ROOT / room).rglob("*") if path.suffix in ENDINGS]
+    return [path for path in sorted(found) if not is_docstring_alone(path)]
+
+
+def is_docstring_alone(path: Path) -> bool:
+    """Say whether a file is an `__init__.py` with a docstring and nothing else."""
+    if path.name != "__init__.py":
+        return False
+    (*_, last) = ast.parse(path.read_text()).body
+    return isinstance(last, ast.Expr)
+
+
+def test_every_source_file_is_listed_in_the_section_of_its_folder() -> None:
+    listed, files = listed_in((ROOT / "DESIGN.md").read_text()), sources()
+    assert len(files) > 200
+    assert [str(path.relative_to(ROOT)) for path in files if not is_listed(path, listed)] == []
+
+
+def test_a_file_that_is_not_listed_is_seen() -> None:
+    text = (ROOT / "DESIGN.md").read_text()
+    lines = text.splitlines(keepends=True)
+    for start, missing in (
+        ("- `gather.py`", "workflow/running/gather.py"),
+        ("- `gluey.{h,cpp}`", "src_fix/laws/gluey.h"),
+        ("- `sections/`", "workflow/report/sections/agitation.py"),
+    ):
+        assert is_listed(ROOT / missing, listed_in(text))
+        (line,) = (line for line in lines if line.startswith(start))
+        assert not is_listed(ROOT / missing, listed_in(text.replace(line, "")))
 
 
 # Folders whose section on the page lists their files, each and no other ones.

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.export import FILES as EXPORTS
+from lammps_inelastic.workflow.looking.export import FILES as EXPORTS
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.store import read_studies
+from lammps_inelastic.workflow.results.store import read_studies
 from tests.helpers.few_spheres import TINY
 from tests.helpers.small_disk import mounted
 from tests.helpers.study_run import inelastic, run_few

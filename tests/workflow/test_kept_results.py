@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.folder import Folder
-from lammps_inelastic.workflow.gather import adopt_results, gather_results
+from lammps_inelastic.workflow.provenance.same_runs import same_runs
 from lammps_inelastic.workflow.report import all_sections, read_data, render_markdown
-from lammps_inelastic.workflow.same_runs import same_runs
+from lammps_inelastic.workflow.results.store import StoredStudy, write_studies
+from lammps_inelastic.workflow.running.folder import Folder
+from lammps_inelastic.workflow.running.gather import adopt_results, gather_results
 from lammps_inelastic.workflow.shipped import STUDIES, STUDIES_FOLDER
-from lammps_inelastic.workflow.store import StoredStudy, write_studies
 from lammps_inelastic.workflow.study import read_study
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lammps_inelastic.analysis import ContactFrame, ParticleDump
-from lammps_inelastic.workflow.pictures import MOST_PIXELS, pictures_of
+from lammps_inelastic.workflow.looking.pictures import MOST_PIXELS, pictures_of
 from lammps_inelastic.workflow.study import Outputs
 from tests.helpers.pixels import check_legend, pixels_of
 from tests.helpers.written_dumps import frame_text

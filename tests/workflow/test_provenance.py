@@ -13,15 +13,19 @@ from typing import Any
 import pytest
 
 from lammps_inelastic import plugin
-from lammps_inelastic.workflow.build_version import dynamic_metadata, version_now, version_of
 from lammps_inelastic.workflow.errors import WorkflowError
-from lammps_inelastic.workflow.folder import Folder
-from lammps_inelastic.workflow.gather import adopt_results
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.provenance import code, differs
+from lammps_inelastic.workflow.provenance.build_version import (
+    dynamic_metadata,
+    version_now,
+    version_of,
+)
+from lammps_inelastic.workflow.provenance.run_record import code, differs
+from lammps_inelastic.workflow.provenance.same_runs import FILE, SameRuns, same_runs
 from lammps_inelastic.workflow.report.sections.provenance import codes_line
-from lammps_inelastic.workflow.same_runs import FILE, SameRuns, same_runs
-from lammps_inelastic.workflow.store import Result, read_result, write_result
+from lammps_inelastic.workflow.results.store import Result, read_result, write_result
+from lammps_inelastic.workflow.running.folder import Folder
+from lammps_inelastic.workflow.running.gather import adopt_results
 from lammps_inelastic.workflow.study import read_study
 from tests.helpers.study_run import run_few
 
@@ -83,8 +87,8 @@ def test_the_build_asks_for_the_version_of_its_folder(
 def test_an_installed_package_keeps_its_version(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file = tmp_path / "lammps_inelastic" / "workflow" / "build_version.py"
-    monkeypatch.setattr("lammps_inelastic.workflow.build_version.__file__", str(file))
+    file = tmp_path / "lammps_inelastic" / "workflow" / "provenance" / "build_version.py"
+    monkeypatch.setattr("lammps_inelastic.workflow.provenance.build_version.__file__", str(file))
     assert version_now("0.2.0+gabc.modified") == "0.2.0+gabc.modified"
 
 

@@ -51,8 +51,8 @@ from lammps_inelastic.workflow.report.text import (
     as_value,
 )
 from lammps_inelastic.workflow.report.verdict import TOPICS, verdict
+from lammps_inelastic.workflow.results.store import Result, StoredStudy, write_studies
 from lammps_inelastic.workflow.shipped import QUICK_FOLDER, STUDIES, STUDIES_FOLDER
-from lammps_inelastic.workflow.store import Result, StoredStudy, write_studies
 
 ANCHORS = {
     "summary",

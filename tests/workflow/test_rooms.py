@@ -55,6 +55,13 @@ def circle_in(arrows: Mapping[str, set[str]]) -> list[str]:
     return []
 
 
+def folder_of(module: str) -> str:
+    """Return the folder of a module that is in a folder of the workflow; else the module itself."""
+    outer = ".".join(module.split(".")[:2])
+    is_folder = outer.startswith("workflow.") and (ROOT / outer.replace(".", "/")).is_dir()
+    return outer if is_folder else module
+
+
 @pytest.fixture(scope="module")
 def arrows() -> dict[str, set[str]]:
     return {
@@ -67,9 +74,22 @@ def test_no_circle_of_imports(arrows: dict[str, set[str]]) -> None:
     assert {"workflow.main", "workflow.cli.look", "analysis.packing"} <= arrows.keys()
     assert "workflow.cli.command_line" in arrows["workflow.main"]
     assert "workflow.cli.look" in arrows["workflow.cli.command_line"]
-    assert "analysis" in arrows["workflow.measure"]
+    assert "analysis" in arrows["workflow.results.measure"]
     circle = circle_in(arrows)
     assert not circle, f"a circle of imports: {' -> '.join(circle)}"
+
+
+def test_no_circle_of_folders(arrows: dict[str, set[str]]) -> None:
+    """A folder of the workflow knows nothing of those that know it."""
+    folders: dict[str, set[str]] = {}
+    for name, to in arrows.items():
+        folders.setdefault(folder_of(name), set()).update(map(folder_of, to))
+    for name, to in folders.items():
+        to.discard(name)
+    assert {"workflow.running", "workflow.results", "workflow.provenance"} <= folders.keys()
+    assert "workflow.results" in folders["workflow.running"]
+    circle = circle_in(folders)
+    assert not circle, f"a circle of folders: {' -> '.join(circle)}"
 
 
 def test_analysis_imports_nothing_of_the_workflow(arrows: dict[str, set[str]]) -> None:
@@ -92,17 +112,18 @@ def test_no_subcommand_is_imported_but_by_the_command_line(arrows: dict[str, set
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("from .store import Result", ["workflow.store"]),
-        ("from . import store, files", ["workflow.store", "workflow.files"]),
-        ("from ..analysis.packing import Cover", ["analysis.packing"]),
-        ("def f():\n    from lammps_inelastic.workflow import store", ["workflow.store"]),
+        ("from .store import Result", ["workflow.results.store"]),
+        ("from . import store, schema", ["workflow.results.store", "workflow.results.schema"]),
+        ("from ...analysis.packing import Cover", ["analysis.packing"]),
+        ("from ..files import whole", ["workflow.files"]),
+        ("def f():\n    from lammps_inelastic.workflow import files", ["workflow.files"]),
         ("if TYPE_CHECKING:\n    import lammps_inelastic.analysis.bodies", ["analysis.bodies"]),
         ("from lammps_inelastic.analysis import packing_fraction", ["analysis"]),
         ("import numpy\nfrom pathlib import Path", []),
     ],
 )
 def test_imports_are_seen_in_every_form(text: str, found: list[str]) -> None:
-    assert list(imports_in(text, "workflow.measure")) == found
+    assert list(imports_in(text, "workflow.results.measure")) == found
 
 
 def test_a_circle_is_seen() -> None:

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 from lammps_inelastic.analysis import AnalysisError, ParticleDump, open_run, read_run_log
-from lammps_inelastic.workflow.finished import other_run
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.measure import measure_case
+from lammps_inelastic.workflow.provenance.finished import other_run
+from lammps_inelastic.workflow.results.measure import measure_case
 from lammps_inelastic.workflow.study import Outputs, ProfileOutput, read_study
 from tests.helpers.few_spheres import TINY
 from tests.helpers.pouring import NO_STEPS

@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 import pytest
 
-from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.schema import SCHEMA
+from lammps_inelastic.workflow.results.schema import SCHEMA
+from lammps_inelastic.workflow.running.folder import Folder
 from lammps_inelastic.workflow.study import Case, read_study
 from tests.helpers.few_spheres import TINY, write_data
 from tests.helpers.study_run import (

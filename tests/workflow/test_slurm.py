@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.slurm import _ranges, job_script
+from lammps_inelastic.workflow.running.folder import Folder
+from lammps_inelastic.workflow.running.slurm import _ranges, job_script
 from lammps_inelastic.workflow.study import read_study
 
 STUDY = 'title = "t"\ndeck = "spheres"\n[parameters]\nseed = { from = 1, to = 3 }\n'

@@ -17,13 +17,9 @@ import pytest
 
 from lammps_inelastic.workflow.errors import WorkflowError
 from lammps_inelastic.workflow.files import whole
-from lammps_inelastic.workflow.folder import Folder
-from lammps_inelastic.workflow.launch import Options
 from lammps_inelastic.workflow.main import main
-from lammps_inelastic.workflow.run_and_gather import run_and_gather
-from lammps_inelastic.workflow.schema import SCHEMA, VERSION
-from lammps_inelastic.workflow.shipped import shipped_studies
-from lammps_inelastic.workflow.store import (
+from lammps_inelastic.workflow.results.schema import SCHEMA, VERSION
+from lammps_inelastic.workflow.results.store import (
     SEAL,
     Result,
     StoredStudy,
@@ -32,6 +28,10 @@ from lammps_inelastic.workflow.store import (
     write_result,
     write_studies,
 )
+from lammps_inelastic.workflow.running.folder import Folder
+from lammps_inelastic.workflow.running.launch import Options
+from lammps_inelastic.workflow.running.run_and_gather import run_and_gather
+from lammps_inelastic.workflow.shipped import shipped_studies
 from lammps_inelastic.workflow.study import Study, read_study
 
 
@@ -96,7 +96,7 @@ def test_a_truncated_file_is_no_result(tmp_path: Path, size: int) -> None:
 def test_another_version_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.h5"
     with monkeypatch.context() as patch:
-        patch.setattr("lammps_inelastic.workflow.store.VERSION", 99)
+        patch.setattr("lammps_inelastic.workflow.results.store.VERSION", 99)
         write_result(path, result_of("a"))
     with pytest.raises(WorkflowError, match="not a result: schema version 99"):
         read_result(path)
@@ -179,7 +179,7 @@ def test_two_writers_of_one_file_do_not_meet(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("module", ["cli.collect", "run_and_gather", "cli.reproduce"])
+@pytest.mark.parametrize("module", ["cli.collect", "running.run_and_gather", "cli.reproduce"])
 def test_results_are_gathered_by_one_at_a_time(
     module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -209,11 +209,12 @@ def test_results_are_gathered_by_one_at_a_time(
     monkeypatch.setattr(f"{place}.write_studies", write)
     if module == "cli.collect":
         assert main(["collect", "table-1", "--out", str(tmp_path)]) == 0
-    elif module == "run_and_gather":
+    elif module == "running.run_and_gather":
         study = read_study(shipped_studies()["table-1"])
         run_and_gather(study, [], folder, Options())
     else:
-        monkeypatch.setattr(f"{place}.write_report", lambda *_: None)
+        page = "lammps_inelastic.workflow.report.report_files"
+        monkeypatch.setattr(f"{page}.write_report", lambda *_: None)
         (tmp_path / "kept" / "table-1").mkdir(parents=True)
         kept = ["--stored-only", "--results", str(tmp_path / "kept")]
         assert main(["reproduce", "--out", str(tmp_path), *kept]) == 0

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from lammps_inelastic.workflow.errors import StudyError, WorkflowError
-from lammps_inelastic.workflow.folder import Folder
 from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.running.folder import Folder
 from lammps_inelastic.workflow.study import read_study
 
 HEAD = 'title = "t"\ndeck = "spheres"\n'

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lammps_inelastic.analysis import read_run_log
-from lammps_inelastic.workflow.thermo import cumulated, read_thermo
+from lammps_inelastic.workflow.results.thermo import cumulated, read_thermo
 
 LOG = """LAMMPS (22 Jul 2025)
 run 20

@@ -12,10 +12,16 @@ import pytest
 from PIL import Image
 
 from lammps_inelastic.analysis import Cell, ParticleDump, ParticleFrame
-from lammps_inelastic.workflow import look
+from lammps_inelastic.workflow.looking import look
+from lammps_inelastic.workflow.looking.view import (
+    KnownContacts,
+    packing_values,
+    page_of_values,
+    view_of,
+)
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.report import all_sections, read_data, render
-from lammps_inelastic.workflow.store import (
+from lammps_inelastic.workflow.results.store import (
     Result,
     StoredStudy,
     read_result,
@@ -23,12 +29,6 @@ from lammps_inelastic.workflow.store import (
     write_studies,
 )
 from lammps_inelastic.workflow.study import Outputs
-from lammps_inelastic.workflow.view import (
-    KnownContacts,
-    packing_values,
-    page_of_values,
-    view_of,
-)
 from tests.helpers.few_spheres import TINY
 from tests.helpers.view_page import array_of, packing_in
 from tests.helpers.written_dumps import frame_text

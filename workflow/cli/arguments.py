@@ -9,10 +9,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..errors import StudyError, WorkflowError, meant
-from ..launch import Options, cores
+from ..running.launch import Options, cores
 from ..shipped import shipped_studies
-from ..starting_points import STUDY_ENDING
 from ..study import Case, Study, read_study
+from ..study.starting_points import STUDY_ENDING
 
 # A longer timeout is a slip of the pen [seconds].
 LONGEST_TIMEOUT = 1e9

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from ..files import check_target
-from ..folder import Folder
-from ..gather import gather_results
-from ..store import write_studies
+from ..results.store import write_studies
+from ..running.folder import Folder
+from ..running.gather import gather_results
 from .arguments import add_out, add_studies, as_cases, read_studies
 
 

@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 
 from lammps_inelastic.analysis import AnalysisError
 
-from .. import provenance
 from ..errors import INTERRUPTED, StudyError, WorkflowError
+from ..provenance import run_record
 from . import (
     collect,
     deck,
@@ -99,7 +99,7 @@ class _Version(argparse.Action):
     """Print which code this is, as it stands in every result, and end."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any, **__: Any) -> NoReturn:
-        code, versions = provenance.code(), provenance.versions()
+        code, versions = run_record.code(), run_record.versions()
         print(
             f"lammps-inelastic {code['version']} (fix {code['sources'][:12]}, "
             f"{code['compiler']}), LAMMPS {versions['lammps']}"

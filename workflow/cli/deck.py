@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from ..starting_points import deck_lines, text_of_deck
+from ..study.starting_points import deck_lines, text_of_deck
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:

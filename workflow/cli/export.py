@@ -11,7 +11,7 @@ import numpy as np
 from lammps_inelastic.analysis import AnalysisError, ParticleDump
 from lammps_inelastic.analysis.geometry import as_box
 
-from ..export import (
+from ..looking.export import (
     FILES,
     IMAGES,
     OF_CONTACTS,
@@ -22,8 +22,8 @@ from ..export import (
     write_spheres,
     write_surfaces,
 )
-from ..finished import PARTICLES as PARTICLE_DUMP
-from ..frames import notes_of
+from ..looking.frames import notes_of
+from ..provenance.finished import PARTICLES as PARTICLE_DUMP
 from .arguments import add_frame
 
 

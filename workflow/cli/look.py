@@ -10,12 +10,12 @@ import numpy as np
 
 from lammps_inelastic.analysis import AnalysisError
 
-from ..finished import CONTACTS as CONTACT_DUMP
-from ..finished import PARTICLES as PARTICLE_DUMP
-from ..look import PICTURE, look_at
-from ..look_output import as_json, as_text
+from ..looking.look import PICTURE, look_at
+from ..looking.look_output import as_json, as_text
+from ..looking.view import PAGE
+from ..provenance.finished import CONTACTS as CONTACT_DUMP
+from ..provenance.finished import PARTICLES as PARTICLE_DUMP
 from ..study import MOST_POINTS
-from ..view import PAGE
 from .arguments import add_frame
 
 

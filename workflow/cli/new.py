@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from ..starting_points import write_first_study
+from ..study.starting_points import write_first_study
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:

@@ -6,8 +6,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..report_files import write_report
-
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     """Add the subcommand to those of `inelastic`."""
@@ -40,5 +38,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the page and the figures, and print where they are; 0, or a WorkflowError."""
+    # Drawing takes a while to import, for which the other subcommands need not wait.
+    from ..report.report_files import write_report
+
     write_report(options.files, options.out, options.figures, options.markdown)
     return 0

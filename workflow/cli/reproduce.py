@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import WorkflowError
-from ..folder import Folder
-from ..gather import adopt_results, gather_results
-from ..report_files import write_report
-from ..run_and_gather import run_and_gather
+from ..results.store import write_studies
+from ..running.folder import Folder
+from ..running.gather import adopt_results, gather_results
+from ..running.run_and_gather import run_and_gather
 from ..shipped import (
     QUICK_FOLDER,
     RESULTS,
@@ -19,7 +19,6 @@ from ..shipped import (
     STUDIES_FOLDER,
     find_stored_results,
 )
-from ..store import write_studies
 from ..study import read_study
 from .arguments import add_out, add_running, running_options
 
@@ -83,6 +82,9 @@ def run(options: argparse.Namespace) -> int:
     with folder.gathering():
         write_studies(store, [gather_results(study, folder) for study in studies])
     print(f"results: {store}")
+    # Drawing takes a while to import, for which the other subcommands need not wait.
+    from ..report.report_files import write_report
+
     root = folder.root
     write_report([store], root / REPORT, root / FIGURES, root / TABLES)
     return 1 if failed else 0

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..errors import WorkflowError, meant
-from ..folder import Folder
-from ..run_and_gather import run_and_gather
+from ..running.folder import Folder
+from ..running.run_and_gather import run_and_gather
 from ..study import Case, Study
 from .arguments import add_out, add_running, add_studies, read_studies, running_options, warn
 

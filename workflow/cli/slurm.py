@@ -7,8 +7,8 @@ from typing import Any
 
 from ..errors import WorkflowError
 from ..files import writing
-from ..folder import Folder
-from ..slurm import job_script
+from ..running.folder import Folder
+from ..running.slurm import job_script
 from .arguments import add_out, add_studies, read_studies, study_path, warn, whole_number
 
 

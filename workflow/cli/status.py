@@ -10,11 +10,11 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from ..folder import Folder, last_lines
-from ..gather import other_code
-from ..launch import MEASURED, failure_in
-from ..provenance import differs
-from ..store import read_result
+from ..provenance.run_record import differs
+from ..results.store import read_result
+from ..running.folder import Folder, last_lines
+from ..running.gather import other_code
+from ..running.launch import MEASURED, failure_in
 from ..study import Case, Study
 from ..wide_table import COLUMNS, on_terminal, print_wide, width_of, wrapped
 from .arguments import add_out, add_studies, read_studies

@@ -9,13 +9,13 @@ from typing import Any
 
 from ..decks import find_deck
 from ..files import write_text, writing
-from ..folder import Folder, held
-from ..gather import gather_results
-from ..launch import Options, run_study
 from ..progress import Display
-from ..run_and_gather import print_outcome
+from ..results.store import Result, read_result, write_studies
+from ..running.folder import Folder, held
+from ..running.gather import gather_results
+from ..running.launch import Options, run_study
+from ..running.run_and_gather import print_outcome
 from ..shipped import SETTLING
-from ..store import Result, read_result, write_studies
 from ..study import Outputs, Study
 from ..tradeoff.advice import recommendations
 from ..tradeoff.comparison import compare

@@ -39,8 +39,8 @@ from lammps_inelastic.analysis.geometry import FloatArray, IntArray
 
 from ..errors import PackingError
 from ..files import whole, writing
-from ..finished import CONTACTS, PARTICLES
-from ..view import KnownContacts, view_of
+from ..looking.view import KnownContacts, view_of
+from ..provenance.finished import CONTACTS, PARTICLES
 from .containers import Ball, Container
 from .shapes import Shape
 

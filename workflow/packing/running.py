@@ -18,8 +18,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ..decks import Value
 from ..errors import PackingError
 from ..files import write_text
-from ..finished import CONTACTS, PARTICLES
-from ..launch import LAST_FILE, POLL, environment, exit_reason, interrupts, kill_group
+from ..provenance.finished import CONTACTS, PARTICLES
+from ..running.launch import LAST_FILE, POLL, environment, exit_reason, interrupts, kill_group
 from ..shipped import PACK, deck_text
 
 OUTPUT = "lmp.out"

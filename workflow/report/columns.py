@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from ..store import Result
+from ..results.store import Result
 from .blocks import Cell, Comparison, Table
 from .statistics import Difference
 from .text import NOT_RUN, as_difference, as_sample

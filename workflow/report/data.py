@@ -15,9 +15,9 @@ import numpy as np
 
 from ..decks import Value, find_deck
 from ..errors import WorkflowError
+from ..results.store import Result, StoredStudy, read_studies
 from ..shipped import DECKS
 from ..shipped import STUDIES as OF_THE_PAPER
-from ..store import Result, StoredStudy, read_studies
 from .curves import FloatArray
 
 # This deck pours free spheres: its particles are spheres.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Any
 
-from ..store import Result
+from ..results.store import Result
 from .data import SPHERES, deck_defaults
 from .text import DASH, as_count, as_runs, as_value
 

@@ -11,7 +11,7 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined, select_autoescape
 
-from ..provenance import THIS, versions
+from ..provenance.run_record import THIS, versions
 from .blocks import Block, Cell, Comparison, Section, Statement, Table, Text
 from .columns import Column, difference_cell, ours_text, table
 from .data import Data

@@ -1,6 +1,6 @@
 """The measured numbers that the tables of the report show, and how each is written.
 
-The names are those of the datasets numbers/NAME in workflow/schema.py.
+The names are those of the datasets numbers/NAME in workflow/results/schema.py.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from ..store import Result
+from ..results.store import Result
 from .blocks import Comparison
 from .columns import Column, Grouped, Row, difference_cell, ours_text
 from .statistics import Sample, numbers

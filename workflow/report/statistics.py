@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.stats import t as student
 
-from ..store import Result
+from ..results.store import Result
 
 Key = TypeVar("Key", bound=Hashable)
 # Samples of fewer values get the scatter of all samples of their kind: that of nine values is known

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lammps_inelastic.analysis import network_difference
 
-from ..store import Result
+from ..results.store import Result
 from .plan import Configuration, Run
 
 FloatArray = NDArray[np.float64]

@@ -25,7 +25,7 @@ from lammps_inelastic.analysis import read_run_log
 
 from ..decks import Value, find_deck
 from ..files import write_text
-from ..finished import LOG, read_json
+from ..provenance.finished import LOG, read_json
 from ..shipped import SETTLING
 from ..study import Case, Input, stage_of
 from .plan import Plan, input_of, start_values

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Block, Content, Statement, Text
 from ..columns import RUNS, Column, table
 from ..data import SPHERES, Data, deck_defaults

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...store import Result, StoredStudy
+from ...results.store import Result, StoredStudy
 from ..blocks import Block, Cell, Section, Table, missing
 from ..columns import RUNS, Column, LabelledRuns, table
 from ..curves import mean_curve, mean_distribution

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ...store import Result
+from ...results.store import Result
 from ..columns import RUNS, Column
 from ..data import SPHERES, Data
 from ..figures import Curve, points

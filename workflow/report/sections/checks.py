@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ...results.store import Result
 from ...shipped import DECKS
-from ...store import Result
 from ..blocks import Cell, Content
 from ..columns import RUNS, Column, table
 from ..data import Data

@@ -12,7 +12,7 @@ from scipy.stats import mannwhitneyu
 
 from lammps_inelastic.analysis import AnalysisError, Plateau, plateau
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Content, Statement, Text
 from ..columns import RUNS, Column, table
 from ..curves import FloatArray

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Comparison, Content, Text
 from ..columns import RUNS, Column, table
 from ..data import RUNS_OF_TABLE_1, SPHERES, Data, deck_defaults

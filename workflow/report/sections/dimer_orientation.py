@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Block, Comparison, Content, Statement, Text
 from ..columns import RUNS, Column, table
 from ..data import Data

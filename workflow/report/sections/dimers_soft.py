@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Content, Text
 from ..columns import RUNS, Column, table
 from ..curves import top

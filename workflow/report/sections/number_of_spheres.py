@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Block, Comparison, Content, Statement, Text
 from ..columns import Column, difference_cell, ours_text, table
 from ..data import Data

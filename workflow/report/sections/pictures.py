@@ -7,9 +7,9 @@ from functools import partial
 
 from lammps_inelastic.analysis.plots import draw_dimer, draw_dimer_section
 
-from ...pictures import NETWORK_DIAMETERS
-from ...store import Result
-from ...view import MOST_IN_REPORT, page_of_values
+from ...looking.pictures import NETWORK_DIAMETERS
+from ...looking.view import MOST_IN_REPORT, page_of_values
+from ...results.store import Result
 from ..blocks import Block, Content, Packing, Text
 from ..data import Data
 from ..figures import Figure, Pictures

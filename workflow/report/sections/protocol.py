@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Content, Text
 from ..columns import RUNS, Column, difference_cell, table
 from ..data import Data

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...decks import gravity_of
-from ...finished import MEASURED_BY
-from ...provenance import version_in
+from ...provenance.finished import MEASURED_BY
+from ...provenance.run_record import version_in
+from ...results.store import Result, StoredStudy
 from ...shipped import QUICK_FOLDER, STUDIES_FOLDER
 from ...shipped import STUDIES as OF_THE_PAPER
-from ...store import Result, StoredStudy
 from ..blocks import Block, Listing, Section, Table, Text, nothing_run
 from ..columns import Column, table
 from ..data import Data

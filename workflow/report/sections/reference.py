@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from lammps_inelastic.analysis import InputError, binned_exponent
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Block, Content, Text
 from ..columns import RUNS, Column, LabelledRuns, table
 from ..curves import mean_curve

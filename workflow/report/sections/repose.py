@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Content, Text
 from ..columns import RUNS, Column, table
 from ..data import Data

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Block, Content, Text
 from ..columns import Column, table
 from ..data import Data, series

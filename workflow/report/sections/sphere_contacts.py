@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Block, Cell, Comparison, Content, Statement, Text
 from ..columns import Column, table
 from ..curves import FloatArray

@@ -11,7 +11,7 @@ import numpy as np
 
 from lammps_inelastic.analysis import mueller_packing_fraction
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Content, Statement, Table, Text
 from ..columns import Column, table
 from ..curves import (

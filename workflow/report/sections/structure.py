@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from lammps_inelastic.analysis.structure import MOST_CRYSTALLINE, Q6_OF_CRYSTALS
 
-from ...store import Result
+from ...results.store import Result
 from ..blocks import Block, Cell, Content
 from ..columns import RUNS, Column, LabelledRuns, table
 from ..curves import FloatArray, mean_curve

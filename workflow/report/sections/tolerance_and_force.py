@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...store import Result
+from ...results.store import Result
 from .. import verdict
 from ..blocks import Comparison, Content, Statement, Table
 from ..columns import RUNS, RUNS_OF_PAPER, Column, table

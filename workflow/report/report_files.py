@@ -6,8 +6,13 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from .errors import WorkflowError
-from .files import check_target, write_text, writing
+from ..errors import WorkflowError
+from ..files import check_target, write_text, writing
+from .contents import all_sections
+from .data import read_data
+from .figures import Figure, Pictures
+from .markdown import render_markdown
+from .page import render, summarise
 
 
 def write_report(
@@ -29,11 +34,6 @@ def write_report(
             check_target(target, hdf5=False)
     if markdown is not None and markdown.resolve() == out.resolve():
         raise WorkflowError(f"{markdown}: page and tables need a file each: they have the same")
-    # Drawing takes a while to import, for which the other subcommands need not wait.
-    from .report import all_sections, read_data, render, render_markdown
-    from .report.figures import Figure, Pictures
-    from .report.page import summarise
-
     data = read_data(files)
     sections = all_sections(data, [path.name for path in files])
     text = render(data, sections)

@@ -42,8 +42,8 @@ from lammps_inelastic.analysis.export_files import named
 from lammps_inelastic.analysis.export_voxels import Progress
 from lammps_inelastic.analysis.geometry import FloatArray, IntArray, inside_of, spheres_reaching
 
-from .finished import CONTACTS as CONTACT_DUMP
-from .finished import open_in_folder
+from ..provenance.finished import CONTACTS as CONTACT_DUMP
+from ..provenance.finished import open_in_folder
 from .frames import choose_index
 
 # The formats, and the name of each one's file if no other is given.

@@ -7,9 +7,9 @@ import shlex
 import sys
 from pathlib import Path
 
-from .errors import WorkflowError
+from ..errors import WorkflowError
+from ..study import Study
 from .folder import Folder
-from .study import Study
 
 # Slurm writes the limit of a job like this: minutes, with hours and seconds, with days.
 _TIME = re.compile(

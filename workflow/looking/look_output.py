@@ -18,8 +18,8 @@ from lammps_inelastic.analysis import (
     ParticleFrame,
 )
 
+from ..wide_table import wrapped
 from .look import Look, as_ranges
-from .wide_table import wrapped
 
 NO_WALLS = "the box is not fixed: give --container or --walls"
 

@@ -6,14 +6,14 @@ import shutil
 import sys
 from pathlib import Path
 
-from .errors import WorkflowError
-from .files import whole
-from .finished import other_run
+from ..errors import WorkflowError
+from ..files import whole
+from ..provenance.finished import other_run
+from ..provenance.run_record import differs
+from ..provenance.same_runs import same_runs
+from ..results.store import StoredStudy, origin_of, read_result
+from ..study import Study
 from .folder import Folder, place_of
-from .provenance import differs
-from .same_runs import same_runs
-from .store import StoredStudy, origin_of, read_result
-from .study import Study
 
 
 def gather_results(study: Study, folder: Folder) -> StoredStudy:

@@ -24,10 +24,10 @@ from lammps_inelastic.analysis import (
     measure_packing,
 )
 
-from .finished import open_in_folder
+from ..provenance.finished import open_in_folder
+from ..study import PAPER_BOX
 from .frames import choose_index, notes_of
 from .pictures import draw_frame
-from .study import PAPER_BOX
 from .view import MOST_SPHERES, KnownContacts, draw_page
 
 PICTURE = "packing.png"

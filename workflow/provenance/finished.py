@@ -22,10 +22,10 @@ from lammps_inelastic.analysis import (
 from lammps_inelastic.analysis.dump_text import open_dump
 from lammps_inelastic.analysis.run_files import AGAIN
 
-from .decks import find_deck
-from .errors import WorkflowError
-from .files import read_regular
-from .shipped import DECKS, SETTLING
+from ..decks import find_deck
+from ..errors import WorkflowError
+from ..files import read_regular
+from ..shipped import DECKS, SETTLING
 
 FINISHED = "finished.json"
 PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from .errors import WorkflowError, meant
-from .files import writing
-from .shipped import DECKS, MINIMAL, PACK, deck_text, first_study_text
-from .study import mistake_in_name
+from ..errors import WorkflowError, meant
+from ..files import writing
+from ..shipped import DECKS, MINIMAL, PACK, deck_text, first_study_text
+from .study_file import mistake_in_name
 
 STUDY_ENDING = ".toml"
 # These are the names of all shipped decks; studies run neither the smallest one, without variables,

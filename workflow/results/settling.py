@@ -25,7 +25,7 @@ from lammps_inelastic.analysis import (
     largest_wall_overlap,
 )
 
-from .shipped import SETTLING
+from ..shipped import SETTLING
 from .thermo import read_thermo
 
 FloatArray = NDArray[np.float64]

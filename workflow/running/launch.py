@@ -21,12 +21,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from .errors import StudyError, WorkflowError
-from .finished import NOT_WHOLE, REMARKS
+from ..errors import StudyError, WorkflowError
+from ..progress import Display
+from ..provenance.finished import NOT_WHOLE, REMARKS
+from ..provenance.run_record import run_record
+from ..study import Case, Study, steps_of
 from .folder import MARK, Folder, last_lines
-from .progress import Display
-from .provenance import run_record
-from .study import Case, Study, steps_of
 
 POLL = 0.05
 # The step of a run is read from its output at most so often [seconds].
@@ -279,7 +279,7 @@ def in_a_line(error: Exception) -> str:
 def measuring(study: Study, case: Case, folder: Folder) -> list[str]:
     """Return the command that measures a finished run, in the case's folder."""
     target = folder.result(study, case).resolve()
-    module = "lammps_inelastic.workflow.measure"
+    module = "lammps_inelastic.workflow.results.measure"
     return [sys.executable, "-m", module, ".", str(target), study.outputs.model_dump_json()]
 
 

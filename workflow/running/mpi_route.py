@@ -22,7 +22,10 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from .errors import StudyError, WorkflowError
+from ..errors import StudyError, WorkflowError
+from ..progress import Display
+from ..provenance.run_record import run_record
+from ..study import Case, Study
 from .folder import Folder
 from .launch import (
     Options,
@@ -34,9 +37,6 @@ from .launch import (
     note_timeout,
     prepare_stage,
 )
-from .progress import Display
-from .provenance import run_record
-from .study import Case, Study
 
 # A deck that refuses its parameters quits. That would end the process, and all other cases with
 # it; an unknown command ends the deck only.

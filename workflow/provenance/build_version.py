@@ -62,7 +62,7 @@ def version_now(installed: str) -> str:
 
     In a development environment the package is linked to a clone, whose present commit counts.
     """
-    root = Path(__file__).resolve().parents[1]
+    root = Path(__file__).resolve().parents[2]
     if not (root / PROJECT).is_file():
         return installed
     return version_of(root, installed.partition("+")[0])

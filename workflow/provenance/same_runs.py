@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from .errors import WorkflowError
+from ..errors import WorkflowError
 
 FILE = "same_runs.toml"
 

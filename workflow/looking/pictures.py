@@ -21,7 +21,7 @@ from lammps_inelastic.analysis import (
 )
 from lammps_inelastic.analysis.pictures import few_colours
 
-from .study import Outputs
+from ..study import Outputs
 
 NETWORK_INCHES, NETWORK_DPI = 7.0, 150
 # The network is that of a slab of so many diameters: of a whole packing one sees only its front.

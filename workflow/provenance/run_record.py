@@ -13,9 +13,9 @@ from typing import Any
 
 from lammps_inelastic import plugin
 
+from ..study import Case
 from .build_version import version_now
 from .same_runs import SameRuns
-from .study import Case
 
 THIS = "lammps-inelastic"
 NOTHING_ELSE = SameRuns()

@@ -1,6 +1,6 @@
 """A finished run measured: from its folder to a result with everything that a study asks for.
 
-    python -m lammps_inelastic.workflow.measure FOLDER TARGET OUTPUTS
+    python -m lammps_inelastic.workflow.results.measure FOLDER TARGET OUTPUTS
 
 writes TARGET, an HDF5 file; OUTPUTS is JSON. It prints a line for each number that the packing does
 not have and for a box that reaches out of it, and nothing else. It is a process of its own, so that
@@ -52,9 +52,11 @@ from lammps_inelastic.analysis import (
 )
 from lammps_inelastic.analysis.run_files import AGAIN
 
-from .decks import gravity_of
-from .errors import WorkflowError, WriteError
-from .finished import (
+from ..decks import gravity_of
+from ..errors import WorkflowError, WriteError
+from ..looking.pictures import pictures_of
+from ..looking.view import KnownContacts, packing_values
+from ..provenance.finished import (
     CONTACTS,
     FINISHED,
     LOG,
@@ -65,14 +67,12 @@ from .finished import (
     PARTICLES,
     check_stage,
 )
-from .pictures import pictures_of
-from .provenance import THIS, versions
+from ..provenance.run_record import THIS, versions
+from ..study import Outputs, ProfileOutput
 from .reference_values import excess_contacts, firm_part, power_laws
 from .settling import contact_frames, has_soft_contacts, is_settling, measure_settling
 from .store import Result, write_result
-from .study import Outputs, ProfileOutput
 from .thermo import cumulated, read_thermo
-from .view import KnownContacts, packing_values
 
 # The packing fraction of a frame has so many random points, where it is not exact.
 POINTS_PER_FRAME = 100_000

@@ -28,11 +28,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
-from .errors import WorkflowError
-from .files import digest_of, is_file, write_text, writing
-from .finished import CONTACTS, FINISHED, PARTICLES, checksums, json_of
-from .store import origin_of
-from .study import INPUTS, Case, Study
+from ..errors import WorkflowError
+from ..files import digest_of, is_file, write_text, writing
+from ..provenance.finished import CONTACTS, FINISHED, PARTICLES, checksums, json_of
+from ..results.store import origin_of
+from ..study import INPUTS, Case, Study
 
 State = Literal["measured", "finished", "running", "cut off", "failed", "missing"]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..progress import Display
+from ..provenance.run_record import differs
+from ..results.store import write_studies
+from ..study import Case, Study
 from .folder import Folder
 from .gather import gather_results, other_code
 from .launch import Options, Outcome, run_study
-from .progress import Display
-from .provenance import differs
-from .store import write_studies
-from .study import Case, Study
 
 
 def run_and_gather(

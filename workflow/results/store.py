@@ -27,10 +27,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import WorkflowError
-from .files import whole
+from ..errors import WorkflowError
+from ..files import whole
+from ..study.case_name import name_in
 from .schema import PICTURES, SCHEMA, VERSION
-from .study.case_name import name_in
 
 Array = NDArray[Any]
 
@@ -47,7 +47,7 @@ class Result:
     ----------
     values : arrays by the names in SCHEMA
     pictures : PNG files by their names
-    record : how the run was made, from `provenance.run_record`
+    record : how the run was made, from `run_record.run_record`
     outputs : what was asked for, as JSON
     before : result of the packing before the last stage; None where there is one stage
     """

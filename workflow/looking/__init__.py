@@ -1,0 +1,1 @@
+"""One run looked at: numbers, pictures, pages, files for other programs."""
