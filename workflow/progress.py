@@ -87,6 +87,11 @@ class Display:
             for name, (at, last) in self._steps.items():
                 self.say(f"  step {at} of {last}: {name}")
 
+    def passed(self, case: str, line: str) -> None:
+        """Show that nothing is done with a case; where displays share the cases, show nothing."""
+        if self._cases is not None:
+            self.ended(case, line)
+
     def ended(self, case: str, line: str, more: Sequence[str] = ()) -> None:
         """Show that a case is done or has failed; `more` are lines of its log."""
         self._done += 1

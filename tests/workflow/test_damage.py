@@ -105,14 +105,14 @@ def test_a_damaged_result_is_named_and_set_aside(
     (line,) = captured.err.splitlines()
     assert line.startswith(f"inelastic: left out: {result}: ")
     # What `run`, a job and `reproduce` do first with a case
-    (line,) = folder.set_aside(read, first)
+    (line,) = folder.set_aside(read, first, folder.found(read, first))
     assert line.startswith(f"{result}: ")
     kept = result.with_name(f"{result.name}.damaged")
     assert line.endswith(f"; kept as {kept.name}")
     assert os.path.lexists(kept)
     assert not os.path.lexists(result)
     assert folder.is_finished(first)
-    assert folder.set_aside(read, second) == []
+    assert folder.set_aside(read, second, folder.found(read, second)) == []
 
 
 def test_a_damaged_result_is_measured_again(
@@ -150,7 +150,7 @@ def test_set_aside_again_and_again(study: Path) -> None:
     result = folder.result(read, case)
     for name in ("damaged", "damaged2", "damaged3"):
         result.write_text(name)
-        folder.set_aside(read, case)
+        folder.set_aside(read, case, folder.found(read, case))
         assert result.with_name(f"{result.name}.{name}").read_text() == name
 
 
@@ -178,7 +178,7 @@ def test_a_damaged_record_of_a_run(
     damage(run / FINISHED)
     assert main(["status", str(path), "--out", str(out)]) == 0
     assert "1 missing, 1 measured" in capsys.readouterr().out
-    (line,) = folder.set_aside(read, case)
+    (line,) = folder.set_aside(read, case, folder.found(read, case))
     assert line == f"{run / FINISHED}: cannot be read; kept as {run.name}.damaged"
     assert (run.with_name(f"{run.name}.damaged") / "particles.lammpsdump").is_file()
     assert not run.exists()

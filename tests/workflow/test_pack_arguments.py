@@ -16,7 +16,7 @@ from lammps_inelastic.workflow.packing.containers import as_container
 from lammps_inelastic.workflow.packing.shapes import volume_of
 from lammps_inelastic.workflow.packing.sizes import diameters_of
 from lammps_inelastic.workflow.packing.start import write_start
-from lammps_inelastic.workflow.running.launch import cores
+from lammps_inelastic.workflow.running.processes import cores
 
 MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"particles": 0}, "particles must be a whole number of at least 1, not 0"),

@@ -29,7 +29,7 @@ from lammps_inelastic.workflow.results.store import (
     write_studies,
 )
 from lammps_inelastic.workflow.running.folder import Folder
-from lammps_inelastic.workflow.running.launch import Options
+from lammps_inelastic.workflow.running.one_case import Options
 from lammps_inelastic.workflow.running.run_and_gather import run_and_gather
 from lammps_inelastic.workflow.shipped import shipped_studies
 from lammps_inelastic.workflow.study import Study, read_study

@@ -31,8 +31,8 @@ from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.results.settling import first_at_rest, overlaps_as_contacts
 from lammps_inelastic.workflow.results.store import Result, read_studies
 from lammps_inelastic.workflow.results.thermo import read_thermo
-from lammps_inelastic.workflow.running.folder import held
-from lammps_inelastic.workflow.running.launch import cores
+from lammps_inelastic.workflow.running.locks import held
+from lammps_inelastic.workflow.running.processes import cores
 from lammps_inelastic.workflow.study import Case
 from lammps_inelastic.workflow.tradeoff.advice import recommendations
 from lammps_inelastic.workflow.tradeoff.comparison import compare, reference_of

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..errors import StudyError, WorkflowError, meant
-from ..running.launch import Options, cores
+from ..running.one_case import Options
+from ..running.processes import cores
 from ..shipped import shipped_studies
 from ..study import Case, Study, read_study
 from ..study.starting_points import STUDY_ENDING

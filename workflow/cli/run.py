@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _print_commands(study: Study, cases: Sequence[Case], folder: Folder, ranks: int) -> None:
     for case in cases:
-        print(f"# {folder.state(study, case)}")
+        print(f"# {folder.state(case, folder.found(study, case))}")
         print(f"cd {shlex.quote(str(folder.part(case)))}")
         for command in case.commands(ranks):
             print(shlex.join(command))

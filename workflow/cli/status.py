@@ -12,9 +12,9 @@ from rich.text import Text
 
 from ..provenance.run_record import differs
 from ..results.store import read_result
-from ..running.folder import Folder, last_lines
+from ..running.folder import Folder
 from ..running.gather import other_code
-from ..running.launch import MEASURED, failure_in
+from ..running.measuring import last_failure
 from ..study import Case, Study
 from ..wide_table import COLUMNS, on_terminal, print_wide, width_of, wrapped
 from .arguments import add_out, add_studies, read_studies
@@ -45,18 +45,19 @@ def _print_status(study: Study, folder: Folder) -> None:
     states: Counter[str] = Counter()
     other = 0
     for number, case in enumerate(study.cases, 1):
-        state = folder.state(study, case)
+        found = folder.found(study, case)
+        state = folder.state(case, found)
         states[state] += 1
         note = ""
         if state == "failed":
             note = folder.reason(case)
-        elif state == "finished" and (said := failure_in(last_lines(folder.case(case) / MEASURED))):
+        elif state == "finished" and (said := last_failure(folder.case(case))):
             note = f"cannot be measured: {said}"
         elif state == "measured":
             note, same = _of_result(study, case, folder)
             other += not same
-        if damage := folder.damage(study, case):
-            note = f"{note}; {damage}" if note else damage
+        if found.damage:
+            note = f"{note}; {found.damage}" if note else found.damage
         rows.append((str(number), case.name, state, note))
     _print_rows(study.title, rows)
     print(f"{study.name}: " + ", ".join(f"{count} {state}" for state, count in states.items()))

@@ -11,9 +11,11 @@ from ..decks import find_deck
 from ..files import write_text, writing
 from ..progress import Display
 from ..results.store import Result, read_result, write_studies
-from ..running.folder import Folder, held
+from ..running.folder import Folder
 from ..running.gather import gather_results
-from ..running.launch import Options, run_study
+from ..running.launch import run_study
+from ..running.locks import held
+from ..running.one_case import Options
 from ..running.run_and_gather import print_outcome
 from ..shipped import SETTLING
 from ..study import Outputs, Study

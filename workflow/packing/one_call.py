@@ -13,7 +13,7 @@ import numpy as np
 from ..decks import Deck, Value
 from ..errors import PackingError
 from ..files import writing
-from ..running.launch import cores
+from ..running.processes import cores
 from ..shipped import PACK, deck_text
 from .checked import as_number, as_positive, as_whole
 from .containers import USUAL_DIAMETER, Container, as_container

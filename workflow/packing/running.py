@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import time
 from collections.abc import Mapping
@@ -18,8 +17,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ..decks import Value
 from ..errors import PackingError
 from ..files import write_text
-from ..provenance.finished import CONTACTS, PARTICLES
-from ..running.launch import LAST_FILE, POLL, environment, exit_reason, interrupts, kill_group
+from ..provenance.finished import CONTACTS, LAST_FILE, PARTICLES
+from ..running.processes import POLL, Command, exit_reason, interrupts, kill_group, start
 from ..shipped import PACK, deck_text
 
 OUTPUT = "lmp.out"
@@ -80,23 +79,13 @@ def run_deck(
 
 def _run(command: list[str], folder: Path, shown: _Shown, interrupted: list[int]) -> int:
     """Run a command until it ends or is interrupted; return its exit status."""
-    variables = environment()
-    with (folder / OUTPUT).open("wb") as output:
-        try:
-            process = subprocess.Popen(
-                command,
-                cwd=folder,
-                env=variables,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                # An interrupt at the keyboard would reach LAMMPS, too, and leave a bar behind.
-                start_new_session=True,
-            )
-        except FileNotFoundError:
-            raise PackingError(
-                f"there is no program {command[0]} beside {sys.executable} or on PATH"
-            ) from None
+    try:
+        # An interrupt at the keyboard does not reach LAMMPS, and leaves no bar behind.
+        process = start(Command(command, folder, folder / OUTPUT))
+    except FileNotFoundError:
+        raise PackingError(
+            f"there is no program {command[0]} beside {sys.executable} or on PATH"
+        ) from None
     try:
         with shown, (folder / OUTPUT).open("rb") as printed:
             while process.poll() is None and not interrupted:

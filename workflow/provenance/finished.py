@@ -30,6 +30,8 @@ from ..shipped import DECKS, SETTLING
 FINISHED = "finished.json"
 PARTICLES, CONTACTS = "particles.lammpsdump", "contacts.lammpsdump"
 LOG = "log.lammps"
+# Our own decks write this file last.
+LAST_FILE = "packing.restart"
 # A result's record is that of its run, and says under this key which version has measured it.
 MEASURED_BY = "measured by"
 # The exit status of the measuring process if a run's files are not whole, or not of that run.

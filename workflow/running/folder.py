@@ -16,36 +16,44 @@ one folder share their cases. What version 0.2 has left under a longer name stay
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
-import signal
-import time
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import Any, Literal
 
 from ..errors import WorkflowError
 from ..files import digest_of, is_file, write_text, writing
 from ..provenance.finished import CONTACTS, FINISHED, PARTICLES, checksums, json_of
 from ..results.store import origin_of
 from ..study import INPUTS, Case, Study
+from . import locks
+from .processes import kill_processes_in, last_lines
 
 State = Literal["measured", "finished", "running", "cut off", "failed", "missing"]
 
 UNKNOWN = "unknown"
 FAILED = "failed.json"
-# Every process that runs a case has this variable in its environment: other processes in the
-# folder, such as a user's shell, are left alone.
-MARK = "INELASTIC_CASE"
-# A killed process may take so long to go [seconds].
-PATIENCE = 10.0
-_PLAIN = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-# So long after one attempt at a lock comes the next [seconds].
-NEXT_ATTEMPT = 0.05
+
+
+@dataclass(frozen=True)
+class Found:
+    """What stands in the place of a case's result.
+
+    Attributes
+    ----------
+    measured : whether it is a result, of what the study asks for now
+    damage : what is wrong with it; None if it can be read, or nothing is there
+    """
+
+    measured: bool = False
+    damage: str | None = None
+
+
+NOTHING = Found()
 
 
 @dataclass(frozen=True)
@@ -84,11 +92,17 @@ class Folder:
         """Return where all measurements of a study are."""
         return self.root / "results" / study.name
 
-    def state(self, study: Study, case: Case) -> State:
-        """Say how far a case has come."""
-        if self.is_measured(study, case):
+    def state(self, case: Case, found: Found) -> State:
+        """Say how far a case has come.
+
+        Parameters
+        ----------
+        case : the case
+        found : what `found` has returned of it
+        """
+        if found.measured:
             return "measured"
-        if self._is_locked(case):
+        if locks.is_locked(self._lock(case)):
             return "running"
         if self.is_finished(case):
             return "finished"
@@ -96,39 +110,37 @@ class Folder:
             return "failed"
         return "cut off" if self.part(case).is_dir() else "missing"
 
-    def is_measured(self, study: Study, case: Case) -> bool:
-        """Say whether there is a result, of what the study asks for now."""
+    def found(self, study: Study, case: Case) -> Found:
+        """Look what stands in the place of a result."""
         path = self.result(study, case)
         try:
             outputs, record = origin_of(path)
-        except WorkflowError:
-            return False
-        return outputs == study.outputs.measured and case.is_of(record)
+        except WorkflowError as error:
+            return Found(damage=str(error)) if os.path.lexists(path) else NOTHING
+        return Found(measured=answers(study, case, outputs, record))
+
+    def is_measured(self, study: Study, case: Case) -> bool:
+        """Say whether there is a result, of what the study asks for now."""
+        return self.found(study, case).measured
 
     def is_finished(self, case: Case) -> bool:
         """Say whether there is a whole run of the case that can still be measured."""
         record = json_of(self.case(case) / FINISHED)
         return case.is_of(record) and is_file(self.case(case) / PARTICLES)
 
-    def damage(self, study: Study, case: Case) -> str | None:
-        """Return what is wrong with the result of a case; None if it can be read or is missing."""
-        path = self.result(study, case)
-        if not os.path.lexists(path):
-            return None
-        try:
-            origin_of(path)
-        except WorkflowError as error:
-            return str(error)
-        return None
-
-    def set_aside(self, study: Study, case: Case) -> list[str]:
+    def set_aside(self, study: Study, case: Case, found: Found) -> list[str]:
         """Rename a result and a finished run that cannot be read; return a line about each.
 
         Nothing of them is lost, and nothing of them is in the way. The case must be locked.
+
+        Parameters
+        ----------
+        study, case : the case, and the study that asks for its result
+        found : what `found` has returned of it
         """
         lines = []
-        if damage := self.damage(study, case):
-            lines.append(f"{damage}; kept as {_renamed(self.result(study, case)).name}")
+        if found.damage:
+            lines.append(f"{found.damage}; kept as {_renamed(self.result(study, case)).name}")
         run = self.case(case)
         if run.is_dir() and json_of(run / FINISHED) is None:
             lines.append(f"{run / FINISHED}: cannot be read; kept as {_renamed(run).name}")
@@ -169,64 +181,37 @@ class Folder:
             for name in (PARTICLES, CONTACTS):
                 (self.case(case) / case.folder_of(stage) / name).unlink(missing_ok=True)
 
-    @contextmanager
-    def lock(self, case: Case) -> Iterator[bool]:
+    def lock(self, case: Case) -> AbstractContextManager[bool]:
         """Lock a case, and give whether that was possible: somebody else may hold the lock.
 
         The lock goes with the process that holds it, however that ends.
         """
-        path = self._lock(case)
-        with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            # Neither a link's target nor a pipe is opened in its place.
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666)
-        with os.fdopen(handle, "w") as file:
-            yield _locked(file)
+        return locks.tried(self._lock(case))
 
-    @contextmanager
-    def gathering(self) -> Iterator[None]:
+    def gathering(self) -> AbstractContextManager[None]:
         """Wait until nobody else gathers results of this folder, and let nobody meanwhile.
 
         Who gathers and writes inside of it never replaces newer results by older ones. Where the
         file system has no locks, or nothing may be written or has been run, it does not wait.
         """
-        with held(self._gathers):
-            yield
-
-    @property
-    def _gathers(self) -> Path:
-        return self.root / "cases" / ".locks" / "results"
+        return locks.held(self.root / "cases" / ".locks" / "results")
 
     def _lock(self, case: Case) -> Path:
         return self.root / "cases" / ".locks" / case.name
 
-    def _is_locked(self, case: Case) -> bool:
-        try:
-            # The file may belong to somebody else, so it is opened for reading only.
-            handle = os.open(self._lock(case), os.O_RDONLY | _PLAIN)
-        except OSError:
-            return False
-        with os.fdopen(handle) as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                return True
-            except OSError:
-                return False
-        return False
-
     def begin(self, case: Case) -> Path:
-        """Make the folder for a new run, and put the decks and their input files there.
+        """Make the folders for a new run, and put the decks and their input files there.
 
         The rest of a run that was cut off is deleted, and any process in it is killed.
         """
         part = self.part(case)
-        _stop_processes_in(part)
+        kill_processes_in(part)
         shutil.rmtree(part, ignore_errors=True)
         with writing(part):
             part.mkdir(parents=True)
             for stage in case.stages:
                 (part / f"{stage.deck.name}.in").write_text(stage.deck.text)
+                (part / case.folder_of(stage)).mkdir(exist_ok=True)
             if case.inputs:
                 (part / INPUTS).mkdir()
             for name, file in case.inputs.items():
@@ -278,6 +263,17 @@ class Folder:
         return " ".join(str(said).split()) or UNKNOWN
 
 
+def answers(study: Study, case: Case, outputs: str, record: Mapping[str, Any]) -> bool:
+    """Say whether a result is what a study asks for now.
+
+    Parameters
+    ----------
+    study, case : the case, and the study that asks for its result
+    outputs, record : of the result, as in `Result`
+    """
+    return outputs == study.outputs.measured and case.is_of(record)
+
+
 def place_of(folder: Path, case: Case, ending: str = "") -> Path:
     """Return where something of a case is or would be: what version 0.2 has left, or else its own.
 
@@ -290,39 +286,6 @@ def place_of(folder: Path, case: Case, ending: str = "") -> Path:
     path = folder / f"{case.name}{ending}"
     before = folder / f"{case.name_before}{ending}"
     return before if os.path.lexists(before) and not os.path.lexists(path) else path
-
-
-@contextmanager
-def held(path: Path, line: str = "") -> Iterator[None]:
-    """Wait until nobody else holds a lock, and hold it.
-
-    Where the file system has no locks, or the lock's file cannot be made, it does not wait.
-
-    Parameters
-    ----------
-    path : of the lock's file, whose folder must be there
-    line : is printed before a wait; nothing is if it is empty
-    """
-    with ExitStack() as stack:
-        with suppress(OSError):
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666)
-            file = stack.enter_context(os.fdopen(handle, "w"))
-            if line and not _locked(file):
-                print(line, flush=True)
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-
-
-def _locked(file: IO[str]) -> bool:
-    for last in (False, False, True):
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            # The lock may be held for a moment only, by `inelastic status`.
-            time.sleep(0 if last else NEXT_ATTEMPT)
-        else:
-            return True
-    return False
 
 
 def _renamed(path: Path) -> Path:
@@ -340,45 +303,3 @@ def _renamed(path: Path) -> Path:
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write a JSON file, which is either whole or not there."""
     write_text(path, json.dumps(content, indent=2))
-
-
-def last_lines(path: Path, count: int = 8) -> list[str]:
-    """Return the last lines of a text file that are not empty; none if there is no file."""
-    try:
-        with path.open("rb") as file:
-            file.seek(max(0, path.stat().st_size - 20_000))
-            text = file.read().decode(errors="replace")
-    except OSError:
-        return []
-    return [line.rstrip() for line in text.splitlines() if line.strip()][-count:]
-
-
-def _stop_processes_in(folder: Path) -> None:
-    """Kill the processes that still work in a folder whose owner is gone, such as an lmp."""
-    deadline = time.monotonic() + PATIENCE
-    while pids := list(_processes_in(folder)):
-        for pid in pids:
-            try:
-                os.kill(pid, signal.SIGKILL)
-            except (ProcessLookupError, PermissionError):
-                continue
-        if time.monotonic() > deadline:
-            break
-        time.sleep(0.05)
-
-
-def _processes_in(folder: Path) -> Iterator[int]:
-    if not folder.is_dir() or not Path("/proc").is_dir():
-        return
-    inside = str(folder.resolve())
-    for entry in Path("/proc").iterdir():
-        if not entry.name.isdigit() or int(entry.name) == os.getpid():
-            continue
-        try:
-            where = os.readlink(entry / "cwd")
-            ours = MARK.encode() in (entry / "environ").read_bytes()
-            # A killed process that nobody has waited for yet still has an entry, without a folder.
-        except OSError:
-            continue
-        if ours and (where == inside or where.startswith(inside + "/")):
-            yield int(entry.name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ from ..provenance.run_record import differs
 from ..provenance.same_runs import same_runs
 from ..results.store import StoredStudy, origin_of, read_result
 from ..study import Study
-from .folder import Folder, place_of
+from .folder import Folder, answers, place_of
 
 
 def gather_results(study: Study, folder: Folder) -> StoredStudy:
@@ -23,13 +24,18 @@ def gather_results(study: Study, folder: Folder) -> StoredStudy:
     """
     results = []
     for case in study.cases:
-        if folder.is_measured(study, case):
-            path = folder.result(study, case)
-            results.append(read_result(path))
-            if said := other_run(folder.case(case), results[-1].record):
-                print(f"WARNING: {path} is {said}; delete it to measure that", file=sys.stderr)
-        elif damage := folder.damage(study, case):
+        path = folder.result(study, case)
+        if not os.path.lexists(path):
+            continue
+        try:
+            result = read_result(path)
+        except WorkflowError as damage:
             print(f"inelastic: left out: {damage}", file=sys.stderr)
+            continue
+        if answers(study, case, result.outputs, result.record):
+            results.append(result)
+            if said := other_run(folder.case(case), result.record):
+                print(f"WARNING: {path} is {said}; delete it to measure that", file=sys.stderr)
     return StoredStudy(study.name, study.title, study.text, results)
 
 
@@ -60,18 +66,19 @@ def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool 
     for case in study.cases:
         kept = place_of(source / study.name, case, ".h5")
         target = folder.result(study, case)
-        if folder.is_measured(study, case) or not kept.is_file():
+        found = folder.found(study, case)
+        if found.measured or not kept.is_file():
             continue
         try:
             outputs, record = origin_of(kept)
         except WorkflowError as error:
             print(f"not taken: {error}")
             continue
-        fits = outputs == study.outputs.measured and case.is_of(record)
+        fits = answers(study, case, outputs, record)
         if not fits or (not of_any_code and differs(case, record, same)):
             other += 1
             continue
-        for line in folder.set_aside(study, case):
+        for line in folder.set_aside(study, case, found):
             print(line)
         with whole(target) as temporary:
             shutil.copyfile(kept, temporary)

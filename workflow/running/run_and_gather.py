@@ -10,7 +10,8 @@ from ..results.store import write_studies
 from ..study import Case, Study
 from .folder import Folder
 from .gather import gather_results, other_code
-from .launch import Options, Outcome, run_study
+from .launch import run_study
+from .one_case import Options, Outcome
 
 
 def run_and_gather(

@@ -10,7 +10,7 @@ from typing import Any
 from ..decks import Rule, Value, as_value, find_deck, read_rule
 from ..errors import StudyError
 from ..files import is_file
-from ..running.launch import cores
+from ..running.processes import cores
 from ..shipped import SETTLING
 from ..study import MOST_CASES, is_word
 from .plan import NONE, Plan
