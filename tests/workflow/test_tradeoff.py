@@ -34,6 +34,7 @@ from lammps_inelastic.workflow.results.thermo import read_thermo
 from lammps_inelastic.workflow.running.locks import held
 from lammps_inelastic.workflow.running.processes import cores
 from lammps_inelastic.workflow.study import Case
+from lammps_inelastic.workflow.tradeoff import settling_runs
 from lammps_inelastic.workflow.tradeoff.advice import recommendations
 from lammps_inelastic.workflow.tradeoff.comparison import compare, reference_of
 from lammps_inelastic.workflow.tradeoff.figure import plot_errors
@@ -706,7 +707,7 @@ def test_a_failed_run_is_left_out_and_said(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     arguments, out = again
-    runs_of = tradeoff_command.runs_of
+    runs_of = settling_runs.runs_of
 
     def with_a_bad_one(plan: Plan) -> list[Run]:
         runs = runs_of(plan)
@@ -714,7 +715,7 @@ def test_a_failed_run_is_left_out_and_said(
         runs[0].case.stages[1].values["particle"] = "cubes"
         return runs
 
-    monkeypatch.setattr(tradeoff_command, "runs_of", with_a_bad_one)
+    monkeypatch.setattr(settling_runs, "runs_of", with_a_bad_one)
     assert main(arguments) == 1
     output = capsys.readouterr().out
     assert "ranks-1: 2 done, 1 failed" in output
