@@ -122,13 +122,8 @@ def contact_graph(
     """
     sides = contact_sides(contact_ids, sphere_ids, spheres.particles, images=spheres.has_images)
     centres = spheres.centres
-    strength = None if forces is None else as_floats(forces, "forces")
-    if strength is not None and strength.shape != (len(sides),):
-        raise InputError(f"forces must have shape ({len(sides)},), not {strength.shape}")
-    if strength is not None and not np.isfinite(strength).all():
-        raise InputError("forces hold NaN or infinity")
+    strength = None if forces is None else _strengths(forces, len(sides))
     wanted = np.full(len(sides), True) if walls else sides[:, 1] >= 0
-
     graph: networkx.Graph = networkx.Graph()
     lines = None
     if points is not None and spheres.has_images:
@@ -140,25 +135,38 @@ def contact_graph(
     # An edge is named by its two particles and, where there are several, by the image.
     ends = np.sort(sides[wanted], axis=1)
     names = ends if lines is None else np.column_stack([ends, _upwards(sides, lines)[wanted]])
-    edges, edge = np.unique(names, axis=0, return_inverse=True)
-    edge = edge.ravel()
-    data: dict[str, list[Any]] = {"contacts": np.bincount(edge, minlength=len(edges)).tolist()}
+    edges, edge, contacts = np.unique(names, axis=0, return_inverse=True, return_counts=True)
+    data: dict[str, list[Any]] = {"contacts": contacts.tolist()}
     if strength is not None:
-        sums = np.bincount(edge, weights=strength[wanted], minlength=len(edges))
-        data["force"] = sums.tolist()
+        data["force"] = np.bincount(edge.ravel(), strength[wanted], len(edges)).tolist()
     if lines is not None:
-        assert spheres.cell is not None
-        # A wall has no place: the line to it is that of no edge that is drawn.
-        low = np.maximum(edges[:, 0], 0)
-        along = centres[edges[:, 1]] - centres[low] + edges[:, 2:] @ spheres.cell.vectors
-        data["vector"] = [(x, y, z) for x, y, z in along.tolist()]
+        data["vector"] = [(x, y, z) for x, y, z in _vectors(edges, spheres).tolist()]
+    values = zip(*data.values(), strict=True)
     graph.add_edges_from(
-        (one, other, dict(zip(data, values, strict=True)))
-        for (one, other), values in zip(
-            edges[:, :2].tolist(), zip(*data.values(), strict=True), strict=True
-        )
+        (one, other, dict(zip(data, own, strict=True)))
+        for (one, other), own in zip(edges[:, :2].tolist(), values, strict=True)
     )
     return graph
+
+
+def _strengths(forces: ArrayLike, number: int) -> FloatArray:
+    """Return the strengths of so many contacts; raise InputError for any other number of them."""
+    strength = as_floats(forces, "forces")
+    if strength.shape != (number,):
+        raise InputError(f"forces must have shape ({number},), not {strength.shape}")
+    if not np.isfinite(strength).all():
+        raise InputError("forces hold NaN or infinity")
+    return strength
+
+
+def _vectors(edges: IntArray, spheres: Spheres) -> FloatArray:
+    """Return the lines along edges that are named by two particles and an image, (e, 3), length."""
+    assert spheres.cell is not None
+    centres = spheres.centres
+    # A wall has no place: the line to it is that of no edge that is drawn.
+    low = np.maximum(edges[:, 0], 0)
+    along: FloatArray = centres[edges[:, 1]] - centres[low] + edges[:, 2:] @ spheres.cell.vectors
+    return along
 
 
 def _upwards(sides: IntArray, lines: ContactLines) -> IntArray:
@@ -220,9 +228,23 @@ def draw_network(
         inside = ((ends[..., depth] >= slab[0]) & (ends[..., depth] <= slab[1])).all(axis=1)
         ends, force = ends[inside], None if force is None else force[inside]
     order = [across, depth, up] if isinstance(ax, Axes3D) else [across, up]
+    lines: FloatArray = ends[:, :, order]
+    _draw_lines(ax, lines, force, palette)
+    ax.set_xlabel("xyz"[across])
+    ax.set_ylabel("xyz"[depth if isinstance(ax, Axes3D) else up])
+    if isinstance(ax, Axes3D):
+        ax.set_zlabel("xyz"[up])
+    if len(lines):
+        # Depth runs away from the viewer: an order that would mirror the packing is turned.
+        _fit_axes(ax, lines, mirrored=(across, depth, up) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)))
+    return ax
+
+
+def _draw_lines(ax: Axes, lines: FloatArray, force: FloatArray | None, palette: str) -> None:
+    """Draw lines, (e, 2, 2 or 3), as strong as their forces, (e,); all alike without forces."""
     # The strongest are drawn last, on top of the others.
-    rank = np.arange(len(ends)) if force is None else np.argsort(np.abs(force), kind="stable")
-    lines: FloatArray = ends[rank][:, :, order]
+    rank = np.arange(len(lines)) if force is None else np.argsort(np.abs(force), kind="stable")
+    lines = lines[rank]
     share = np.zeros(len(lines))
     if force is not None and len(force):
         mean = np.abs(force).mean()
@@ -242,14 +264,6 @@ def draw_network(
                 cmap=palette,
                 linestyles=style,
             )
-    ax.set_xlabel("xyz"[across])
-    ax.set_ylabel("xyz"[depth if isinstance(ax, Axes3D) else up])
-    if isinstance(ax, Axes3D):
-        ax.set_zlabel("xyz"[up])
-    if len(lines):
-        # Depth runs away from the viewer: an order that would mirror the packing is turned.
-        _fit_axes(ax, lines, mirrored=(across, depth, up) in ((0, 2, 1), (1, 0, 2), (2, 1, 0)))
-    return ax
 
 
 def _edges(graph: networkx.Graph, lower_half: int | None) -> tuple[FloatArray, FloatArray | None]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from lammps_inelastic.analysis import AnalysisError
 
-from ..looking.look import PICTURE, look_at
+from ..looking.look import PICTURE, Wanted, look_at
 from ..looking.look_output import as_json, as_text
 from ..looking.view import PAGE
 from ..provenance.finished import CONTACTS as CONTACT_DUMP
@@ -105,10 +105,8 @@ def run(options: argparse.Namespace) -> int:
         if options.dump is not None:
             raise AnalysisError(f"{folder}: is a file; --dump names one in a folder")
         folder, name = folder.parent, folder.name
-    found = look_at(
-        folder / name,
-        folder / CONTACT_DUMP,
-        None if options.box is None else np.reshape(np.asarray(options.box, float), (3, 2)),
+    wanted = Wanted(
+        box=None if options.box is None else np.reshape(np.asarray(options.box, float), (3, 2)),
         whole_cell=options.cell,
         contact_gap=options.contact_gap,
         radius=options.radius,
@@ -123,6 +121,7 @@ def run(options: argparse.Namespace) -> int:
         picture=None if options.no_picture else folder / PICTURE,
         page=None if options.no_picture or options.no_page else folder / PAGE,
     )
+    found = look_at(folder / name, folder / CONTACT_DUMP, wanted)
     print(as_json(found) if options.json else as_text(found))
     if found.failure is not None:
         raise found.failure

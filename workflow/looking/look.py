@@ -82,31 +82,12 @@ class Look:
         return float(self.frame.radii.min())
 
 
-def look_at(
-    dump: Path,
-    contact_dump: Path,
-    box: FloatArray | None,
-    *,
-    whole_cell: bool,
-    contact_gap: float | None,
-    radius: float | None,
-    number: int | None,
-    step: int | None,
-    points: int,
-    seed: int,
-    container: FloatArray | None,
-    box_is_container: bool,
-    picture: Path | None,
-    page: Path | None,
-) -> Look:
-    """Measure a frame of a run and its contacts, and draw it.
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What a user wants to see of a run.
 
-    Contacts are those of all contact frames; where a frame is chosen, of its step alone.
-
-    Parameters
+    Attributes
     ----------
-    dump : path of the particle dump
-    contact_dump : path of the contact dump
     box : (3, 2), where the packing fraction and the coordination number are measured, length; None
         for the whole simulation box if it is periodic on all sides, and else for the paper's box
     whole_cell : whether it is the whole simulation box, periodic or not
@@ -122,27 +103,56 @@ def look_at(
     box_is_container : whether the faces of the dump's box are walls even if they are not fixed
     picture : path of the picture; None draws none
     page : path of the page of the packing; None writes none
+    """
+
+    box: FloatArray | None
+    whole_cell: bool
+    contact_gap: float | None
+    radius: float | None
+    number: int | None
+    step: int | None
+    points: int
+    seed: int
+    container: FloatArray | None
+    box_is_container: bool
+    picture: Path | None
+    page: Path | None
+
+    @property
+    def chooses_frame(self) -> bool:
+        """Whether a frame is chosen; otherwise it is the last one."""
+        return self.number is not None or self.step is not None
+
+
+def look_at(dump: Path, contact_dump: Path, wanted: Wanted) -> Look:
+    """Measure a frame of a run and its contacts, and draw it.
+
+    Contacts are those of all contact frames; where a frame is chosen, of its step alone.
+
+    Parameters
+    ----------
+    dump : path of the particle dump
+    contact_dump : path of the contact dump
+    wanted : what is measured, and drawn
 
     Raises AnalysisError with one line. A picture that cannot be drawn, or a page that cannot be
     written, is told by `Look.failure`: the numbers do not need it.
     """
-    particle_dump = ParticleDump(dump, radius=radius, whole=False)
-    chosen = number is not None or step is not None
-    files = _files(particle_dump, contact_dump if contact_gap is None else None, chosen, step)
-    frame = particle_dump[choose_index(particle_dump, number=number, step=step)]
-    if box is None and not whole_cell and not frame.spheres.endless.all():
-        box = np.reshape(np.asarray(PAPER_BOX, dtype=np.float64), (3, 2))
+    particles = ParticleDump(dump, radius=wanted.radius, whole=False)
+    files = _files(particles, contact_dump if wanted.contact_gap is None else None, wanted)
+    frame = particles[choose_index(particles, number=wanted.number, step=wanted.step)]
+    box, walls = _box(frame, wanted), _walls(frame, wanted)
     _check_frame(dump, frame, box)
-    walls = container
-    if walls is None and (box_is_container or _ends_are_fixed(frame)):
-        walls = frame.cell.flat_faces
-    gap = None if contact_gap is None else contact_gap * float(frame.radii.min())
-    steps, counts, last = _count_contacts(files, frame, gap, walls, frame.step if chosen else None)
-    failure = None if picture is None else _draw(picture, frame, walls, counts[-1])
-    packing = measure_packing(frame, counts, box, points=points, seed=seed, walls=walls)
+    gap = None if wanted.contact_gap is None else wanted.contact_gap * float(frame.radii.min())
+    only = frame.step if wanted.chooses_frame else None
+    steps, counts, last = _count_contacts(files, frame, gap, walls, only)
+    failure = None if wanted.picture is None else _draw(wanted.picture, frame, walls, counts[-1])
+    packing = measure_packing(
+        frame, counts, box, points=wanted.points, seed=wanted.seed, walls=walls
+    )
     # There is a frame of contacts, and a particle in the box.
     assert packing.coordination is not None
-    notes = notes_of(particle_dump, frame)
+    notes, page = notes_of(particles, frame), wanted.page
     if page is not None and len(frame.ids) > MOST_SPHERES:
         notes.append(f"no {page.name}: it has at most {MOST_SPHERES:,} spheres")
         page = None
@@ -157,17 +167,33 @@ def look_at(
         contact_gap=gap,
         frame=frame,
         box=box,
-        seed=seed,
+        seed=wanted.seed,
         packing=packing,
         coordination=packing.coordination,
         contact_steps=(steps[0], steps[-1]),
         walls_known=gap is None or walls is not None,
         wall_contacts_in_all=float(np.mean([count.walls.sum() for count in counts])),
-        picture=picture if failure is None else None,
+        picture=wanted.picture if failure is None else None,
         page=page,
         failure=failure,
         notes=tuple(notes),
     )
+
+
+def _box(frame: ParticleFrame, wanted: Wanted) -> FloatArray | None:
+    """Return the box that is measured, (3, 2), length; None for the whole simulation box."""
+    if wanted.box is None and not wanted.whole_cell and not frame.spheres.endless.all():
+        return np.reshape(np.asarray(PAPER_BOX, dtype=np.float64), (3, 2))
+    return wanted.box
+
+
+def _walls(frame: ParticleFrame, wanted: Wanted) -> FloatArray | None:
+    """Return the walls of the container, (3, 2), length; None if they are not known."""
+    if wanted.container is not None:
+        return wanted.container
+    if wanted.box_is_container or _ends_are_fixed(frame):
+        return frame.cell.flat_faces
+    return None
 
 
 def _draw(
@@ -182,26 +208,23 @@ def _draw(
     return None
 
 
-def _files(
-    particles: ParticleDump, contacts: Path | None, chosen: bool, step: int | None
-) -> RunFiles:
+def _files(particles: ParticleDump, contacts: Path | None, wanted: Wanted) -> RunFiles:
     """Open the files of a run, which must belong together, as far as there is a log to tell.
 
     Parameters
     ----------
     particles : particle dump
     contacts : path of the contact dump; None where contacts are counted by distance
-    chosen : whether the user has chosen a frame
-    step : time step of that frame; None where it is named by its number
+    wanted : says which frame is measured
     """
     if contacts is not None and not contacts.exists():
         raise AnalysisError(
             f"{contacts}: no such file; --contact-gap GAP counts contacts by distance"
         )
-    if step is not None:
+    if wanted.step is not None:
         # A frame that is named by its step is the right one, whatever became of the others.
         return RunFiles(particles, contacts, None)
-    if contacts is not None and particles.cut_off is not None and not chosen:
+    if contacts is not None and particles.cut_off is not None and not wanted.chooses_frame:
         raise AnalysisError(
             f"{particles.cut_off}; --contact-gap GAP counts contacts in the last whole frame"
         )

@@ -6,9 +6,13 @@ import os
 import shutil
 import tempfile
 import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
+from lammps_inelastic.analysis.geometry import FloatArray
 
 from ..decks import Deck, Value
 from ..errors import PackingError
@@ -18,7 +22,7 @@ from ..shipped import PACK, deck_text
 from .checked import as_number, as_positive, as_whole
 from .containers import USUAL_DIAMETER, Container, as_container
 from .result import Packing, read_packing
-from .running import run_deck
+from .running import Scene, run_deck
 from .shapes import Cluster, Shape, Sphere, as_shape, volume_of
 from .sizes import Sizes, diameters_of
 from .start import write_start
@@ -78,28 +82,75 @@ def pack(
     number = as_whole(seed, "seed", 1, LARGEST_SEED, f"a whole number from 1 to {LARGEST_SEED}")
     most = cores()
     at_once = as_whole(ranks, "ranks", 1, most, f"from 1 to {most}, the number of cores here")
-    allowed = as_number(tolerance, "tolerance", 1e-10, 0.1, "from 1e-10 to 0.1 radii")
     values: dict[str, Value] = {
-        "tolerance": allowed,
+        "tolerance": as_number(tolerance, "tolerance", 1e-10, 0.1, "from 1e-10 to 0.1 radii"),
         "density": as_positive(density, "density"),
         "gravity": as_positive(gravity, "gravity"),
+        "particles": count,
+        "seed": number,
     }
     target = None if folder is None else _free(Path(folder))
-    random = np.random.default_rng(number)
-    diameters = diameters_of(sizes, count, random)
-    room = form.room * float(diameters.max())
-    volume = volume_of(form, diameters)
-    walls = as_container(container, volume, room)
-    _check_room(form, diameters, walls, volume)
+    start = _start(form, sizes, count, container, np.random.default_rng(number))
+    return _packed(start, values, target, at_once, progress)
 
-    values |= {"particles": count, "seed": number, "diameter": float(diameters.max())}
-    values |= form.settings | walls.settings
-    deck = Deck(PACK, deck_text(PACK), shipped=True)
-    final = float(values.get("tolerance_measuring", deck.variables["tolerance_measuring"]))
-    values["tolerance_measuring"] = min(final, allowed)
-    used = {**deck.variables, **values}
-    steps = sum(int(value) for name, value in used.items() if name.startswith("steps_"))
-    several = float(diameters.min()) < float(diameters.max())
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """What is packed in what.
+
+    Attributes
+    ----------
+    shape : of the particles
+    diameters : of the spheres of each, (n,), length
+    walls : the container, with its height
+    random : draws the rest of the start, where LAMMPS does not
+    """
+
+    shape: Shape
+    diameters: FloatArray
+    walls: Container
+    random: np.random.Generator
+
+    @property
+    def words(self) -> str:
+        """What is packed."""
+        return f"{len(self.diameters)} {self.shape.plural}"
+
+    @property
+    def has_sizes(self) -> bool:
+        """Whether the particles are of several sizes."""
+        return bool(self.diameters.min() < self.diameters.max())
+
+
+def _start(
+    form: Shape,
+    sizes: Sizes,
+    count: int,
+    container: Container | None,
+    random: np.random.Generator,
+) -> _Start:
+    """Draw the sizes and choose the container; raise PackingError where they do not fit."""
+    diameters = diameters_of(sizes, count, random)
+    volume = volume_of(form, diameters)
+    walls = as_container(container, volume, form.room * float(diameters.max()))
+    _check_room(form, diameters, walls, volume)
+    return _Start(form, diameters, walls, random)
+
+
+def _packed(
+    start: _Start, values: dict[str, Value], target: Path | None, ranks: int, progress: bool
+) -> Packing:
+    """Run LAMMPS and read the packing.
+
+    Parameters
+    ----------
+    start : what is packed in what
+    values : what was asked for, by the names of the deck's parameters
+    target : folder for LAMMPS's files; None for a temporary one that goes with the packing
+    ranks : number of MPI ranks
+    progress : whether to show how far it is
+    """
+    values, steps = _complete(values, start)
     where = Path(tempfile.gettempdir()) if target is None else target.absolute().parent
     with writing(where):
         where.mkdir(parents=True, exist_ok=True)
@@ -109,28 +160,14 @@ def pack(
     try:
         with writing(where):
             run.mkdir()
-            if isinstance(form, Cluster) and not several:
-                (run / MOLECULE).write_text(form.molecule)
-                values["shape"] = MOLECULE
-            if several:
-                write_start(run / START, form, diameters, walls, float(values["density"]), random)
-        if several:
-            ratio = float(diameters.min() / diameters.max())
-            values |= {"start": START, "ratio": ratio, "inertia": "solid"}
-        run_deck(
-            run,
-            values,
-            what=f"{count} {form.plural}",
-            container=walls.words,
-            steps=steps,
-            ranks=at_once,
-            progress=progress,
-        )
+            values |= _write_files(run, start, float(values["density"]))
+        scene = Scene(start.words, start.walls.words, steps)
+        run_deck(run, values, scene, ranks=ranks, progress=progress)
         if target is not None:
             with writing(target):
                 run.rename(target)
                 run = target
-        packing = read_packing(run, form, walls)
+        packing = read_packing(run, start.shape, start.walls)
         if target is None:
             weakref.finalize(packing, shutil.rmtree, work, ignore_errors=True)
         else:
@@ -139,6 +176,31 @@ def pack(
         shutil.rmtree(work, ignore_errors=True)
         raise
     return packing
+
+
+def _complete(values: Mapping[str, Value], start: _Start) -> tuple[dict[str, Value], int]:
+    """Return all values that are not the deck's defaults, and the number of steps they ask for."""
+    all_values = {**values, "diameter": float(start.diameters.max())}
+    all_values |= start.shape.settings | start.walls.settings
+    deck = Deck(PACK, deck_text(PACK), shipped=True)
+    final = float(all_values.get("tolerance_measuring", deck.variables["tolerance_measuring"]))
+    all_values["tolerance_measuring"] = min(final, float(values["tolerance"]))
+    used = {**deck.variables, **all_values}
+    steps = sum(int(value) for name, value in used.items() if name.startswith("steps_"))
+    return all_values, steps
+
+
+def _write_files(run: Path, start: _Start, density: float) -> dict[str, Value]:
+    """Write the files that the deck reads, if any; return the values that name them."""
+    form, diameters = start.shape, start.diameters
+    if start.has_sizes:
+        write_start(run / START, form, diameters, start.walls, density, start.random)
+        ratio = float(diameters.min() / diameters.max())
+        return {"start": START, "ratio": ratio, "inertia": "solid"}
+    if isinstance(form, Cluster):
+        (run / MOLECULE).write_text(form.molecule)
+        return {"shape": MOLECULE}
+    return {}
 
 
 def _free(folder: Path) -> Path:

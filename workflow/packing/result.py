@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -51,6 +52,15 @@ ENDINGS = (
     *(".csv", ".npz", ".json", ".pqr", ".xyz", ".extxyz"),
     *(".vtu", ".vtp", ".html", ".stl", ".tif", ".raw"),
 )
+# Of these, these are lists of the spheres, and these are images.
+OF_SPHERES: Mapping[str, Callable[..., object]] = {
+    ".csv": write_csv,
+    ".json": write_json,
+    ".vtu": write_vtk,
+    ".xyz": write_xyz,
+    ".extxyz": write_xyz,
+}
+OF_VOXELS: Mapping[str, Callable[..., object]] = {".tif": write_tiff, ".raw": write_raw}
 # The smallest radius is so many voxels long, if no other size is given.
 VOXELS_PER_RADIUS = 10
 
@@ -188,44 +198,18 @@ class Packing:
         AnalysisError or WriteError if it cannot be written.
         """
         target = Path(path)
-        ending = target.suffix.lower()
-        if ending == "":
-            self._save_folder(target)
-            return target
-        if ending not in ENDINGS:
-            raise PackingError(
-                f"{target}: the name must end in {', '.join(ENDINGS)}, or have no ending for a "
-                "folder"
-            )
+        ending = _ending_of(target)
         frame, spheres = self.frame, self.frame.spheres
-        ids, bodies, contacts = frame.ids, frame.bodies, frame.contacts
-        edge = float(self.radii.min()) / VOXELS_PER_RADIUS if voxel is None else voxel
-        bounds = self._filled if box is None else box
-        match ending:
-            case ".csv":
-                write_csv(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
-            case ".npz":
-                self._save_npz(target)
-            case ".vtu":
-                write_vtk(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
-            case ".vtp":
-                write_contacts_vtk(target, self.contacts, ids, spheres)
-            case ".html":
-                known = KnownContacts(self.contacts.ids, self.contacts.points, self.forces)
-                caption = repr(self).partition("\n")[0]
-                write_view(target, view_of(frame, known, target.stem, caption))
-            case ".json":
-                write_json(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
-            case ".pqr":
-                write_pqr(target, spheres, ids=ids)
-            case ".stl":
-                write_stl(target, spheres, subdivisions=subdivisions)
-            case ".tif":
-                write_tiff(target, spheres, bounds, edge)
-            case ".raw":
-                write_raw(target, spheres, bounds, edge)
-            case _:
-                write_xyz(target, spheres, ids=ids, bodies=bodies, contacts=contacts)
+        if ending in OF_SPHERES:
+            lists = {"ids": frame.ids, "bodies": frame.bodies, "contacts": frame.contacts}
+            OF_SPHERES[ending](target, spheres, **lists)
+        elif ending in OF_VOXELS:
+            edge = float(self.radii.min()) / VOXELS_PER_RADIUS if voxel is None else voxel
+            OF_VOXELS[ending](target, spheres, self._filled if box is None else box, edge)
+        elif ending == ".stl":
+            write_stl(target, spheres, subdivisions=subdivisions)
+        else:
+            self._save_other(target, ending)
         return target
 
     def __repr__(self) -> str:
@@ -277,6 +261,22 @@ class Packing:
             return None
         return box
 
+    def _save_other(self, target: Path, ending: str) -> None:
+        frame = self.frame
+        match ending:
+            case ".npz":
+                self._save_npz(target)
+            case ".vtp":
+                write_contacts_vtk(target, self.contacts, frame.ids, frame.spheres)
+            case ".html":
+                known = KnownContacts(self.contacts.ids, self.contacts.points, self.forces)
+                caption = repr(self).partition("\n")[0]
+                write_view(target, view_of(frame, known, target.stem, caption))
+            case ".pqr":
+                write_pqr(target, frame.spheres, ids=frame.ids)
+            case _:
+                self._save_folder(target)
+
     def _save_folder(self, target: Path) -> None:
         if target.exists():
             raise PackingError(f"{target}: is there already, and is not replaced")
@@ -298,6 +298,16 @@ class Packing:
                 contact_points=self.contacts.points,
                 forces=self.forces,
             )
+
+
+def _ending_of(target: Path) -> str:
+    """Return the ending of a file's name; raise PackingError for one that says nothing."""
+    ending = target.suffix.lower()
+    if ending not in ("", *ENDINGS):
+        raise PackingError(
+            f"{target}: the name must end in {', '.join(ENDINGS)}, or have no ending for a folder"
+        )
+    return ending
 
 
 def read_packing(folder: Path, shape: Shape, container: Container) -> Packing:

@@ -6,6 +6,7 @@ import re
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
@@ -31,15 +32,23 @@ _STEP = re.compile(rb"^\s*(\d+)\s+[-\d]")
 _SOURCE = re.compile(r"\s*\([\w/.]+\.(?:cpp|h):\d+\)$")
 
 
+@dataclass(frozen=True)
+class Scene:
+    """What is run, as it is shown.
+
+    Attributes
+    ----------
+    what, container : what is packed in what, in words
+    steps : of all phases together
+    """
+
+    what: str
+    container: str
+    steps: int
+
+
 def run_deck(
-    folder: Path,
-    values: Mapping[str, Value],
-    *,
-    what: str,
-    container: str,
-    steps: int,
-    ranks: int,
-    progress: bool,
+    folder: Path, values: Mapping[str, Value], scene: Scene, *, ranks: int, progress: bool
 ) -> None:
     """Run the deck of `pack` in a folder, in which the files are that it reads.
 
@@ -49,8 +58,7 @@ def run_deck(
     ----------
     folder : where LAMMPS works and writes
     values : parameters of the deck that are not its defaults
-    what, container : what is packed in what, in words
-    steps : of all phases together
+    scene : what is run
     ranks : number of MPI ranks
     progress : whether to show how far it is
 
@@ -63,12 +71,13 @@ def run_deck(
     if ranks > 1:
         command = ["mpiexec", "-bind-to", "core", "-n", str(ranks), *command]
     with interrupts() as interrupted:
-        code = _run(command, folder, _Shown(what, steps, visible=progress), interrupted)
+        code = _run(command, folder, _Shown(scene, visible=progress), interrupted)
     if interrupted:
-        raise KeyboardInterrupt(f"LAMMPS is stopped, and nothing is left of {what}")
+        raise KeyboardInterrupt(f"LAMMPS is stopped, and nothing is left of {scene.what}")
     if code != 0:
         raise PackingError(
-            f"LAMMPS could not pack {what} in {container}: {_reason(folder / OUTPUT, code)}"
+            f"LAMMPS could not pack {scene.what} in {scene.container}: "
+            f"{_reason(folder / OUTPUT, code)}"
         )
     for name in (PARTICLES, CONTACTS, LAST_FILE):
         if not (folder / name).is_file():
@@ -100,9 +109,9 @@ def _run(command: list[str], folder: Path, shown: _Shown, interrupted: list[int]
 class _Shown:
     """How far LAMMPS is: a bar in a terminal or a notebook, otherwise a line now and then."""
 
-    def __init__(self, what: str, steps: int, *, visible: bool) -> None:
+    def __init__(self, scene: Scene, *, visible: bool) -> None:
         """Show nothing yet."""
-        self._what, self._steps, self._visible = what, steps, visible
+        self._what, self._steps, self._visible = scene.what, scene.steps, visible
         self._phase, self._step, self._told = "start", 0, time.monotonic()
         self._bar: Progress | None = None
         console = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -110,7 +119,7 @@ class _Shown:
         if visible and (console.is_terminal or (console.is_jupyter and _has_widgets())):
             columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
             self._bar = Progress(*columns, TimeElapsedColumn(), console=console, transient=True)
-            self._task = self._bar.add_task(self._line, total=steps)
+            self._task = self._bar.add_task(self._line, total=self._steps)
 
     def __enter__(self) -> Self:
         """Begin to show it."""

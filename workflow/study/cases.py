@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,49 +42,22 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
     seen: dict[str, str] = {}
     files: dict[Path, Input] = {}
     missing = False
-    rows = file.rows or [{}]
-    for number, row in enumerate(rows, 1):
+    for number, values in enumerate(file.rows or [{}], 1):
         where = f"rows[{number}]" if file.rows else "parameters"
-        own = {name: value for name, value in row.items() if name != "deck"}
+        deck_key = f"{where}.deck" if "deck" in values else "deck"
         try:
-            decks = _decks(row.get("deck", file.deck), folder)
+            decks = _decks(values.get("deck", file.deck), folder)
         except WorkflowError as error:
-            mistakes.append(f"{f'{where}.deck' if 'deck' in row else 'deck'}: {error}")
+            mistakes.append(f"{deck_key}: {error}")
             missing = True
             continue
-        parameters = {name: p for deck in decks for name, p in deck.parameters.items()}
-        known |= set(parameters)
-        for name in own:
-            if name in parameters:
-                continue
-            mistakes.append(_unknown(f"{where}.{name}", decks))
-        wanted = {f"parameters.{name}": (name, v) for name, v in file.parameters.items()}
-        wanted = {key: pair for key, pair in wanted.items() if pair[0] not in own}
-        wanted |= {f"{where}.{name}": (name, v) for name, v in own.items()}
-        choices: dict[str, list[Value]] = {}
-        for key, (name, value) in wanted.items():
-            if name in parameters:
-                choices[name] = values_of(key, name, value, decks, folder, mistakes)
-        keys = {name: key for key, (name, _) in wanted.items()}
-        if "particles" in choices and _starts_from_file(decks, choices, folder):
-            mistakes.append(
-                f"{keys['particles']}: not allowed where start is a file, which has a number of "
-                "particles of its own; give it in rows with another start"
-            )
-        if math.prod(len(values) for values in choices.values()) > MOST_CASES:
-            mistakes.append(f"{where}: more than {MOST_CASES} cases")
+        row = _row(where, deck_key, decks, values, file.parameters)
+        known |= row.known
+        choices = _choices(row, folder, mistakes)
         if mistakes:
             continue
-        keys["deck"] = f"{where}.deck" if "deck" in row else "deck"
-        for combination in itertools.product(*choices.values()):
-            try:
-                case = _case(decks, dict(zip(choices, combination, strict=True)), folder, files)
-            except WorkflowError as error:
-                mistakes.append(f"{where}: {error}")
-                break
-            if wrong := misfit(case.stages):
-                mistakes.append(f"{keys.get(wrong[0], keys['deck'])}: {wrong[1]}")
-            elif case.name not in seen:
+        for case in _combined(row, choices, folder, files, mistakes):
+            if case.name not in seen:
                 seen[case.name] = case.identity
                 yield case
             elif seen[case.name] != case.identity:
@@ -97,6 +71,88 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
     for name in file.parameters:
         if name not in known:
             mistakes.append(_unknown(f"parameters.{name}", _all_decks(file, folder)))
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A row of a study file, with the parameters that all rows share.
+
+    Attributes
+    ----------
+    where : key of the row, for errors
+    deck_key : key under which its decks stand
+    decks : its decks
+    wanted : what the file says of each parameter, by its name
+    keys : key under which it says so, by the same names
+    own : names of the parameters that the row itself gives
+    """
+
+    where: str
+    deck_key: str
+    decks: Sequence[Deck]
+    wanted: Mapping[str, Any]
+    keys: Mapping[str, str]
+    own: Sequence[str]
+
+    @property
+    def known(self) -> set[str]:
+        """The parameters that its decks have."""
+        return {name for deck in self.decks for name in deck.parameters}
+
+
+def _row(
+    where: str,
+    deck_key: str,
+    decks: Sequence[Deck],
+    values: Mapping[str, Any],
+    shared: Mapping[str, Any],
+) -> _Row:
+    """Return a row of a study file: what it says itself comes before what all rows share."""
+    own = {name: value for name, value in values.items() if name != "deck"}
+    others = {name: value for name, value in shared.items() if name not in own}
+    keys = {name: f"parameters.{name}" for name in others}
+    keys |= {name: f"{where}.{name}" for name in own}
+    return _Row(where, deck_key, decks, {**others, **own}, keys, list(own))
+
+
+def _choices(row: _Row, folder: Path, mistakes: list[str]) -> dict[str, list[Value]]:
+    """Return the values of each parameter that the decks of a row have, by its name."""
+    mistakes += [
+        _unknown(f"{row.where}.{name}", row.decks) for name in row.own if name not in row.known
+    ]
+    choices = {
+        name: values_of(row.keys[name], name, value, row.decks, folder, mistakes)
+        for name, value in row.wanted.items()
+        if name in row.known
+    }
+    if "particles" in choices and _starts_from_file(row.decks, choices, folder):
+        mistakes.append(
+            f"{row.keys['particles']}: not allowed where start is a file, which has a number of "
+            "particles of its own; give it in rows with another start"
+        )
+    if math.prod(len(values) for values in choices.values()) > MOST_CASES:
+        mistakes.append(f"{row.where}: more than {MOST_CASES} cases")
+    return choices
+
+
+def _combined(
+    row: _Row,
+    choices: Mapping[str, Sequence[Value]],
+    folder: Path,
+    files: dict[Path, Input],
+    mistakes: list[str],
+) -> Iterator[Case]:
+    """Return the cases of a row, one for each combination of the values of its parameters."""
+    for combination in itertools.product(*choices.values()):
+        try:
+            case = _case(row.decks, dict(zip(choices, combination, strict=True)), folder, files)
+        except WorkflowError as error:
+            mistakes.append(f"{row.where}: {error}")
+            return
+        if wrong := misfit(case.stages):
+            mistakes.append(f"{row.keys.get(wrong[0], row.deck_key)}: {wrong[1]}")
+        else:
+            yield case
 
 
 def _starts_from_file(

@@ -13,7 +13,7 @@ from scipy.stats import mannwhitneyu
 from lammps_inelastic.analysis import AnalysisError, Plateau, plateau
 
 from ...results.store import Result
-from ..blocks import Content, Statement, Text
+from ..blocks import Block, Content, Statement, Table, Text
 from ..columns import RUNS, Column, table
 from ..curves import FloatArray
 from ..data import Data, series
@@ -65,83 +65,82 @@ def coming_to_rest(data: Data) -> Content:
     results = nearest_size(with_frames, 10_000, data.usual_tolerance)
     if not results:
         return Content()
-    stated = data.paper["protocol"]
-    moments = _moments(results[0], stated)
-    runs = [
-        _Run(
-            count_of([result]),
-            seed_label(result),
-            _plateau(result, PACKING_FRACTION, BAND_OF_PHI),
-            _plateau(result, COORDINATION_NUMBER, BAND_OF_Z),
-            _scatter_at_rest(result, PACKING_FRACTION),
-            _scatter_at_rest(result, COORDINATION_NUMBER),
-        )
-        for result in results
-    ]
+    runs = [_run(result) for result in results]
     to_plateau = _times_to_the_plateau(data)
-    return Content(
+    blocks: list[Block] = [
+        _figure(data, results),
+        _table_of_plateaus(runs),
+        _remark(data.paper["protocol"]),
+    ]
+    if to_plateau:
+        blocks.append(_table_of_times(to_plateau))
+    return Content(blocks, statements=[*_statements(runs), *_statement_on_times(to_plateau)])
+
+
+def _run(result: Result) -> _Run:
+    """Return where a run comes to a plateau, and how much it scatters at rest."""
+    return _Run(
+        count_of([result]),
+        seed_label(result),
+        _plateau(result, PACKING_FRACTION, BAND_OF_PHI),
+        _plateau(result, COORDINATION_NUMBER, BAND_OF_Z),
+        _scatter_at_rest(result, PACKING_FRACTION),
+        _scatter_at_rest(result, COORDINATION_NUMBER),
+    )
+
+
+def _figure(data: Data, results: Sequence[Result]) -> Figure:
+    """Return a figure of both numbers against the step."""
+    moments = _moments(results[0], data.paper["protocol"])
+    return Figure(
+        "figure-5",
+        f"Packing fraction and coordination number in the box against the step, "
+        f"{as_count(count_of(results))} spheres. The two steps that the paper names are "
+        "those of its own code; dashed and shaded: its numbers of packings at rest.",
         [
-            Figure(
-                "figure-5",
-                f"Packing fraction and coordination number in the box against the step, "
-                f"{as_count(count_of(results))} spheres. The two steps that the paper names are "
-                "those of its own code; dashed and shaded: its numbers of packings at rest.",
-                [
-                    Panel(
-                        "step",
-                        "packing fraction",
-                        _curves(results, PACKING_FRACTION),
-                        references=_stated_packing_fraction(data, count_of(results)),
-                        moments=moments,
-                    ),
-                    Panel(
-                        "step",
-                        "coordination number",
-                        _curves(results, COORDINATION_NUMBER),
-                        bounds=stated_contacts(data),
-                        moments=moments,
-                    ),
-                ],
+            Panel(
+                "step",
+                "packing fraction",
+                _curves(results, PACKING_FRACTION),
+                references=_stated_packing_fraction(data, count_of(results)),
+                moments=moments,
             ),
-            table(
-                "From which step on the packing stays as it is",
-                COLUMNS,
-                runs,
-                (
-                    "The mean is that of the last quarter of the frames. Dash: not even the last "
-                    "frame. Frame to frame: standard deviation over the mean, in the phase of "
-                    "rest.",
-                ),
-            ),
-            Text(
-                f"Paper: a plateau after about {stated['plateau_reached_at_step']} steps; from "
-                f"step {stated['plateau_step']} on φ is constant within 0.1 % and z within 0.05 %. "
-                "A step of the paper's code and one of ours need not last the same time, and "
-                "nothing states how long the paper's is: the shapes can be compared, the numbers "
-                "of steps cannot. A bed of this size still gives way here and there when the run "
-                "ends, by far less than its packing fraction tells; contacts open and close with "
-                "it, and 0.05 % of z are two contacts of the box. z is that of single frames, and "
-                "until the count it is taken with the larger ε."
-            ),
-            *(
-                [
-                    table(
-                        "How long it takes to the plateau of φ",
-                        PLATEAU_COLUMNS,
-                        to_plateau,
-                        (
-                            "The plateau begins with the first frame from which on φ stays within "
-                            f"±{as_text(100 * BAND_OF_PHI, 1)} % of the mean of the last quarter. "
-                            "A bed that still gives way at the end of its run has not reached it: "
-                            "it counts as longer than all others.",
-                        ),
-                    )
-                ]
-                if to_plateau
-                else []
+            Panel(
+                "step",
+                "coordination number",
+                _curves(results, COORDINATION_NUMBER),
+                bounds=stated_contacts(data),
+                moments=moments,
             ),
         ],
-        statements=[*_statements(runs), *_statement_on_times(to_plateau)],
+    )
+
+
+def _table_of_plateaus(runs: Sequence[_Run]) -> Table:
+    """Return a table of the steps from which on the numbers stay as they are."""
+    return table(
+        "From which step on the packing stays as it is",
+        COLUMNS,
+        runs,
+        (
+            "The mean is that of the last quarter of the frames. Dash: not even the last "
+            "frame. Frame to frame: standard deviation over the mean, in the phase of "
+            "rest.",
+        ),
+    )
+
+
+def _remark(stated: Mapping[str, Any]) -> Text:
+    """Return a remark on the paper's steps, and on what still moves in the end."""
+    return Text(
+        f"Paper: a plateau after about {stated['plateau_reached_at_step']} steps; from "
+        f"step {stated['plateau_step']} on φ is constant within 0.1 % and z within 0.05 %. "
+        "A step of the paper's code and one of ours need not last the same time, and "
+        "nothing states how long the paper's is: the shapes can be compared, the numbers "
+        "of steps cannot. A bed of this size still gives way here and there when the run "
+        "ends, by far less than its packing fraction tells; contacts open and close with "
+        "it, and 0.05 % of z are two contacts of the box. z is that of single frames, and "
+        "until the count it is taken with the larger ε."
     )
 
 
@@ -240,6 +239,21 @@ PLATEAU_COLUMNS: Sequence[Column[_ToPlateau]] = (
     Column("time: median (quartiles)", lambda row: _median(row.time)),
     Column("computing [s]: median (quartiles)", lambda row: _median(row.seconds)),
 )
+
+
+def _table_of_times(rows: Sequence[_ToPlateau]) -> Table:
+    """Return a table of the times to the plateau, by the random force."""
+    return table(
+        "How long it takes to the plateau of φ",
+        PLATEAU_COLUMNS,
+        rows,
+        (
+            "The plateau begins with the first frame from which on φ stays within "
+            f"±{as_text(100 * BAND_OF_PHI, 1)} % of the mean of the last quarter. "
+            "A bed that still gives way at the end of its run has not reached it: "
+            "it counts as longer than all others.",
+        ),
+    )
 
 
 def _times_to_the_plateau(data: Data) -> list[_ToPlateau]:

@@ -205,45 +205,14 @@ def against_aspect(data: Data) -> Content:
     forces = {force: dimers for force, dimers in forces.items() if dimers}
     if not forces:
         return Content()
-    consistent, printed = stated["consistent_aspect_ratio"], stated["stated_aspect_ratio"]
+    consistent = stated["consistent_aspect_ratio"]
     rows = [
         _our_row(force, aspect, group)
         for force, dimers in forces.items()
         for aspect, group in dimers.items()
     ]
     blocks: list[Block] = [
-        Figure(
-            "anisotropy",
-            "Root mean square of the components of the vector between the two spheres of a "
-            "dimer, over what each would be if no direction was preferred, by the random force. y "
-            f"is along gravity. The paper's numbers are those of L/d = {as_short(consistent)}.",
-            [
-                Panel(
-                    "aspect ratio L/d",
-                    "a / isotropic a",
-                    [
-                        points(
-                            f"a_{axis}",
-                            [row.value for row in rows if row.force == force],
-                            [row.ratios[axis] for row in rows if row.force == force],
-                        )
-                        for axis in AXES
-                    ]
-                    + [
-                        curve(
-                            f"a_{axis}, paper",
-                            [consistent],
-                            [_stated_ratio(stated, axis)],
-                            kind="apart",
-                        )
-                        for axis in AXES
-                    ],
-                    references=[("isotropic", 1.0)],
-                    title=f"random force {as_short(force)}",
-                )
-                for force in forces
-            ],
-        ),
+        _figure(rows, stated),
         table(
             "Orientation of dimers in the box",
             COLUMNS,
@@ -253,14 +222,7 @@ def against_aspect(data: Data) -> Content:
                 "is larger.",
             ),
         ),
-        Text(
-            "Paper: dimers lie down, a_y < a_x = a_z, and more so the longer they are. Its "
-            f"four numbers are printed for L/d = {printed}, but a_x² + a_y² + a_z² is the "
-            "square of the distance of the two centres, and theirs is that of L/d = "
-            f"{consistent}: compare with that row. For {printed} the isotropic value is "
-            f"{as_text((printed - 1) * DIAMETER / math.sqrt(3), 4)}, not "
-            f"{as_text(stated['isotropic'], 4)}."
-        ),
+        _remark(stated),
     ]
     comparisons = [
         one
@@ -271,6 +233,57 @@ def against_aspect(data: Data) -> Content:
     weakest = min(forces)
     return Content(
         blocks, comparisons, _statements([row for row in rows if row.force == weakest], weakest)
+    )
+
+
+def _figure(rows: Sequence[_Orientation], stated: Mapping[str, Any]) -> Figure:
+    """Return a figure of the components against the aspect ratio, by the random force."""
+    consistent = stated["consistent_aspect_ratio"]
+    forces = list(dict.fromkeys(row.force for row in rows))
+    return Figure(
+        "anisotropy",
+        "Root mean square of the components of the vector between the two spheres of a "
+        "dimer, over what each would be if no direction was preferred, by the random force. y "
+        f"is along gravity. The paper's numbers are those of L/d = {as_short(consistent)}.",
+        [
+            Panel(
+                "aspect ratio L/d",
+                "a / isotropic a",
+                [
+                    points(
+                        f"a_{axis}",
+                        [row.value for row in rows if row.force == force],
+                        [row.ratios[axis] for row in rows if row.force == force],
+                    )
+                    for axis in AXES
+                ]
+                + [
+                    curve(
+                        f"a_{axis}, paper",
+                        [consistent],
+                        [_stated_ratio(stated, axis)],
+                        kind="apart",
+                    )
+                    for axis in AXES
+                ],
+                references=[("isotropic", 1.0)],
+                title=f"random force {as_short(force)}",
+            )
+            for force in forces
+        ],
+    )
+
+
+def _remark(stated: Mapping[str, Any]) -> Text:
+    """Return a remark on the aspect ratio of the paper's numbers."""
+    consistent, printed = stated["consistent_aspect_ratio"], stated["stated_aspect_ratio"]
+    return Text(
+        "Paper: dimers lie down, a_y < a_x = a_z, and more so the longer they are. Its "
+        f"four numbers are printed for L/d = {printed}, but a_x² + a_y² + a_z² is the "
+        "square of the distance of the two centres, and theirs is that of L/d = "
+        f"{consistent}: compare with that row. For {printed} the isotropic value is "
+        f"{as_text((printed - 1) * DIAMETER / math.sqrt(3), 4)}, not "
+        f"{as_text(stated['isotropic'], 4)}."
     )
 
 

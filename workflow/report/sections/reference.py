@@ -82,6 +82,12 @@ PARTS = (
     _Part("forces of 0.001 to 0.02", *FORCES, 1e-3, 1.77e-2),
     _Part("forces of 0.02 to 0.3", *FORCES, 1.77e-2, 0.3),
 )
+THEORY = Text(
+    "Theory of amorphous packings in many dimensions (Charbonneau, Corwin, Parisi and "
+    "Zamponi, Phys. Rev. Lett. 114 (2015) 125504): gaps g^(-0.413); forces f^0.423 where "
+    "the opening of a contact moves the whole packing, and f^0.17 where it moves few "
+    "particles, as most weak contacts do."
+)
 
 
 def reference(data: Data) -> Content:
@@ -90,7 +96,13 @@ def reference(data: Data) -> Content:
     cases = [LabelledRuns(label, group) for label, group in groups.items()]
     if not cases:
         return Content()
-    blocks: list[Block] = [
+    figures = [*_power_laws(cases), *_radial(cases), *_layers(cases), *_floor(cases)]
+    return Content([*_tables(cases), THEORY, *figures])
+
+
+def _tables(cases: Sequence[LabelledRuns]) -> list[Block]:
+    """Return the tables of the numbers, and of the exponents of the power laws."""
+    return [
         table(
             f"Hard packings of {as_count(count_of(cases[0].group))} particles",
             COLUMNS,
@@ -121,13 +133,11 @@ def reference(data: Data) -> Content:
                 "the same height. Where two parts have one exponent, the law is a power.",
             ),
         ),
-        Text(
-            "Theory of amorphous packings in many dimensions (Charbonneau, Corwin, Parisi and "
-            "Zamponi, Phys. Rev. Lett. 114 (2015) 125504): gaps g^(-0.413); forces f^0.423 where "
-            "the opening of a contact moves the whole packing, and f^0.17 where it moves few "
-            "particles, as most weak contacts do."
-        ),
     ]
+
+
+def _power_laws(cases: Sequence[LabelledRuns]) -> list[Block]:
+    """Return a figure of small gaps and weak forces, if they were measured."""
     laws = [
         panel
         for panel in (
@@ -136,60 +146,75 @@ def reference(data: Data) -> Content:
         )
         if panel is not None
     ]
-    if laws:
-        blocks.append(
-            Figure(
-                "power-laws",
-                "Density of small gaps, and of contact forces over their mean at the same height.",
-                laws,
-            )
-        )
+    if not laws:
+        return []
+    return [
+        Figure(
+            "power-laws",
+            "Density of small gaps, and of contact forces over their mean at the same height.",
+            laws,
+        ),
+    ]
+
+
+def _radial(cases: Sequence[LabelledRuns]) -> list[Block]:
+    """Return a figure of the radial distribution function, if it was measured."""
     around = _curves(cases, "structure/distance", "structure/radial_distribution")
-    if around:
-        blocks.append(
-            Figure(
-                "radial",
-                "Radial distribution function of the particles' centres.",
-                [Panel("r [container widths]", "g(r)", around, references=[("no order", 1.0)])],
-            )
-        )
+    if not around:
+        return []
+    return [
+        Figure(
+            "radial",
+            "Radial distribution function of the particles' centres.",
+            [Panel("r [container widths]", "g(r)", around, references=[("no order", 1.0)])],
+        ),
+    ]
+
+
+def _layers(cases: Sequence[LabelledRuns]) -> list[Block]:
+    """Return a figure of the contacts in layers above the floor, if they were counted."""
     layers = _curves(cases, "layers/height", "layers/coordination_number")
-    if layers:
-        blocks.append(
-            Figure(
-                "layers",
-                "Contacts with other particles in layers above the floor, a diameter thick, of "
-                "particles between the sides of the measuring box. Near the floor the wall takes "
-                "the place of particles, and at the free surface there are fewer of them: the box "
-                "lies between, so that its mean is above twice the degrees of freedom of a "
-                "particle, while the whole packing has as many contacts as degrees of freedom.",
-                [
-                    Panel(
-                        "height above the floor / d",
-                        "contacts per particle",
-                        layers,
-                        references=[
-                            ("twice the degrees of freedom: spheres", 6.0),
-                            ("twice the degrees of freedom: dimers", 10.0),
-                        ],
-                    )
-                ],
-            )
-        )
+    if not layers:
+        return []
+    return [
+        Figure(
+            "layers",
+            "Contacts with other particles in layers above the floor, a diameter thick, of "
+            "particles between the sides of the measuring box. Near the floor the wall takes "
+            "the place of particles, and at the free surface there are fewer of them: the box "
+            "lies between, so that its mean is above twice the degrees of freedom of a "
+            "particle, while the whole packing has as many contacts as degrees of freedom.",
+            [
+                Panel(
+                    "height above the floor / d",
+                    "contacts per particle",
+                    layers,
+                    references=[
+                        ("twice the degrees of freedom: spheres", 6.0),
+                        ("twice the degrees of freedom: dimers", 10.0),
+                    ],
+                )
+            ],
+        ),
+    ]
+
+
+def _floor(cases: Sequence[LabelledRuns]) -> list[Block]:
+    """Return a figure of the packing fraction above the floor, if it was measured."""
     floors = [
         curve(case.label, *mean_curve(found), kind="profile")
         for case in cases
         if (found := profiles(case.group))
     ]
-    if floors:
-        blocks.append(
-            Figure(
-                "floor",
-                "Packing fraction in slabs above the floor.",
-                [Panel("height above the floor / d", "packing fraction", floors)],
-            )
-        )
-    return Content(blocks)
+    if not floors:
+        return []
+    return [
+        Figure(
+            "floor",
+            "Packing fraction in slabs above the floor.",
+            [Panel("height above the floor / d", "packing fraction", floors)],
+        ),
+    ]
 
 
 def _label(result: Result) -> str:
