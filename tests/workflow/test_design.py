@@ -54,7 +54,7 @@ def test_every_file_that_is_named_exists(name: str) -> None:
     assert [link for link in links if not (ROOT / link).exists()] == []
 
 
-def listed_in(text: str) -> set[Path]:
+def listed_in_rooms(text: str) -> set[Path]:
     """Return what the sections of the rooms list: each file in the section of its own folder."""
     rooms = text[text.index("## Rooms") : text.index("## One step")]
     return {places[0] for _, places in named_in(rooms)}
@@ -80,7 +80,7 @@ def is_docstring_alone(path: Path) -> bool:
 
 
 def test_every_source_file_is_listed_in_the_section_of_its_folder() -> None:
-    listed, files = listed_in((ROOT / "DESIGN.md").read_text()), sources()
+    listed, files = listed_in_rooms((ROOT / "DESIGN.md").read_text()), sources()
     assert len(files) > 200
     assert [str(path.relative_to(ROOT)) for path in files if not is_listed(path, listed)] == []
 
@@ -93,9 +93,9 @@ def test_a_file_that_is_not_listed_is_seen() -> None:
         ("- `gluey.{h,cpp}`", "src_fix/laws/gluey.h"),
         ("- `sections/`", "workflow/report/sections/agitation.py"),
     ):
-        assert is_listed(ROOT / missing, listed_in(text))
+        assert is_listed(ROOT / missing, listed_in_rooms(text))
         (line,) = (line for line in lines if line.startswith(start))
-        assert not is_listed(ROOT / missing, listed_in(text.replace(line, "")))
+        assert not is_listed(ROOT / missing, listed_in_rooms(text.replace(line, "")))
 
 
 # Folders whose section on the page lists their files, each and no other ones.
