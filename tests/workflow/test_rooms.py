@@ -109,6 +109,29 @@ def test_no_subcommand_is_imported_but_by_the_command_line(arrows: dict[str, set
     assert importing == {"workflow.cli.command_line": sorted(subcommands)}
 
 
+def private_names_in(text: str) -> list[str]:
+    """Return the names with an underscore that a module imports from another one."""
+    return [
+        alias.name
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.name.startswith("_") and not alias.name.startswith("__")
+    ]
+
+
+def test_no_module_imports_private_names_of_another() -> None:
+    assert private_names_in("from ._core import a, _b\nfrom c import __version__") == ["_b"]
+    found = {name: private_names_in(path.read_text()) for name, path in MODULES.items()}
+    assert {name: private for name, private in found.items() if private} == {}
+
+
+def test_both_ways_to_run_cases_share_one_module(arrows: dict[str, set[str]]) -> None:
+    ways = "workflow.running.launch", "workflow.running.mpi_route"
+    assert all("workflow.running.one_case" in arrows[way] for way in ways)
+    assert not any(other in arrows[way] for way in ways for other in ways)
+
+
 @pytest.mark.parametrize(
     ("text", "found"),
     [
