@@ -305,6 +305,23 @@ def test_collect_replaces_hdf5_files_only(study: Path, capsys: pytest.CaptureFix
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ranks", [0, 1])
+def test_status_says_why_a_run_cannot_be_measured(study: Path, ranks: int) -> None:
+    """Also where the ranks of an MPI job have run it."""
+    path, out = study / "few.toml", study / "out"
+    for result in (out / "results" / "few").iterdir():
+        result.unlink()
+    for dump in out.glob("cases/*/particles.lammpsdump"):
+        dump.write_bytes(dump.read_bytes()[:2000])
+    job = ["--mpi"] if ranks else []
+    said = inelastic("run", path, "--out", out, *job, ranks=ranks)
+    assert said.returncode == 1
+    assert "few: 2 failed" in said.stdout
+    told = inelastic("status", path, "--out", out).stdout
+    assert told.count("cannot be measured: particles.lammpsdump, line") == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [0, 1])
 def test_measuring_takes_too_long(study: Path, ranks: int) -> None:
     """What was run stays, and is measured when there is more time."""
     path, out = study / "few.toml", study / "out"
