@@ -46,15 +46,41 @@ namespace {
   // sixteenth that targets are of it (contact_targets.cpp; of bodies a third as much).
   constexpr double MOST_MOVED = 0.4;
 
-  // Tells whether velocities have come to what they end with. Collective.
-  template <typename Real>
-  bool has_settled(PackedIterations<Real> &iterations, double accuracy, Host &host)
-  {
-    iterations.set_targets();
-    double moved = iterations.moved_since_kept(accuracy);
-    host.reduce(nullptr, 0, &moved, 1);
-    return moved <= MOST_MOVED;
-  }
+  // Whether the velocities of a search have come to what they end with.
+  template <typename Real> class Settling {
+   public:
+    // Velocities that are not `asked` for have always settled.
+    Settling(PackedIterations<Real> &iterations, bool asked, long iterations_before) :
+        iterations_(iterations), asked_(asked), next_kept_(iterations_before + 2)
+    {
+    }
+
+    // Collective.
+    bool has_settled(double accuracy, Host &host)
+    {
+      if (!asked_) return true;
+      iterations_.set_targets();
+      double moved = iterations_.moved_since_kept(accuracy);
+      host.reduce(nullptr, 0, &moved, 1);
+      return moved <= MOST_MOVED;
+    }
+
+    // Call it after each iteration.
+    void see(long iteration)
+    {
+      if (!asked_) return;
+      if (iteration >= next_kept_) {
+        iterations_.keep_velocities();
+        next_kept_ = iteration + iteration / 2 + 4;
+      }
+      if (sets_targets(++in_search_)) iterations_.set_targets();
+    }
+
+   private:
+    PackedIterations<Real> &iterations_;
+    bool asked_;
+    long next_kept_, in_search_ = 0;
+  };
 
   // The weights of accelerated_gradient.h.
   class Momentum {
@@ -97,7 +123,7 @@ namespace {
   {
     double sums[3] = {mine.uphill, mine.curved, mine.steep};
     double maxima[6] = {-mine.least_gap, mine.most_under_force, mine.heaviest,
-                        mine.farthest,   mine.unsolved,         mine.unsolved_beyond_blur};
+                        mine.farthest,   mine.unsolved,         mine.unblurred};
     host.reduce(sums, 3, maxima, 6);
     packed::Passed all;
     all.uphill = sums[0];
@@ -108,7 +134,7 @@ namespace {
     all.heaviest = maxima[2];
     all.farthest = maxima[3];
     all.unsolved = maxima[4];
-    all.unsolved_beyond_blur = maxima[5];
+    all.unblurred = maxima[5];
     return all;
   }
 
@@ -166,21 +192,19 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
                                              const Scales &scales, Host &host, SolverResult &result)
 {
   constexpr bool SINGLE = sizeof(Real) < sizeof(double);
-  const bool by_velocity = limits.accuracy > 0.0 && limits.coarseness == 1.0;
-
   iterations.prepare(problem, diagonal_, gap_,
                      IDLE_GAP * std::max(limits.tolerance, result.residual.largest()), scales,
                      targets_, gap_operator_.change(), limits.tolerance);
   std::vector<double> &impulse = problem.contacts.impulse;
   Momentum momentum;
-  long next_check = 0, next_kept = result.iterations + 2, in_search = 0;
-  long failures = 0;
+  Settling<Real> settling(iterations, limits.accuracy > 0.0 && limits.coarseness == 1.0,
+                          result.iterations);
+  long next_check = 0, failures = 0;
   double blur = 0.0;
   while (result.iterations < limits.max_iterations) {
     const packed::Passed passed =
         over_ranks(iterations.advance(momentum.next(curvature_), 1.0 / curvature_, blur), host);
     ++result.iterations;
-    ++in_search;
     if (!std::isfinite(passed.steep)) {
       result.residual = UNSOLVED;
       return Status::NOT_FINITE;
@@ -191,8 +215,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     trend_of_targets_.see(result.iterations, passed.unsolved);
 
     blur = least_residual<Real>(passed.farthest);
-    bool solved = passed.unsolved_beyond_blur <= 1.0 && result.iterations >= next_check;
-    if (solved && by_velocity && !has_settled(iterations, limits.accuracy, host)) {
+    bool solved = passed.unblurred <= 1.0 && result.iterations >= next_check;
+    if (solved && !settling.has_settled(limits.accuracy, host)) {
       solved = false;
       next_check = result.iterations + std::max(3L, result.iterations / 10);
     }
@@ -209,17 +233,11 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     result.round_off = UNIT_ROUND_OFF * scales.length * passed.heaviest;
     if (result.iterations % CHECK_EVERY == 0) {
       iterations.impulses_before(scales, impulse);
-      const std::optional<Status> end = judge_prospects(problem, limits, SINGLE, host, result);
-      if (end) return *end;
+      if (const auto end = judge_prospects(problem, limits, SINGLE, host, result)) return *end;
     }
-
     if (passed.uphill > 0.0) momentum.restart();
     iterations.finish(host);
-    if (by_velocity && result.iterations >= next_kept) {
-      iterations.keep_velocities();
-      next_kept = result.iterations + result.iterations / 2 + 4;
-    }
-    if (by_velocity && sets_targets(in_search)) iterations.set_targets();
+    settling.see(result.iterations);
     if (result.iterations % LOOK_EVERY == 0)
       iterations.look(IDLE_GAP * std::max(limits.tolerance / scales.length, packed_residual));
   }

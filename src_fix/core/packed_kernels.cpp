@@ -143,8 +143,7 @@ namespace {
     passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
     passed.farthest = std::max(passed.farthest, static_cast<double>(farthest));
     passed.unsolved = std::max(passed.unsolved, static_cast<double>(unsolved));
-    passed.unsolved_beyond_blur =
-        std::max(passed.unsolved_beyond_blur, static_cast<double>(beyond_blur));
+    passed.unblurred = std::max(passed.unblurred, static_cast<double>(beyond_blur));
   }
 
   template <typename Real, template <typename> typename Set>

@@ -67,7 +67,7 @@ struct Passed {
   double heaviest = 0.0;            // largest of the next impulses, times D: a length
   double farthest = 0.0;            // largest of the next changes, times D
   // Largest present residual as a part of its target; the same with the residual less the blur
-  double unsolved = 0.0, unsolved_beyond_blur = 0.0;
+  double unsolved = 0.0, unblurred = 0.0;
 };
 
 // Makes a gradient step from the present changes and the step of the momentum, and projects. `sum`
