@@ -101,7 +101,8 @@ void LawContacts::take_impulses()
 }
 
 // In the half kick with which a run starts velocities are at the end of the last step already; the
-// next run may start with the same half kick.
+// next run may start with the same half kick. Then what a contact has asked for counts again, also
+// one that the law need not keep, whose values begin anew.
 LawEntry LawContacts::entry_of(std::size_t c) const
 {
   const inelastic::ContactProblem &problem = step_.problem;
@@ -110,13 +111,13 @@ LawEntry LawContacts::entry_of(std::size_t c) const
   const double before = parting_speed(step_.velocity_before, i, j, n);
   const double after = parting_speed(step_.velocity, i, j, n);
   const LawState &state = *step_.law_state_of(c);
-  LawEntry entry;
+  LawEntry entry{};
   entry.partner = step_.contact_of(c).partner;
   std::copy_n(n, 3, entry.normal.begin());
   entry.demand = step_.contact_of(c).asked;
   entry.impulse = state.impulse.normal / step_.kicks();
   entry.speed = step_.kick == Kick::WHOLE ? 0.5 * (before + after) : before;
-  entry.remembered = state.remembered;
+  if (state.kept) entry.remembered = state.remembered;
   return entry;
 }
 

@@ -3,9 +3,8 @@
 //
 // A contact has a unit normal n from side 2 to side 1, a gap D between the surfaces, and the
 // velocity u of side 1 against side 2 (that of a wall included). Its impulse is lambda n on side 1
-// and -lambda n on side
-// 2. Every step minimises 1/2 (V - V*)^T M (V - V*) under what all contacts ask, and the impulses
-// are the duals (../core/contact_problem.h):
+// and -lambda n on side 2. Every step minimises 1/2 (V - V*)^T M (V - V*) under what all contacts
+// ask, and the impulses are the duals (../core/contact_problem.h):
 //
 //   w = D + h n.u >= 0   or   w = h (n.u - s) >= 0,      lambda >= l,      (lambda - l) w = 0
 //
@@ -75,16 +74,16 @@ class ContactLaw {
   virtual Demand ask(const ContactState &contact, const double *remembered) const = 0;
 
   // Takes the impulse that a contact has carried in a step that is solved, and sets what is
-  // remembered of it. Returns whether that must be kept: such a contact belongs to the
-  // next step whether it touches or not, and is in the output; one that need not be kept begins
-  // anew. Where a run begins, half of the last step is made again, and this takes the difference to
-  // what it took before.
+  // remembered of it. Returns whether that must be kept: such a contact belongs to the next step
+  // whether it touches or not, and is in the output; one that need not be kept begins anew. Where a
+  // run begins, half of the last step is made again, and this takes the difference to what it took
+  // before.
   virtual bool remember(const Impulse & /*impulse*/, double * /*remembered*/) const
   { return false; }
 
-  // Turns what is remembered round, as it is seen with the sides exchanged and n the other way:
-  // each of two particles keeps a copy of its own. Numbers along n stay. A vector across n, such as
-  // a tangential impulse, changes its sign.
+  // Changes what is remembered to what it is with the sides exchanged and n the other way: each of
+  // two particles keeps a copy as it is seen from it, and either of them may be side 1 in the next
+  // step. Numbers along n stay. A vector across n, such as a tangential impulse, changes its sign.
   virtual void turn_round(double * /*remembered*/) const {}
 };
 
