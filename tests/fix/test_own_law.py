@@ -31,8 +31,8 @@ RADIUS = 0.5
 
 # `law witness sides` and `law witness sliding` remember what the contact was told to be in this
 # step, `law witness begin` how it slid when it began, as its side 1 sees it; `unturned` is a
-# mistake. The interface gives a law what it has asked for back in the order of asking, in runs that
-# repeat no step.
+# mistake. `remember` is not told the contact: the law relies on being called for all contacts of a
+# step in the order in which it was asked, as it is where no step is repeated.
 WITNESS = """
 #include "contact_law_plugin.h"
 
