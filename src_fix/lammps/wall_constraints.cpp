@@ -84,6 +84,25 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
   return viewpoints_;
 }
 
+// [length] By how much these velocities open the gap of an atom and a wall in the step, beside the
+// motion of the wall that is prescribed.
+double WallConstraints::opening_of(int i, int wall, const double *normal,
+                                   const double *velocity) const
+{
+  const double *const v = velocity + 3 * i;
+  const double *const of_wall = velocity + 3 * step_.problem.slot_of_wall(wall - 1);
+  const double relative[3] = {v[0] - of_wall[0], v[1] - of_wall[1], v[2] - of_wall[2]};
+  return step_.problem.timestep * dot(normal, relative);
+}
+
+// [length] The gap of an atom that is seen where the step takes it, and of the wall where contacts
+// take that.
+double WallConstraints::gap_at_end(const WallView &view, int i) const
+{
+  const double *const of_wall = &step_.velocity[3 * step_.problem.slot_of_wall(view.wall - 1)];
+  return view.distance - atom->radius[i] - step_.problem.timestep * dot(view.normal, of_wall);
+}
+
 void WallConstraints::collect(double margin)
 {
   constraint_.clear();
@@ -103,7 +122,7 @@ void WallConstraints::collect(double margin)
         const double gap = view.distance - atom->radius[from.atom];
         const double gap_now = view.distance_now - atom->radius[from.atom];
         rules_.overlaps().note(gap_now, from.atom, -view.wall);
-        const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
+        const double opening = opening_of(from.atom, view.wall, view.normal, velocity);
         if (gap + std::min(0.0, opening) <= margin ||
             rows_.remembers(from.atom, -view.wall, view.normal, gap_now, atom->radius[from.atom]))
           take(from, view);
@@ -146,7 +165,7 @@ long WallConstraints::add_violated()
       viewpoints(velocity, 0.0), false,
       [&](const Viewpoint &from, const WallView &view) {
         const double gap = view.distance - atom->radius[from.atom];
-        const double opening = step_.problem.timestep * dot(view.normal, velocity + 3 * from.atom);
+        const double opening = opening_of(from.atom, view.wall, view.normal, velocity);
         if (gap + opening < -step_.settings.tolerance &&
             !constraint_.count(key(from.atom, view.wall)))
           take(from, view);
@@ -173,7 +192,7 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   const double *const x = atom->x[i];
   double from_here[3];
   for (int d = 0; d < 3; ++d) from_here[d] = from.where[d] + from.image[d] - x[d];
-  const double gap_there = view.distance - atom->radius[i];
+  const double gap_there = gap_at_end(view, i);
   const double gap_here = gap_there - dot(n, from_here);
   const double wall_motion = view.distance_now - view.distance;
   // A region can show a wall late: from inside one part of a union the others are not seen. An
@@ -217,7 +236,7 @@ long WallConstraints::relinearise(double margin)
         if (known) seen.insert(existing->second);
         const Contact contact = known ? step_.contact_of(existing->second)
                                       : contact_with(from.atom, view.wall, 0.0);
-        const double gap = view.distance - atom->radius[from.atom];
+        const double gap = gap_at_end(view, from.atom);
         // The walls behind a periodic boundary are as exact as others.
         const bool exact = is_image(from) && walls_.exact() && !step_.is_member(from.atom);
         const bool too_deep = rules_.ends_too_deep(contact, gap) ||
@@ -248,8 +267,9 @@ long WallConstraints::hold(std::size_t c, double gap_at_end, const double *norma
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const double *const normal = &contacts.normal[3 * c];
-  const double speed = dot(normal, &step_.velocity[3 * contacts.first[c]]);
-  return rules_.hold(c, gap_at_end, step_.problem.timestep * speed, dot(normal, normal_at_end));
+  const double opening =
+      opening_of(contacts.first[c], step_.contact_of(c).wall(), normal, step_.velocity.data());
+  return rules_.hold(c, gap_at_end, opening, dot(normal, normal_at_end));
 }
 
 // From where a body ends, a part of an intersection of regions may not show the wall that a

@@ -60,6 +60,8 @@ class WallConstraints : protected Pointers {
   const Viewpoints &viewpoints(const double *velocity, double beyond);
   const Viewpoints &viewpoints_at_end(double margin);
   Viewpoints last_inside(const Viewpoints &beyond);
+  double opening_of(int i, int wall, const double *normal, const double *velocity) const;
+  double gap_at_end(const WallView &view, int i) const;
   bool may_hold(std::size_t c, const double *normal_at_end) const;
   long hold(std::size_t c, double gap_at_end, const double *normal_at_end);
   long add_plane(const Viewpoint &, const WallView &, bool too_deep);
