@@ -9,7 +9,36 @@
 
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <limits>
+
 namespace inelastic {
+
+// The impulse of a contact on its first side.
+struct Impulse {
+  double normal = 0.0;                   // lambda [mass length / time]
+  std::array<double, 3> tangential{};    // across n [mass length / time]; 0 for a half line
+
+  Impulse &operator+=(const Impulse &other)
+  {
+    normal += other.normal;
+    for (int d = 0; d < 3; ++d) tangential[d] += other.tangential[d];
+    return *this;
+  }
+};
+
+// How far a contact, or the worst one of many, is from a solution (solver.h).
+struct Residual {
+  double feasibility = 0.0;        // [length], >= 0
+  double complementarity = 0.0;    // [length], >= 0
+
+  double largest() const { return std::max(feasibility, complementarity); }
+};
+
+// The residual of impulses that cannot be judged, because a number is not finite.
+constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
+                               std::numeric_limits<double>::infinity()};
 
 template <typename Real> struct HalfLine {
   Real least = 0;    // l <= 0
@@ -27,10 +56,15 @@ template <typename Real> struct HalfLine {
   Real idle() const { return least; }
   Real load(Real impulse) const { return impulse - least; }
 
-  // Returns the residual of a contact [length]: what is lacking of its gap, or what its gap is open
-  // under a force.
-  Real residual(Real gap_at_end, Real impulse) const
-  { return is_loaded(impulse) && gap_at_end > 0 ? gap_at_end : gap_at_end < 0 ? -gap_at_end : 0; }
+  // Returns the residual of a contact: what is lacking of its gap at the end of the step, and by
+  // how much the gap is open under a force. A contact that may pull, and does not open, has its gap
+  // closed: an open one is not feasible, either.
+  Residual residual(double gap_at_end, double impulse) const
+  {
+    const double open = is_loaded(static_cast<Real>(impulse)) ? std::max(0.0, gap_at_end) : 0.0;
+    const double lacking = std::max(0.0, -gap_at_end);
+    return {may_pull() ? std::max(lacking, open) : lacking, open};
+  }
 
   // Returns the set of what may be added to an impulse.
   HalfLine changes_of(Real impulse) const { return {least - impulse}; }

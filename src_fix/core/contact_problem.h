@@ -35,11 +35,7 @@ struct ContactProblem : Unknowns {
 
   // Returns the diagonal entry of A for constraint c [time / mass]: what a unit impulse of the
   // constraint adds to its own w.
-  double diagonal(std::size_t c) const
-  {
-    return mobility_of_pair(contacts.first[c], contacts.second[c], &contacts.normal[3 * c]) +
-        contacts.compliance[c];
-  }
+  double diagonal(std::size_t c) const { return contacts.diagonal(c, *this, timestep); }
 
   // Returns the length by which a unit impulse along n between two slots moves them apart in the
   // step [time / mass].

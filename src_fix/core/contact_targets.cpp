@@ -39,8 +39,8 @@ void ContactTargets::begin(const ContactProblem &problem, const SolverLimits &li
   change_by_guess_ = gap_operator.change();
   of_guess_.resize(contacts.size());
   for (std::size_t c = 0; c < contacts.size(); ++c)
-    of_guess_[c] = std::max(contacts.set[c].residual(gap[c], contacts.impulse[c]),
-                            PART_OF_LOAD * std::abs(contacts.impulse[c]) * diagonal[c]);
+    of_guess_[c] = std::max(contacts.residual(c, gap.data()).largest(),
+                            PART_OF_LOAD * contacts.magnitude(c) * diagonal[c]);
   set_least(problem, limits, gap_operator);
 }
 
@@ -58,7 +58,7 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
   }
   carried_.assign(problem.slots(), 0.0);
   for (std::size_t c = 0; c < count; ++c) {
-    const double load = std::abs(contacts.impulse[c]) * diagonal_[c];
+    const double load = contacts.magnitude(c) * diagonal_[c];
     carried_[mover(problem, contacts.first[c])] += load;
     carried_[mover(problem, contacts.second[c])] += load;
   }
@@ -113,14 +113,10 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
     const double by_velocity =
         part_[c] * std::min(of_slot[contacts.first[c]], of_slot[contacts.second[c]]);
     const double target = std::min(limits.tolerance, std::max(least_[c], by_velocity));
-    // What may pull is open where it does not pull by as much as it may (solver.h).
-    const bool all = counts == Counts::ALL || contacts.set[c].may_pull();
-    const double left = all ? contacts.set[c].residual(gap[c], contacts.impulse[c])
-                            : std::max(0.0, -gap[c]);
-    const bool finite = std::isfinite(gap[c]) && std::isfinite(contacts.impulse[c]);
+    const Residual left = contacts.residual(c, gap.data());
     maxima[0] =
-        std::max(maxima[0], finite ? left / target : std::numeric_limits<double>::infinity());
-    if (contacts.set[c].is_loaded(contacts.impulse[c]) || gap[c] < NEAR * limits.tolerance)
+        std::max(maxima[0], (counts == Counts::ALL ? left.largest() : left.feasibility) / target);
+    if (contacts.is_loaded(c) || gap[c] < NEAR * limits.tolerance)
       maxima[1] = std::max(maxima[1], target);
   }
   host.reduce(nullptr, 0, maxima, 2);

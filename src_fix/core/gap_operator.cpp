@@ -1,92 +1,23 @@
 #include "gap_operator.h"
 
 #include "vector3.h"
-#include "vectorise.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace inelastic {
 
-namespace {
-
-  // Returns n . (v_first - v_second) for 3 numbers per slot.
-  inline double opening_speed(const double *n, const double *v_first, const double *v_second)
-  {
-    const double relative[3] = {v_first[0] - v_second[0], v_first[1] - v_second[1],
-                                v_first[2] - v_second[2]};
-    return dot(n, relative);
-  }
-
-}    // namespace
-
 void GapOperator::prepare(const ContactProblem &problem)
 {
-  const ContactSet &contacts = problem.contacts;
-  const double *velocity = problem.predicted_velocity.data();
-  free_gap_.resize(contacts.size());
-  change_.resize(3 * static_cast<std::size_t>(problem.slots()));
-  for (std::size_t c = 0; c < contacts.size(); ++c)
-    free_gap_[c] = contacts.gap[c] +
-        problem.timestep *
-            opening_speed(&contacts.normal[3 * c],
-                          velocity + 3 * static_cast<std::size_t>(contacts.first[c]),
-                          velocity + 3 * static_cast<std::size_t>(contacts.second[c]));
-}
-
-// Adds G^T impulse to `sum`, 3 per slot. Constraints come in runs with the same first particle,
-// in the order of the neighbour list. The sum of that particle is kept in registers over a run:
-// through memory each addition would wait for the one before.
-INELASTIC_CLONES void scatter_impulses(const ContactSet &contacts, const double *impulse,
-                                       double *sum)
-{
-  const std::size_t count = contacts.size();
-  const int *const first = contacts.first.data();
-  const int *const second = contacts.second.data();
-  const double *n = contacts.normal.data();
-  std::size_t c = 0;
-  while (c < count) {
-    const int i = first[c];
-    double ix = 0.0, iy = 0.0, iz = 0.0;
-    for (; c < count && first[c] == i; ++c, n += 3) {
-      const double lambda = impulse[c];
-      double *const j = sum + 3 * static_cast<std::size_t>(second[c]);
-      const double x = lambda * n[0], y = lambda * n[1], z = lambda * n[2];
-      ix += x;
-      iy += y;
-      iz += z;
-      j[0] -= x;
-      j[1] -= y;
-      j[2] -= z;
-    }
-    double *const own = sum + 3 * static_cast<std::size_t>(i);
-    own[0] += ix;
-    own[1] += iy;
-    own[2] += iz;
-  }
-}
-
-// Writes free_gap + h G change + C impulse, one per constraint.
-INELASTIC_CLONES void gather_gaps(const ContactSet &contacts, const double *free_gap,
-                                  double timestep, const double *change, const double *impulse,
-                                  double *gap_at_end)
-{
-  const std::size_t count = contacts.size();
-  const int *const first = contacts.first.data();
-  const int *const second = contacts.second.data();
-  const double *const compliance = contacts.compliance.data();
-  const double *n = contacts.normal.data();
-  for (std::size_t c = 0; c < count; ++c, n += 3)
-    gap_at_end[c] = free_gap[c] + compliance[c] * impulse[c] +
-        timestep *
-            opening_speed(n, change + 3 * static_cast<std::size_t>(first[c]),
-                          change + 3 * static_cast<std::size_t>(second[c]));
+  free_gap_.resize(problem.contacts.size());
+  change_.resize(problem.predicted_velocity.size());
+  problem.contacts.free_gaps(problem.timestep, problem.predicted_velocity.data(), free_gap_.data());
 }
 
 void GapOperator::find_change(const ContactProblem &problem, const double *impulse, Host &host)
 {
   std::fill(change_.begin(), change_.end(), 0.0);
-  scatter_impulses(problem.contacts, impulse, change_.data());
+  problem.contacts.add_impulses(impulse, change_.data());
   problem.velocity_change(change_.data(), host);
 }
 
@@ -96,13 +27,13 @@ GapOperator::ImpulseNorm GapOperator::impulse_norm(const ContactProblem &problem
   // The norm is summed over particles and not over constraints: where impulses balance, the
   // round-off that is left of a particle's sum is squared.
   std::vector<double> sum(change_.size(), 0.0);
-  scatter_impulses(problem.contacts, impulse, sum.data());
+  problem.contacts.add_impulses(impulse, sum.data());
   host.sum_over_ghosts(sum.data());
   find_change(problem, impulse, host);
   ImpulseNorm result = {0.0, 0.0};
   std::vector<char> pushed(problem.slots(), 0);
   for (std::size_t c = 0; c < problem.contacts.size(); ++c)
-    if (impulse[c] > 0.0)
+    if (problem.contacts.pushes(c, impulse))
       pushed[problem.contacts.first[c]] = pushed[problem.contacts.second[c]] = 1;
   auto work = [&](int i) {
     return dot(&sum[3 * i], &change_[3 * i]);
@@ -131,8 +62,8 @@ void GapOperator::apply(const ContactProblem &problem, const double *impulse, do
                         Host &host)
 {
   find_change(problem, impulse, host);
-  gather_gaps(problem.contacts, free_gap_.data(), problem.timestep, change_.data(), impulse,
-              gap_at_end);
+  problem.contacts.gaps_at_end(free_gap_.data(), problem.timestep, change_.data(), impulse,
+                               gap_at_end);
 }
 
 void GapOperator::velocity(const ContactProblem &problem, const double *impulse, double *velocity,

@@ -17,8 +17,7 @@ namespace {
         result.residual.feasibility > tolerance;
     double most = 0.0;
     for (std::size_t c = 0; c < count; ++c) {
-      const bool matters = gap_at_end[c] < 0.0 ||
-          (contacts.set[c].is_loaded(contacts.impulse[c]) && !overlaps_only);
+      const bool matters = gap_at_end[c] < 0.0 || (contacts.is_loaded(c) && !overlaps_only);
       if (!matters || !(std::abs(gap_at_end[c]) > most)) continue;
       most = std::abs(gap_at_end[c]);
       result.worst = c;
@@ -32,11 +31,10 @@ namespace {
   void judge_failure(ContactProblem &problem, GapOperator &gap_operator, std::size_t solved_for,
                      double tolerance, Host &host, ProjectionResult &result)
   {
-    std::vector<double> &impulse = problem.contacts.impulse;
-    std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(solved_for), impulse.end(), 0.0);
+    problem.contacts.forget_impulses(solved_for);
     std::vector<double> gap_at_end(problem.contacts.size());
     gap_operator.prepare(problem);
-    gap_operator.apply(problem, impulse.data(), gap_at_end.data(), host);
+    gap_operator.apply(problem, problem.contacts.impulse.data(), gap_at_end.data(), host);
     result.residual = residual_over_ranks(gap_at_end.data(), problem.contacts, host);
     const bool solved = result.status == Status::OUT_OF_ROUNDS;
     find_worst(gap_at_end, problem.contacts, solved ? gap_at_end.size() : solved_for, tolerance,

@@ -8,14 +8,9 @@ Residual residual(const double *gap_at_end, const ContactSet &contacts)
 {
   Residual worst;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const double impulse = contacts.impulse[c];
-    const HalfLine<double> set = contacts.set[c];
-    // A value that is no number satisfies no constraint.
-    if (!std::isfinite(gap_at_end[c]) || !std::isfinite(impulse)) return UNSOLVED;
-    worst.feasibility = std::max(worst.feasibility, -gap_at_end[c]);
-    if (!set.is_loaded(impulse)) continue;
-    worst.complementarity = std::max(worst.complementarity, gap_at_end[c]);
-    if (set.may_pull()) worst.feasibility = std::max(worst.feasibility, gap_at_end[c]);
+    const Residual here = contacts.residual(c, gap_at_end);
+    worst.feasibility = std::max(worst.feasibility, here.feasibility);
+    worst.complementarity = std::max(worst.complementarity, here.complementarity);
   }
   return worst;
 }
@@ -30,20 +25,19 @@ Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contact
 
 Guess Solver::judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host)
 {
-  std::vector<double> &impulse = problem.contacts.impulse;
-  const std::vector<HalfLine<double>> &set = problem.contacts.set;
+  ContactSet &contacts = problem.contacts;
   const std::vector<double> &free_gap = gap_operator_.free_gap();
-  const std::size_t count = impulse.size();
+  const std::size_t count = contacts.size();
   gap_.resize(count);
   diagonal_.resize(count);
-  for (std::size_t c = 0; c < count; ++c) impulse[c] = set[c].project(impulse[c]);
-  gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
-  const Residual mine = residual(gap_.data(), problem.contacts);
+  contacts.make_admissible();
+  gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
+  const Residual mine = residual(gap_.data(), contacts);
   Guess guess;
   for (std::size_t c = 0; c < count; ++c) {
     diagonal_[c] = problem.diagonal(c);
     guess.largest_length = std::max(
-        {guess.largest_length, std::abs(free_gap[c]), std::abs(impulse[c]) * diagonal_[c]});
+        {guess.largest_length, std::abs(free_gap[c]), contacts.magnitude(c) * diagonal_[c]});
     guess.largest_diagonal = std::max(guess.largest_diagonal, diagonal_[c]);
   }
   double maxima[4] = {mine.feasibility, mine.complementarity, guess.largest_length,

@@ -25,17 +25,6 @@
 
 namespace inelastic {
 
-struct Residual {
-  double feasibility = 0.0;        // [length], >= 0
-  double complementarity = 0.0;    // [length], >= 0
-
-  double largest() const { return std::max(feasibility, complementarity); }
-};
-
-// The residual of impulses that cannot be judged, because a number is not finite.
-constexpr Residual UNSOLVED = {std::numeric_limits<double>::infinity(),
-                               std::numeric_limits<double>::infinity()};
-
 // Returns the residual of this rank's constraints with their impulses; UNSOLVED if a number is not
 // finite.
 Residual residual(const double *gap_at_end, const ContactSet &contacts);

@@ -92,7 +92,7 @@ inelastic::ContactState LawContacts::seen(const Contact &contact, int i, int j,
 void LawContacts::take_impulses()
 {
   for (std::size_t c = 0; has_law() && c < step_.rows.size(); ++c)
-    step_.law_states[step_.rows[c].contact].impulse.normal += step_.problem.contacts.impulse[c];
+    step_.law_states[step_.rows[c].contact].impulse += step_.problem.contacts.impulse_of(c);
   for (LawState &state : step_.law_states) {
     inelastic::Impulse taken = state.impulse;
     taken.normal -= taken_before(state);

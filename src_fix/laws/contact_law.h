@@ -53,12 +53,6 @@ struct Demand {
   bool is_inelastic() const { return !parts && !set.may_pull(); }
 };
 
-// The impulse that a contact has carried in a step, on side 1.
-struct Impulse {
-  double normal = 0.0;                   // lambda [mass length / time]
-  std::array<double, 3> tangential{};    // across n [mass length / time]; 0 for a half line
-};
-
 class ContactLaw {
  public:
   virtual ~ContactLaw() = default;
