@@ -1,6 +1,6 @@
 #include "contact_targets.h"
 
-#include "solver.h"
+#include "solver_limits.h"
 #include "vector3.h"
 
 #include <algorithm>

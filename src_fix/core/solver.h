@@ -18,6 +18,7 @@
 #include "contact_targets.h"
 #include "gap_operator.h"
 #include "host.h"
+#include "solver_limits.h"
 
 #include <algorithm>
 #include <limits>
@@ -73,22 +74,6 @@ class ResidualTrend {
   static constexpr double NONE = std::numeric_limits<double>::infinity();
   long mark_ = 1;    // the last iteration that was a power of two
   double least_ = NONE, at_mark_ = NONE, before_mark_ = NONE;
-};
-
-struct SolverLimits {
-  double tolerance = 0.0;    // [length] largest residual of a solution
-  long max_iterations = 0;
-  // [length] Steps that move particles further than this are not sensible (infeasibility.h).
-  double reach = std::numeric_limits<double>::infinity();
-  // The part of what contacts change to which they are resolved (contact_targets.h); 0 = only the
-  // tolerance counts.
-  double accuracy = 0.0;
-  // By this the targets are larger, at least 1. Above 1 velocities need not settle, either: enough
-  // of a solution to tell which constraints change (projection.h).
-  double coarseness = 1.0;
-  // [length] Shorter lengths are round-off of positions: no target is below it, unless it is the
-  // tolerance.
-  double least_length = 0.0;
 };
 
 // What is known before the iterations, from the first guess of the impulses; over all ranks.

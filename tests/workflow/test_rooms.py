@@ -1,8 +1,9 @@
-"""The imports of the Python modules: they close no circle, and analysis stands alone."""
+"""Imports of Python and includes of C++: they close no circle, and analysis stands alone."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -53,6 +54,16 @@ def circle_in(arrows: Mapping[str, set[str]]) -> list[str]:
     except CycleError as error:
         return list(reversed(error.args[1]))
     return []
+
+
+def includes() -> dict[str, set[str]]:
+    """Return what each C++ room (a header with the source of that name) includes of other rooms."""
+    paths = [path for ending in ("h", "cpp") for path in (ROOT / "src_fix").rglob(f"*.{ending}")]
+    rooms: dict[str, set[str]] = {path.stem: set() for path in paths}
+    for path in paths:
+        named = re.findall(r'^#include "(\w+)\.h"', path.read_text(), re.M)
+        rooms[path.stem].update(name for name in named if name in rooms and name != path.stem)
+    return rooms
 
 
 def folder_of(module: str) -> str:
@@ -153,3 +164,11 @@ def test_a_circle_is_seen() -> None:
     circle = circle_in({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}})
     assert len(circle) == 4
     assert circle[0] == circle[-1]
+
+
+def test_no_circle_of_includes() -> None:
+    rooms = includes()
+    assert len(rooms) > 60
+    assert sum(map(len, rooms.values())) > 2 * len(rooms)
+    circle = circle_in(rooms)
+    assert not circle, f"a circle of includes: {' -> '.join(circle)}"
