@@ -138,6 +138,12 @@ void Reader::read_law(const std::string &name)
   if (!allowed.empty())
     error_at(error_, FLERR, at_name, "Fix inelastic needs law {}, not law {}", allowed,
              settings_.law_words);
+  const int most = inelastic::ContactLaw::MOST_REMEMBERED;
+  const int remembered = settings_.law ? settings_.law->remembers() : 0;
+  if (remembered < 0 || remembered > most)
+    error_at(error_, FLERR, at_name,
+             "Fix inelastic: law {} remembers {} values of a contact: 0 to {} are allowed", name,
+             remembered, most);
 }
 
 void Reader::read_solver(const char *name)

@@ -4,6 +4,8 @@
 
 #include "atom.h"
 
+#include "fmt/format.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -53,6 +55,7 @@ void LawContacts::ask(Contact &contact, double wall_motion, int i, int j, const 
   demand = step_.settings.law->ask(
       seen(contact, i, j, normal, speed_before - speed_of_wall, predicted_speed),
       state.remembered.data());
+  check(demand, i);
   demand.set.least = std::min(0.0, demand.set.least + taken_before(state));
   // The velocities at the start of a run are half way through a collision of the last step, if they
   // are those with which it ended. (Spheres of bodies turn a little.)
@@ -65,6 +68,18 @@ void LawContacts::ask(Contact &contact, double wall_motion, int i, int j, const 
   if (bad_start) demand.parts = false;
   contact.predicted_speed = predicted_speed;
   step_.law_states.push_back(state);
+}
+
+// A law of a user's own may answer anything.
+void LawContacts::check(const Demand &demand, int i)
+{
+  const bool parts = !demand.parts ||
+      (demand.parting_speed >= 0.0 && std::isfinite(demand.parting_speed));
+  if (parts && demand.set.least <= 0.0 && std::isfinite(demand.set.least)) return;
+  step_.problem_found = fmt::format(
+      "law {} asks a contact of atom {} to part with the speed {} and to carry an impulse of at "
+      "least {}: a speed must be a number of at least 0, a least impulse one of at most 0",
+      step_.settings.law_words, atom->tag[i], demand.parting_speed, demand.set.least);
 }
 
 // The contact as the law sees it. [length / time] The speeds are those with which the surfaces

@@ -58,6 +58,7 @@ class LawContacts : protected Pointers {
   // Looks for what is remembered of a contact with this gap and sum of radii [length]. One whose
   // surfaces something else than a step has parted begins anew.
   const LawEntry *find(int i, tagint partner, const double *normal, double gap, double size) const;
+  void check(const inelastic::Demand &demand, int i);
   bool is_pushed_apart(std::size_t c) const;
   inelastic::ContactState seen(const Contact &contact, int i, int j, const double *normal,
                                double speed_before, double predicted_speed) const;

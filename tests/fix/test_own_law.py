@@ -238,6 +238,25 @@ def test_what_need_not_be_kept_begins_anew(tmp_path: Path, lmp: Runner) -> None:
     assert (counts == 1.0).all()
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("{ return 4; }", "{ return 5; }", "remembers 5 values of a contact: 0 to 4 are allowed"),
+        ("{false, 0.0, {-1e-9}}", '{true, std::nan(""), {}}', "to part with the speed nan"),
+        ("{false, 0.0, {-1e-9}}", "{true, -1.0, {}}", "to part with the speed -1"),
+        ("{false, 0.0, {-1e-9}}", "{false, 0.0, {0.5}}", "to carry an impulse of at least 0.5"),
+        ("{false, 0.0, {-1e-9}}", '{false, 0.0, {std::nan("")}}', "of at least nan"),
+    ],
+)
+def test_answers_that_no_law_may_give(
+    old: str, new: str, said: str, tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    assert FORGETFUL.count(old) == 1
+    build("#include <cmath>\n" + FORGETFUL.replace(old, new), tmp_path)
+    line = refused(deck(tmp_path, "forgetful", 1.0) + "run 20\n")
+    assert said in line
+
+
 # Two spheres that fall upon one another and slide, and one that slides on a floor, which comes up
 # and moves away sideways: place, velocity, radius, type, acceleration.
 BIG, SMALL, ON_FLOOR = range(3)
