@@ -13,22 +13,22 @@ namespace {
   constexpr double UNIT_ROUND_OFF = 0.5 * std::numeric_limits<double>::epsilon();
 
   // Returns the residual at which a search ends because of its precision, in packed units: some ten
-  // times the round-off of the largest change in single precision; double precision is the best
-  // there is.
+  // times the round-off of the largest change in single precision; 0 in double precision, since
+  // there is no better one.
   template <typename Real> double least_residual(double largest_change)
   {
     constexpr double PART = 1.0 / 3.0e5;
     return sizeof(Real) == sizeof(double) ? 0.0 : PART * largest_change;
   }
 
-  // If double precision refuses so many residuals that single precision finds within the tolerance,
-  // round-off shows and this search is given up. (It also refuses where a constraint was idle for
-  // too long, once or twice in a solve.)
+  // So many times double precision may refuse impulses that single precision finds within the
+  // targets: then round-off shows and the search is given up. (Double precision also refuses where
+  // a constraint was idle for too long, once or twice in a solve.)
   constexpr long MOST_FAILURES = 8;
-  // Idle constraints are looked at in every so many iterations. A constraint is idle above so many
-  // residuals, or tolerances where they are more: gaps change by some residuals until the end.
-  // (With tolerances alone a bed at rest moved up to four times as fast, measured: contacts that
-  // closed in the step came in late.)
+  // Idle constraints are looked at in every so many iterations. A constraint is idle if its gap is
+  // above so many residuals, or tolerances where these are larger: gaps change by some residuals
+  // until the end. (With tolerances alone a bed at rest moved up to four times as fast, measured:
+  // contacts that closed in the step came in late.)
   constexpr long LOOK_EVERY = 20;
   constexpr double IDLE_GAP = 5.0;
 
@@ -40,10 +40,10 @@ namespace {
         iteration % TARGETS_EVERY == 0;
   }
 
-  // In a chain residuals add up, and what is left of a velocity is many times what is left of a
-  // gap. So a search goes on where velocities differ from those that a half to two thirds as many
-  // iterations had found by more than a fortieth of what contacts change: this part of the
-  // sixteenth that targets are of it (contact_targets.cpp; of bodies a third as much).
+  // In a chain residuals add up, and the error of a velocity is many times that of a gap. So a
+  // search goes on while velocities differ by more than a fortieth of what contacts change from
+  // those of a half to two thirds as many iterations. The fortieth is this part of the sixteenth by
+  // which targets are set (contact_targets.cpp; for bodies a third as much).
   constexpr double MOST_MOVED = 0.4;
 
   // Whether the velocities of a search have come to what they end with.
@@ -172,7 +172,7 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   if (infeasible) return Status::INFEASIBLE;
   if (blurred) return Status::ROUND_OFF;
   if (result.residual.largest() <= limits.tolerance) return Status::CONVERGED;
-  // It may be round-off that keeps it.
+  // Round-off of single precision may keep the residual up; double precision then goes on.
   if (!single_precision) return std::nullopt;
   result.trend = trend_of_targets_ = ResidualTrend();
   return Status::OUT_OF_ITERATIONS;
@@ -180,7 +180,8 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
 
 void AcceleratedProjectedGradient::raise_curvature(const packed::Passed &passed)
 {
-  // A change that A nearly takes to nothing tells L badly: round-off could raise it without bound.
+  // A change of impulses that A makes nearly zero tells little of L: round-off could raise L
+  // without bound.
   constexpr double MARGIN = 1.02, MOST_RAISE = 2.0;
   if (passed.steep > curvature_ * passed.curved && passed.curved > 0.0)
     curvature_ = std::min(MARGIN * passed.steep / passed.curved, MOST_RAISE * curvature_);

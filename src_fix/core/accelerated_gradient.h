@@ -20,17 +20,17 @@
 // (L as of iteration k; g is L times the length of the step that unbound_k made), and t is 1 again
 // where the dual function rises along the last change. L must not be below the largest eigenvalue
 // of the scaled A, of the constraints with impulses: with a smaller one this method diverges at
-// once, where Nesterov's goes on for a while. With u the last change L is raised to |A u|^2 / u.A u
-// over these constraints, where that is more, which costs no product with A, and is remembered from
-// one call to the next.
+// once, where Nesterov's goes on for a while. Therefore L is raised to |A u|^2 / u.A u over these
+// constraints where that is more, with u the last change: this costs no product with A. L is
+// remembered from one call to the next.
 //
 // In an impact most constraints never have an impulse. An iteration reads only those that have one
-// or whose gap is near closed; the idle ones are looked at in every twentieth, as support vector
-// machines are trained ("shrinking": Joachims, in Advances in Kernel Methods, MIT Press 1999, p.
-// 169). Iterations look for the change of the impulses in single precision. Where its round-off
-// shows they start again from what was reached, and in the end go on in double precision
-// (packed_iterations.h). The verdict whether impulses are a solution is always in double precision,
-// by gap_operator.h.
+// or whose gap is near closed; every twentieth looks at the others, which are idle, as support
+// vector machines are trained ("shrinking": Joachims, in Advances in Kernel Methods, MIT Press
+// 1999, p. 169). Iterations look for the change of the impulses in single precision. Where the
+// round-off of that shows, they start again from the impulses reached, and in the end go on in
+// double precision (packed_iterations.h). The verdict whether impulses are a solution is always in
+// double precision, by gap_operator.h.
 
 #pragma once
 

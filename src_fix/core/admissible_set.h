@@ -52,11 +52,12 @@ template <typename Real> struct HalfLine {
   // Tells whether a contact may pull.
   bool may_pull() const { return least < 0; }
 
-  // Returns the impulse of a contact whose gap is open, and by how much another one is more.
+  // idle() returns the impulse of a contact whose gap is open, load() by how much an impulse is
+  // more than that.
   Real idle() const { return least; }
   Real load(Real impulse) const { return impulse - least; }
 
-  // Returns the residual of a contact: what is lacking of its gap at the end of the step, and by
+  // Returns the residual of a contact: the length that its gap lacks at the end of the step, and by
   // how much the gap is open under a force. A contact that may pull, and does not open, has its gap
   // closed: an open one is not feasible, either.
   Residual residual(double gap_at_end, double impulse) const

@@ -7,9 +7,9 @@
 //   subject to         gap_c + h G_c . V >= 0      for every rigid constraint c
 //
 // M is the mass matrix, h the time step, and G_c . V = n_c . (v_first - v_second). l_c <= 0 is the
-// least impulse of the constraint: where it is 0 the contact only pushes, elsewhere it takes that
-// much energy a length to open it. The dual problem has one impulse lambda_c per constraint; the
-// optimality conditions are
+// least impulse of the constraint: where it is 0 the contact only pushes; where it is below 0,
+// opening the contact costs an energy of -l_c / h a length. The dual problem has one impulse
+// lambda_c per constraint; the optimality conditions are
 //
 //   V = V* + M^-1 G^T lambda,   lambda >= l,  w >= 0,  (lambda - l) . w = 0,
 //   w(lambda) = gap + h G V + C lambda

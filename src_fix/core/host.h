@@ -2,9 +2,8 @@
 // between ranks and global reductions.
 //
 // A rank holds the particles that it owns and, behind them, ghosts: particles that other ranks own,
-// and periodic images of its own. Every function is
-// collective: all ranks call it together. A host with one rank and without periodic images has
-// nothing to do (SerialHost).
+// and periodic images of its own. Every function is collective: all ranks call it together. A host
+// with one rank and without periodic images has nothing to do (SerialHost).
 
 #pragma once
 

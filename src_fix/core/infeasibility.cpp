@@ -10,7 +10,7 @@ bool is_infeasible(const ContactProblem &problem, GapOperator &gap_operator,
                    const SolverLimits &limits, Host &host)
 {
   constexpr double FAR = 10.0;
-  // Any impulses that push are a bound. What pulls lets go where there is no room.
+  // Any impulses that push give a bound. Contacts that pull let go where there is no room.
   std::vector<double> impulse = problem.contacts.impulse;
   for (double &value : impulse) value = std::max(0.0, value);
   const std::vector<double> &free_gap = gap_operator.free_gap();

@@ -5,15 +5,15 @@
 //
 //   h |V - V*|_M  >=  (-lambda . w(0) - tolerance sum lambda) / |G^T lambda|_(M^-1)
 //
-// in the notation of contact_problem.h. Springs (contact_set.h) are taken to give way by C lambda,
-// which is subtracted above, too: the bound is then that of velocities at which they give way by no
-// more. Divided by the root of the mass that the impulses act on, the right side is a length: the
-// root mean square, by mass, of the distances from the predicted positions at which admissible
-// velocities would leave these particles, is at least so long. It is not sensible to go on when
-// this length is above SolverLimits::reach and above ten times every overlap and every predicted
-// motion. Without admissible velocities the impulses of a solver grow for ever along a direction in
-// which they balance, and the bound grows with them. With admissible velocities nearby the bound
-// never gets so large.
+// in the notation of contact_problem.h. With springs (contact_set.h) lambda . C lambda is
+// subtracted above, too: the bound then holds for velocities at which each spring gives way by no
+// more than its C lambda. Divided by the root of the mass that the impulses act on, the right side
+// is a length: the root mean square, by mass, of the distances from the predicted positions at
+// which admissible velocities would leave these particles, is at least so long. It is not sensible
+// to go on when this length is above SolverLimits::reach and above ten times every overlap and
+// every predicted motion. Without admissible velocities the impulses of a solver grow for ever
+// along a direction in which they balance, and the bound grows with them. With admissible
+// velocities nearby the bound never gets so large.
 
 #pragma once
 

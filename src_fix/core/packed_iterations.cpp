@@ -10,22 +10,22 @@ namespace inelastic {
 
 namespace {
 
-  // Working constraints that could be idle become so when they are more than one in so many: each
-  // look would otherwise move them all to save little.
+  // Working constraints that could be idle become so only when they are more than one in so many:
+  // to make a few of them idle moves all others in memory, and saves little.
   constexpr std::size_t FEW = 10;
 
-  // Working constraints are looked at for those that could be idle at every so many looks: it takes
-  // a pass over them, and they become idle more rarely than idle ones come in.
+  // At every so many looks working constraints are looked at, too, for those that could be idle:
+  // this takes a pass over them, and they become idle more rarely than idle ones become working.
   constexpr int SET_IDLE_EVERY = 4;
 
   // A gap is known to a few units of round-off of the largest change.
   constexpr double ROUND_OFFS = 2.0;
 
-  // What a particle moves alone counts by so much of what it moves together with one that it
-  // touches.
+  // Where one of two particles in contact has changed its velocity more than the other, this part
+  // of the larger change counts, if it is more than the smaller one.
   constexpr double ALONE = 0.5;
 
-  // A velocity, which is a sum of some impulses, to so many units of its own round-off.
+  // A velocity, which is a sum of some impulses, is known to so many units of its own round-off.
   constexpr int BLURRED = 16;
 
   struct RodShape {
@@ -250,8 +250,8 @@ void PackedIterations<Real>::join(const std::vector<double> &gap, const Scales &
 }
 
 // Makes idle constraints working, given by their places in ascending order. `gap` has one number
-// per idle constraint. It is kept as the gap of the impulses before, which is not known: the next
-// advance uses it in the momentum alone.
+// per idle constraint. The gap of the impulses before is not known: the present one takes its
+// place, since the next advance uses it in the momentum alone.
 template <typename Real>
 void PackedIterations<Real>::wake(const std::vector<std::size_t> &near, const Real *gap)
 {

@@ -57,10 +57,10 @@ template <typename Real> class PackedIterations {
   void keep_velocities();
 
   // Returns by how much velocities have changed since those that were kept last but one: the
-  // largest over both sides of the working constraints with an impulse, as a part of what the
-  // target is the accuracy's part of. Before two were kept it is the change since the start of the
-  // search. What may be round-off of a velocity does not count. `accuracy` is above 0. Call it
-  // after finish and set_targets.
+  // largest change on either side of the working constraints with an impulse, in units of the
+  // target divided by `accuracy`, which is above 0. Before two were kept the change is that since
+  // the start of the search. A change that may be round-off does not count. Call it after finish
+  // and set_targets.
   double moved_since_kept(double accuracy) const;
 
   // Begins an iteration with a step of 1 / L: the next impulses become the present ones. Returns
@@ -84,7 +84,8 @@ template <typename Real> class PackedIterations {
   // Writes the present impulses, in the order of the problem's constraints.
   void impulses(const Scales &scales, std::vector<double> &impulse) const
   { unpack(unbound_, scales, impulse); }
-  // Writes the impulses that the last iteration started from: what advance returned is of these.
+  // Writes the impulses that the last iteration started from: the sums and maxima that advance
+  // returned are those of these impulses.
   void impulses_before(const Scales &scales, std::vector<double> &impulse) const
   { unpack(change_before_, scales, impulse); }
 
@@ -139,9 +140,9 @@ template <typename Real> class PackedIterations {
   // Per slot: the change of velocity by the impulses at the start of the search, in all and since
   // the first guess of the solve
   std::vector<Vector> at_start_, since_guess_;
-  std::vector<char> mobile_;     // per slot
-  std::vector<Real> changed_;    // per slot that can move, what targets are a part of, as
-                                 // set_targets found it
+  std::vector<char> mobile_;    // per slot
+  // Per slot that can move: the change of velocity of which targets are a part (set_targets)
+  std::vector<Real> changed_;
   std::vector<Vector> kept_, kept_before_;    // of velocity_
   Real most_target_ = 0;
   std::vector<packed::Rod<Real>> rods_;

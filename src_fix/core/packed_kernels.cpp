@@ -84,7 +84,8 @@ namespace {
   }
 
   // The part of advance_impulses between its gathers and its scatters makes the next changes of a
-  // block, `next`, from the gaps that the present ones leave, and adds to what is passed.
+  // block, `next`, from the gaps that the present ones leave, and adds to the sums and maxima that
+  // the pass returns.
   template <typename Real, template <typename> typename Set>
   inline __attribute__((always_inline)) void step_block(const Pass<Real, Set> &pass,
                                                         std::size_t begin, std::size_t size,

@@ -27,8 +27,8 @@ template <typename Real> struct alignas(4 * sizeof(Real)) Vector {
   Lanes lanes;
 };
 
-// The vectors of a constraint's two particles are at these places, in bytes from the start of an
-// array, as addresses take them.
+// The vectors of a constraint's two slots (unknowns.h) are at these places, in bytes from the start
+// of an array, as addresses take them.
 struct Ends {
   std::uint32_t first, second;
 };
@@ -71,7 +71,7 @@ struct Passed {
 };
 
 // Makes a gradient step from the present changes and the step of the momentum, and projects. `sum`
-// gets the sums of the changes that are next.
+// gets the sums of the next changes.
 Passed advance_impulses(const Pass<float, HalfLine> &pass);
 Passed advance_impulses(const Pass<double, HalfLine> &pass);
 

@@ -1,5 +1,5 @@
-// The projection of one step's velocities onto ALL constraints, with only those in the problem that
-// matter.
+// The projection of one step's velocities onto ALL constraints, of which only those that matter are
+// in the problem.
 //
 // The set of constraints is generated (for the theory see Palmer, Aktulga and Gao, arXiv
 // 2506.14097). One round solves the problem with the constraints at hand; then the source of
@@ -53,10 +53,10 @@ inline Status worse(Status a, Status b)
 { return std::max(a, b); }
 
 // Projects problem.predicted_velocity in one to `max_rounds` rounds. On return `velocity` (3 per
-// slot) holds the projection and problem.contacts.impulse the impulses. If the
-// last round added constraints, `velocity` knows nothing of them and their impulses are 0.
-// Where the limits are coarse, they are so until a round has left nothing to add or change; what
-// follows is solved as it should be. Collective.
+// slot) holds the projection and problem.contacts.impulse the impulses. If the last round added
+// constraints, `velocity` knows nothing of them and their impulses are 0. Coarse limits are coarse
+// until a round has left nothing to add or change; the rounds after it are solved to the targets.
+// Collective.
 ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solver &solver,
                          const SolverLimits &limits, int max_rounds, Host &host,
                          std::vector<double> &velocity);

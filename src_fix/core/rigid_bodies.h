@@ -9,9 +9,9 @@
 // of Newton and Euler for impulses). Point masses on a line have no inertia about that line; I^-1
 // is then the pseudo-inverse, since no impulse on the particles turns the body about the line.
 //
-// A particle may be a member several times: once as the original, then as its copies (host.h),
-// which move with the body. Impulses are read from the originals alone: those of a copy are the
-// same.
+// A particle may be a member several times: once as the original, then as its copies, further
+// images of it on the same rank, which move with the body. Impulses are read from the originals
+// alone: those of a copy are the same.
 
 #pragma once
 
@@ -36,8 +36,8 @@ struct RigidBodies {
   std::vector<int> start;    // bodies + 1 numbers
   std::vector<int> originals;
   std::vector<int> member;    // per member: the index of its particle
-  std::vector<double>
-      arm;    // 3 per member: from the body's centre of mass to the particle [length]
+  // 3 per member: from the body's centre of mass to the particle [length]
+  std::vector<double> arm;
   std::vector<int> place;    // per particle: its index in `member`; -1 if it is in no body
   std::vector<int> body;     // per particle: the index of its body; -1 if it is in no body
 

@@ -120,8 +120,8 @@ bool AtomState::is_pushed(int i) const
       (step_.has_bodies && momenta_.has_held(i));
 }
 
-// The layout is: this size; with a law, what it remembers of contacts, without one, if there is
-// more, a 0; the push, if there is one.
+// The layout is: this size; what the law remembers of contacts, or without a law a 0 if more
+// follows; the push, if there is one.
 int AtomState::restart_size(int i, bool writes) const
 {
   if (!writes) return 0;
@@ -169,7 +169,7 @@ void AtomState::unpack_restart(int i, int nth, bool written, bool same_law)
   } else
     in += written ? LawMemory::size_of_packed(in) : 1;
   if (in == end) return;
-  // A velocity that was set since is all momentum.
+  // A velocity that was set since the file was written is momentum alone.
   if (!std::equal(in, in + 3, atom->v[i])) return;
   for (int d = 0; d < 3; ++d) atom->v[i][d] -= in[3 + d];
   if (step_.has_bodies && end - in == push_size()) momenta_.unpack_held(i, in + 6);

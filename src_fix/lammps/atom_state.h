@@ -26,14 +26,15 @@ class AtomState : protected Pointers {
   double *expected_position(int i) { return state_[i] + EXPECTED_X; }
   double *expected_velocity(int i) { return state_[i] + EXPECTED_V; }
   double &expected_radius(int i) { return state_[i][EXPECTED_RADIUS]; }
-  static constexpr double OUTSIDE =
-      -1.0;    // in place of the radius of an atom outside of the group
+  // In place of the radius of an atom outside of the group.
+  static constexpr double OUTSIDE = -1.0;
 
   // The part of a velocity that takes a bad overlap apart and is no momentum: after the last move,
   // and at whole steps.
   double *push_next(int i) { return state_[i] + PUSH_NEXT; }
   double *push_held(int i) { return state_[i] + PUSH_HELD; }
-  // At the end of a run: velocities are momentum alone from here on.
+  // At the end of a run: takes the pushes out of the velocities, which are momentum alone from here
+  // on.
   void take_out_pushes();
 
   // For how many steps a particle has been quiet (rest.h).
@@ -50,8 +51,8 @@ class AtomState : protected Pointers {
   // show the pair from the other side, and atoms may migrate before it is built. Collective.
   void remember_contacts(GhostExchange &ranks);
 
-  // Finds how long the messages of an atom are: after each step, and where a restart file has
-  // brought what the law remembers, before LAMMPS hands atoms to other ranks or writes another
+  // Finds how long the messages of an atom are. Call it after each step, and when a restart file
+  // has brought what the law remembers, before LAMMPS hands atoms to other ranks or writes another
   // file. Collective.
   void measure_messages(GhostExchange &ranks);
 
@@ -64,10 +65,10 @@ class AtomState : protected Pointers {
   // The largest message of an atom that is handed to another rank [numbers].
   int exchange_size() const;
 
-  // Restart files hold what the contact law remembers. Those that are written during a run hold
-  // velocities with the push in them: it goes along, with the velocity that it belongs to. Most
-  // atoms have none. Where none has, and without a law (`writes` false), the file holds nothing of
-  // this fix: LAMMPS would refuse change_box after it.
+  // Restart files hold what the contact law remembers. A file that is written during a run holds
+  // velocities with pushes in them: the push of an atom goes along, with the velocity that it is a
+  // part of. Most atoms have none. Where no atom has one, and without a law (`writes` false), the
+  // file holds nothing of this fix, since LAMMPS refuses change_box after a file that does.
   int restart_size(int i, bool writes) const;
   int largest_restart_size() const;
   int pack_restart(int i, double *buffer, bool writes) const;

@@ -58,7 +58,7 @@ bool invert_inertia(const double *a, double *inverse)
   return false;
 }
 
-// Same trace, same sum of squares and same product of the principal moments.
+// Tells whether an inertia has these principal moments: the same trace, sum of squares and product.
 bool same_moments(const double *inertia, const double *moments)
 {
   const double sum = moments[0] + moments[1] + moments[2];

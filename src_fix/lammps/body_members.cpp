@@ -163,7 +163,7 @@ std::string BodyMembers::add_body(int first_sphere, const std::vector<int> &next
   last_sphere_[place] = NONE;
   std::vector<int> spheres, originals, copies, original_of;
   for (int i = first_sphere; i != NONE; i = next[i]) spheres.push_back(i);
-  // The owned sphere before its ghosts.
+  // An owned sphere comes before its ghosts.
   std::sort(spheres.begin(), spheres.end(), [&](int a, int b) {
     return tag[a] != tag[b] ? tag[a] < tag[b] : a < b;
   });

@@ -28,14 +28,13 @@ class BodyMembers : protected Pointers {
   void begin_run() { first_of_run_ = true; }
   Fix *fix() const { return fix_; }
 
-  // Puts the bodies into the step's problem, all particles of the group: to be called when atoms or
-  // ghosts have changed. Collective. Returns what is wrong on this rank, empty if nothing is: a
-  // body of which it sees a part only. Errors: a body that is not all in the group, or holds frozen
-  // spheres.
+  // Puts the bodies into the step's problem, all particles of the group. Call it when atoms or
+  // ghosts have changed. Collective. Returns a message if this rank sees only a part of a body;
+  // otherwise an empty text. Errors: a body that is not all in the group, or holds frozen spheres.
   std::string find();
 
-  // The first call of a run checks this when the bodies were measured. Errors: ghosts that do not
-  // reach far enough. Collective.
+  // Checks, once a run, when the bodies are measured, how far this rank sees. Errors: ghosts that
+  // do not reach far enough. Collective.
   void check_reach() const;
 
   bool is_first_of_run() const { return first_of_run_; }
@@ -60,8 +59,8 @@ class BodyMembers : protected Pointers {
   std::vector<int> last_sphere_;    // per molecule: room for find, NONE between its calls
   std::vector<int> original_of_;    // per member: which of the body's originals it is
   std::vector<char> incomplete_;    // per particle: of a body of which this rank has only a part
-  std::vector<double>
-      in_body_;    // 3 per particle, of which the first tells whether it is in a body
+  // 3 per particle, of which the first tells whether it is in a body
+  std::vector<double> in_body_;
 };
 
 }    // namespace LAMMPS_NS

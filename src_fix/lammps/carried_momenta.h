@@ -20,12 +20,12 @@ struct Carried {
   Push next;                                 // part of the motion after the last move
   Push held;                                 // part of the velocities at whole steps
   // The angular momentum of earlier pushes that is still in the motion: forces on spheres in a line
-  // cannot take away what lies along it, until the line has turned.
+  // cannot take away its part along the line, until the line has turned.
   std::array<double, 3> left_over;
   // [radians] The largest one turned in a step of this run, by motion and by moments of contacts.
   double angle;
-  // The body has made a step: what is carried along is known. A body that is new has its velocities
-  // alone.
+  // Whether the body has made a step, so that the momenta above are known. Of a new body velocities
+  // alone are known.
   bool continues;
 };
 
@@ -49,8 +49,8 @@ class CarriedMomenta {
   void pack_held(int i, double *buffer) const;
   void unpack_held(int i, const double *buffer);
 
-  // By how much the steps of a run have magnified the round-off of a local atom's position: how
-  // fast a body turns, and where to, is known no better than its arms, which may be short.
+  // Returns the factor by which the steps of a run have magnified the round-off of a local atom's
+  // position: the rotation of a body is known no better than its arms, which may be short.
   double round_off_growth(int i) const
   {
     const double angle = carried_[i].angle;

@@ -28,7 +28,7 @@ void Clusters::join(int i, int j)
   parent_[std::max(a, b)] = std::min(a, b);
 }
 
-// Connects what this rank sees to be connected.
+// Connects the particles whose contacts this rank sees.
 void Clusters::join_local()
 {
   const inelastic::ContactProblem &problem = step_.problem;

@@ -13,24 +13,21 @@
 namespace LAMMPS_NS {
 
 struct Contact {
-  // In place of a gap at which a contact is closed, which is not negative.
+  // In place of a closed gap, which is never negative.
   static constexpr double NOT_CLOSED = -1.0;
 
   tagint partner;    // of the first particle: the other one's ID, or minus the wall's number
   double gap_now;    // [length] at the present positions
   double size;       // [length] the sum of the two radii; the radius at a wall
 
-  // Of the last step.
-  double force = 0.0;    // [force]
-  double closed_gap =
-      NOT_CLOSED;    // [length] the gap at which the contact is closed (gap_rules.h)
+  double force = 0.0;                // [force] of the last step
+  double closed_gap = NOT_CLOSED;    // [length] at which it counts as closed (gap_rules.h)
+  double to_stop = 0.0;              // [length] what the contact has to stop (gap_rules.h)
+  inelastic::Demand asked = {};      // what the law asks for; an inelastic contact nothing
+  double predicted_speed = 0.0;      // [length / time] n.u without contacts; set if there is a law
 
-  double to_stop = 0.0;            // [length] what the contact has to stop (gap_rules.h)
-  inelastic::Demand asked = {};    // what the law asks for; an inelastic contact nothing
-  double predicted_speed = 0.0;    // [length / time] with which it parts without contacts, if asked
-
-  // By this the contact is solved more accurately than others (contact_set.h). A speed with which
-  // surfaces part is asked for where they collide, maybe hundreds of times: errors of it add up.
+  // The part of the accuracy to which the contact is solved (contact_set.h). Surfaces may collide
+  // hundreds of times: errors of the speeds with which they part add up.
   double refinement() const { return asked.parts ? 1.0 / 16.0 : 1.0; }
 
   bool is_with_wall() const { return partner < 0; }

@@ -66,8 +66,8 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   vector_[HELD_CONTACTS] = sums[4];
 }
 
-// Contacts carry a force, or their law remembers something of them. Of several constraints that are
-// one contact only those with a force count.
+// Tells whether a row is a contact of the output: it carries a force, or the law remembers
+// something of its contact. Of several rows of one contact only those with a force count.
 bool ContactOutput::is_contact(std::size_t c) const
 {
   if (step_.problem.contacts.impulse[c] != 0.0) return true;

@@ -25,8 +25,8 @@ class ContactOutput : protected Pointers {
 
   // The columns of the arrays, in the order in which the page of the fix lists them.
   static constexpr int PER_ATOM_COLUMNS = 5;
-  static constexpr int LOCAL_COLUMNS =
-      10;    // and one for each value that the contact law remembers
+  // One more follows for each value that the contact law remembers.
+  static constexpr int LOCAL_COLUMNS = 10;
   int local_columns() const { return LOCAL_COLUMNS + remembered_; }
   enum Vector {
     ITERATIONS,
@@ -47,7 +47,7 @@ class ContactOutput : protected Pointers {
     VECTOR_SIZE
   };
 
-  // Once, when the fix is defined.
+  // Call it once, when the fix is defined.
   void set_walls(int number_of_walls);
 
   // LAMMPS says which virial it wants in this step, and where it is to be added.

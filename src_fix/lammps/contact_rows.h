@@ -1,5 +1,6 @@
-// The only way of a contact into the problem of a step. Here it is told what it asks for, what is
-// remembered of it and which gap it has; pairs and walls find contacts, and know nothing of laws.
+// Contacts enter the problem of a step through this room alone. It finds what a contact asks for,
+// what is remembered of it, and its gap; the rooms of pairs and walls find contacts, and know
+// nothing of laws.
 
 #ifndef INELASTIC_CONTACT_ROWS_H
 #define INELASTIC_CONTACT_ROWS_H

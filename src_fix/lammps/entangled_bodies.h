@@ -20,7 +20,7 @@ class EntangledBodies {
   void clear() { pairs_.clear(); }
   bool empty() const { return pairs_.empty(); }
 
-  // Finds them among the constraints of the step.
+  // Finds the entangled bodies among the constraints of the step.
   void find();
 
   // Tells whether particles i and j belong to two entangled bodies, in the phase in which these are

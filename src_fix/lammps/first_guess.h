@@ -38,7 +38,7 @@ struct FirstGuess {
 
 class FirstGuesses : public ContactMemory<FirstGuess> {
  public:
-  // The most contacts that a ghost tells its owned atom; what is beyond loses its first guess.
+  // The most contacts that a ghost tells its owned atom; further ones lose their first guess.
   static constexpr int ENTRIES_PER_MESSAGE = 16;
 
   int pack_message(int atom, double *buffer) const

@@ -25,11 +25,12 @@ using namespace FixConst;
 namespace {
 
 constexpr int MAX_ROUNDS = 100;    // of adding constraints; a handful is usual
+
 std::string first_word(const std::string &words)
 { return words.substr(0, words.find(' ')); }
 
-// Of what restart files hold. Files of version 0.1 begin with a time, those of its successors,
-// before the release of the next version, with the other number.
+// The first number of what restart files hold. In files of version 0.1 it is a time, in those of
+// development versions after it EARLIER_LAYOUT.
 constexpr double LAYOUT = -3.0, EARLIER_LAYOUT = -2.0;
 
 }    // namespace
@@ -186,9 +187,8 @@ void FixInelastic::begin_run()
   begin_summary();
 }
 
-// What the fix was given when it was defined, and may be gone or changed since, also where no run
-// is set up
-// (`run pre no`). Collective.
+// Checks what the fix was given when it was defined, which may be gone or changed since, also where
+// no run is set up (`run pre no`). Collective.
 void FixInelastic::check_scene()
 {
   check_group();
@@ -290,8 +290,9 @@ void FixInelastic::setup(int vflag)
   }
 }
 
-// Far too many spheres would be found out too, but only after very long solves. Those in bodies and
-// frozen ones may overlap one another, and out of a box without walls they may be pushed.
+// Refuses far too many spheres, which the solver would find, too, but only after very long solves.
+// Spheres in bodies and frozen ones do not count, since they may overlap one another; boxes without
+// walls are not checked, since spheres may be pushed out of them.
 void FixInelastic::check_volume()
 {
   const bool closed = !domain->nonperiodic || (!walls_.empty() && domain->nonperiodic == 1);
@@ -381,8 +382,7 @@ inelastic::ProjectionResult FixInelastic::solve()
     constraints_.collect();
     inelastic::ProjectionResult result = project(settings_.max_iterations);
     constraints_.overlaps().share();
-    // Beside bad overlaps regular ones are kept where they cannot all be given back in one step,
-    // and from then on.
+    // Beside bad overlaps regular ones are kept, once they cannot all be given back in one step.
     const bool unsolved = result.status != inelastic::Status::CONVERGED;
     const bool keeps = step_.bad_start && (step_.keeps_overlaps || unsolved);
     if (keeps != step_.keeps_overlaps) {
@@ -437,12 +437,12 @@ void FixInelastic::predict()
 inelastic::ProjectionResult FixInelastic::project(long max_iterations)
 {
   const PhaseClock::Within within(clock_, PhaseClock::SOLVE);
-  // Further than the list reaches no step goes: such a one is shortened, or it is an error.
+  // No step goes further than the list reaches: it is shortened, or it is an error.
   constexpr double BEYOND_REACH = 10.0;
   const double reach = (settings_.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
   inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
   limits.least_length = std::numeric_limits<double>::epsilon() * length_.smallest_radius();
-  // A push is no momentum.
+  // The accuracy is that of momentum, and a push is none.
   if (step_.phase == Phase::CONTACT) {
     // Bodies turn: their constraints are linearised anew in many rounds, of which only the last
     // ones matter.
@@ -488,9 +488,10 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   constraints_.adapt_margin(length_.reach());
 }
 
-// A shortened time step stays until the next step, which `run pre no` takes with it, and restart
-// files tell the regular one. Restart files and the next run start from the momentum alone. (Of
-// bodies the last step has taken the push out, because fix rigid/small is out of reach here.)
+// The time step stays shortened until the next step, also with `run pre no`; restart files tell the
+// regular one. Pushes are taken out of the velocities: restart files and the next run start from
+// momentum alone. (For bodies the last step has done so, because fix rigid/small is out of reach
+// here.)
 void FixInelastic::post_run()
 {
   check_.end_run(constraints_.overlaps().pushes_in_velocity());
@@ -573,7 +574,8 @@ void FixInelastic::write_restart(FILE *file)
   fwrite(law.data(), 1, law.size(), file);
 }
 
-// A time step that was set since stays. LAMMPS calls this before unpack_restart().
+// A time step that was set since the file was read stays. LAMMPS calls this before
+// unpack_restart().
 void FixInelastic::restart(char *buffer)
 {
   double numbers[4];

@@ -18,11 +18,10 @@ class LAMMPS;
 enum class Inertia { POINT, SOLID };
 
 struct Settings {
-  // EPS, the largest overlap allowed [length]. Too small, it is below the round-off of positions.
-  // Velocities are bounded by the accuracy.
+  // EPS, the largest overlap allowed [length]. It must be above the round-off of positions. Errors
+  // of velocities are bounded by the accuracy.
   double tolerance = 0.0;
-  // A, the fraction of what contacts change in a step to which the step is solved, where that is
-  // below EPS.
+  // A: a step is solved to this fraction of what contacts change in it, where that is below EPS.
   double accuracy = 1.0e-3;
   // The name that make_solver() of the core knows.
   std::string solver = "apgd";
@@ -31,7 +30,7 @@ struct Settings {
   bool warn_only = false;
   // A step may be made shorter than `timestep` where the whole step leaves an overlap.
   bool shorten = false;
-  // What contacts hold comes to rest (rest.h).
+  // Particles that their contacts hold come to rest (rest.h).
   bool rest = true;
   // The group of the fix, and the group of spheres that nothing moves (0 = none).
   int group_bit = 0;

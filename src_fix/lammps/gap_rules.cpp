@@ -12,7 +12,7 @@ namespace {
 constexpr double RELINEARISE_BEYOND = 1.1;
 // In tolerances: a contact is closed, whatever its exact gap, within this distance from touching.
 constexpr double CLOSED = 0.5;
-// Beyond that it closes in a step by at most this part of what the contact has to stop.
+// Beyond that a contact closes in a step by at most this part of what it has to stop.
 constexpr double CLOSING = 0.01;
 
 }    // namespace
@@ -34,7 +34,8 @@ void GapRules::begin(Contact &contact, const FirstGuess &last, double wall_motio
   const double load =
       step_.impulse_per_force * contact.force * problem.mobility_of_pair(i, j, normal);
   contact.to_stop = std::max({PART_OF_LOAD * load, wall_motion - problem.timestep * opening, 0.0});
-  // What is at rest is closed where it is: to close would be a motion that nothing makes.
+  // A contact at rest is closed where it is: to close the gap would be a motion that no force
+  // makes.
   contact.closed_gap =
       closed_gap(contact, last.closed_gap, changes ? 0.0 : CLOSING * contact.to_stop);
 }
@@ -53,12 +54,12 @@ std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
   return std::array<double, 2>{one, other};
 }
 
-// [length] A gap under a force is closed where it is, up to half a tolerance: positions are not
-// known better, and what they would give or take in a step would be velocities that nothing gives.
-// Where that adds up along a chain, or differs from step to step, a bed would never be quiet.
-// Beyond it the gap closes, so little that the force stays. When the force goes, the contact is
-// still closed at that gap until the two have parted: what lies on a contact that loses its force
-// for a step does not fall.
+// Returns the gap at which a contact counts as closed [length]. A gap under a force counts as
+// closed where it is, up to half a tolerance: positions are not known better, and to correct them
+// in a step would give velocities that no force makes. These add up along chains and differ from
+// step to step: a bed would never be quiet. A wider gap closes, so little that the force stays.
+// When the force goes, the contact is still closed at that gap until the two have parted: a sphere
+// on a contact that loses its force for a step does not fall.
 double GapRules::closed_gap(const Contact &contact, double last, double most_closing) const
 {
   const double tolerance = step_.settings.tolerance;
@@ -70,8 +71,8 @@ double GapRules::closed_gap(const Contact &contact, double last, double most_clo
   return parted ? Contact::NOT_CLOSED : std::min(gap, last);
 }
 
-// [length] By how much a contact may close. An overlap of up to half a tolerance counts as closed,
-// too; beyond it it is given back little by little.
+// Returns the length by which a contact may close [length]. An overlap of up to half a tolerance
+// counts as closed, too; a deeper one is given back little by little.
 double GapRules::contact_gap(const Contact &contact) const
 {
   const double gap = contact.gap_now;
@@ -79,10 +80,10 @@ double GapRules::contact_gap(const Contact &contact) const
   return gap - std::max(0.0, contact.closed_gap);
 }
 
-// [length] What is given back in the step of an overlap. It begins smoothly, with the accuracy's
-// part of what the contact has to stop where the overlap is 0.8 tolerances. What turning bodies and
-// curved walls leave beyond the tolerance is given back at once: with the next step's it could
-// become a bad start.
+// Returns the part of an overlap that is given back in the step [length]. It grows smoothly: from 0
+// at half a tolerance, by the accuracy's part of what the contact has to stop at 0.8 tolerances.
+// The part beyond the tolerance, which turning bodies and curved walls leave, is given back at
+// once: with the next step's it could become a bad start.
 double GapRules::given_back(const Contact &contact) const
 {
   constexpr double FULL = 0.8;    // tolerances
@@ -94,7 +95,8 @@ double GapRules::given_back(const Contact &contact) const
   return std::min(beyond, std::max(softly, -contact.gap_now - tolerance));
 }
 
-// A held contact is under a force, push or pull, whatever the force was.
+// Does the same for a contact that may pull, which counts as under a force whatever its last one
+// was.
 double GapRules::held_gap(const Contact &contact) const
 {
   if (contact.gap_now <= 0.0) return -given_back(contact);
@@ -102,9 +104,9 @@ double GapRules::held_gap(const Contact &contact) const
   return std::min(open, most_closed(contact));
 }
 
-// [length] The surfaces of a held contact are brought back to one another by no more than
-// velocities are resolved to, or as fast as they would part: this adds nothing to the kinetic
-// energy.
+// Returns the most by which the step may close the gap of a held contact [length]: the accuracy's
+// part of what it has to stop, or as much as the surfaces would part without contacts, which adds
+// nothing to the kinetic energy.
 double GapRules::most_closed(const Contact &contact) const
 {
   return std::max(step_.settings.accuracy * contact.to_stop,
@@ -149,8 +151,8 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   inelastic::ContactSet &contacts = step_.problem.contacts;
   constexpr double LEFT = 0.75;    // tolerances
   const double tolerance = step_.settings.tolerance;
-  // Where one has to change, those that are near to it change with it: in a chain each would be the
-  // next round's.
+  // Once a constraint has to change, later ones that are near the tolerance change with it: in a
+  // chain each would otherwise need a round of its own.
   double allowed = tolerance;
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
@@ -193,7 +195,7 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
         step_.relinearisations > MAX_RELINEARISATIONS / 2)
       return 0;
     if (contacts.impulse[c] > 0.0) {
-      // What approaches across a gap needs no pull, and no push before it touches.
+      // Surfaces that approach across a gap need no pull, and no push before they touch.
       contacts.set[c].least = 0.0;
     } else {
       gap = std::min(gap, most_closed(contact) - row.wall_motion);
@@ -225,7 +227,8 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
   const Contact &contact = step_.contact_of(c);
   const double linear_gap = effective_gap(contact) - row.wall_motion;
   double gap = std::min(exact_gap, linear_gap);
-  // What may keep its overlap, and with the residual still gets too deep, is to give it back.
+  // A contact that may keep its overlap, and with the residual still gets too deep, has to give it
+  // back.
   if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(contact.gap_now))
     gap = std::min(gap, contact.gap_now - row.wall_motion);
   if (!too_deep) {

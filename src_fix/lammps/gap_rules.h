@@ -28,28 +28,27 @@ class GapRules {
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Contact &contact) const;
 
-  // Takes what is remembered of the contact of particles i and j, and finds the gap at which it is
-  // closed, and what it has to stop in this step: the length by which the two approach one another
-  // without contacts, or a tenth of that by which the force opens the gap, whichever is more. What
-  // a position error gives back in a step is at most the accuracy's part of it, so that it is no
-  // more than the errors of velocities.
-  // The wall closes the gap by `wall_motion` [length] in the step.
+  // Takes what is remembered of the contact of slots i and j (unknowns.h), and finds the gap at
+  // which it is closed, and what it has to stop in this step: the length by which the two approach
+  // one another without contacts, or a tenth of that by which the force opens the gap, whichever is
+  // more. A small overlap gives back at most the accuracy's part of this length in a step, no more
+  // than the errors of velocities. A wall closes the gap by `wall_motion` [length] in the step.
   void begin(Contact &contact, const FirstGuess &last, double wall_motion, int i, int j,
              const double *normal) const;
 
   // The gap [length] at the end of the step for which the constraint is just met: negative where an
-  // overlap need not be given back in one step, of which at most half a tolerance may be left.
+  // overlap need not be given back in one step, and but for bad starts by at most half a tolerance.
   double wanted_gap(const Contact &contact) const;
 
-  // Tells whether the end of the step is so deep that the constraint must change. The excess is
-  // noted as well: what starts with a bad overlap may keep it, but not get deeper. It is asked for
-  // more, which costs no shorter step where it is not to be had.
+  // Tells whether the end of the step is so deep that the constraint must change. Notes the excess,
+  // too (StepState). A bad overlap may stay as deep as it began without an excess, though its
+  // constraint asks for less: where less is not to be had, the step need not be shorter.
   bool ends_too_deep(const Contact &contact, double gap_at_end);
 
   // Sets the gap of constraint c to one that is exact for the present velocity, or to the
-  // linearised one if that is smaller. One that was set for an earlier velocity is set again, so
-  // that no force keeps apart what has moved on meanwhile, and the step does not depend on how it
-  // was found. Returns how many constraints changed.
+  // linearised one if that is smaller. A gap that was set for an earlier velocity is set again, so
+  // that no force keeps surfaces apart that have parted meanwhile, and the step does not depend on
+  // how it was found. Returns how many constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
   // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the
@@ -60,11 +59,11 @@ class GapRules {
   // never more than that of two spheres. Not for bad starts. Returns how many constraints changed.
   long hold(std::size_t c, double gap_at_end, double opening, double along);
 
-  // Changes constraints of free spheres that these velocities leave beyond the tolerance, since
-  // gaps that count as closed may be open or overlap: they ask for their present gap, in the case
-  // of an overlap first for as much as leaves most of the tolerance. Returns how many. None where
-  // overlaps are kept: in a dense start the spheres jam for a moment, and cannot all be opened at
-  // once.
+  // Changes constraints of free spheres whose gaps these velocities leave open, or overlapping, by
+  // more than the tolerance, since gaps that count as closed may be open or overlap. Such a
+  // constraint then asks for its present gap; where the two overlap, first for an overlap of most
+  // of the tolerance at the end. Returns how many changed. Overlaps that are kept do not count: in
+  // a dense start spheres jam for a moment, and cannot all be taken apart at once.
   long keep_within_tolerance(const std::vector<double> &velocity);
 
   OverlapWatch &overlaps() { return overlaps_; }

@@ -10,11 +10,11 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-// What moves was solved for: only what ends deeper by so many tolerances, because something is at
-// rest, is to be changed.
+// The moving particles were solved for already: only where they would end deeper by so many
+// tolerances, because others are at rest, do their velocities change.
 constexpr double DEEPER = 0.1;
-// Where more iterations would be needed, what moves has no room beside what is at rest: nothing is
-// stopped in the step.
+// Where more iterations would be needed, moving particles have no room beside those at rest:
+// nothing is stopped in the step.
 constexpr long MOST_ITERATIONS = 2000;
 
 }    // namespace
@@ -47,7 +47,7 @@ std::vector<char> HoldStill::with_ghosts(const std::vector<char> &stopped) const
 
 long HoldStill::run(const std::vector<char> &stopped, const std::function<long()> &add_violated)
 {
-  // What is stopped may be met by what was not to meet it, which may come to something else.
+  // Moving particles may meet stopped ones that they would not have met, and then come upon others.
   constexpr int MOST_ROUNDS = 20;
   const std::vector<char> still = with_ghosts(stopped);
   const std::vector<double> velocity = step_.velocity;
@@ -99,10 +99,11 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
     const double *const n = &problem.contacts.normal[3 * c];
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
     if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
-    // What counts as closed, and overlaps, is to end within the tolerance, the residual included.
+    // A contact that counts as closed, and overlaps, is to end within the tolerance, the residual
+    // included.
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
         (1.0 - DEEPER) * step_.settings.tolerance;
-    // In all a contact still pushes, or pulls by as much as it may.
+    // With the step's own impulse the contact still pushes, or pulls by no more than it may.
     contacts.add(
         i, j, n, std::min(problem.contacts.gap[c], ends_within), 0.0, 0.0,
         std::min(0.0, problem.contacts.set[c].changes_of(problem.contacts.impulse[c]).least));
@@ -122,7 +123,8 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
 void HoldStill::turn_bodies()
 { movers_.turn(step_.problem, step_.velocity, step_.motion_of_bodies); }
 
-// Bodies at rest are to have other velocities than the contact forces give them.
+// Tells the movers that bodies at rest are to have other velocities than the contact forces give
+// them.
 void HoldStill::note_stop()
 {
   if (!movers_.any_turns()) return;

@@ -1,6 +1,6 @@
-// This room takes the velocities of particles at rest away (rest.h). What moves beside them was
-// solved for with these velocities: it is projected once more, with the particles at rest as
-// obstacles, so that nothing moves into them.
+// This room takes the velocities of particles at rest away (rest.h). The moving particles beside
+// them were solved for with these velocities: they are projected once more, with the particles at
+// rest as obstacles, so that nothing moves into these.
 
 #ifndef INELASTIC_HOLD_STILL_H
 #define INELASTIC_HOLD_STILL_H
@@ -24,8 +24,8 @@ class HoldStill {
   // Changes velocities and impulses of the step, which is solved. The marks are one per particle,
   // those of ghosts are not read; of a body any marked member will do. `add_violated` adds
   // constraints that the step's velocities violate, and returns how many all ranks added. Returns
-  // the number of iterations that it took. Where what moves finds no room nothing is changed.
-  // Collective.
+  // the number of iterations that it took. Where the moving particles find no room nothing is
+  // changed. Collective.
   long run(const std::vector<char> &stopped, const std::function<long()> &add_violated);
 
  private:
@@ -37,8 +37,8 @@ class HoldStill {
   Step &step_;
   GhostExchange &ranks_;
   Movers &movers_;
-  std::unique_ptr<inelastic::Solver>
-      solver_;    // apart from that of the steps, which learns from them
+  // Not the solver of the steps, which learns from them.
+  std::unique_ptr<inelastic::Solver> solver_;
   inelastic::ContactProblem moving_;
 };
 

@@ -1,6 +1,6 @@
 // What differs between the releases of LAMMPS for which these sources compile: errors that point to
 // a word of the input and the arguments of `minimum_image` are of 2025, a description of a variable
-// is of 2024. And what no release shows but to its own classes.
+// is of 2024. Beside it stand things that every release shows to its own classes alone.
 
 #ifndef INELASTIC_LAMMPS_VERSIONS_H
 #define INELASTIC_LAMMPS_VERSIONS_H

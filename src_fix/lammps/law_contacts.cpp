@@ -29,8 +29,8 @@ const LawEntry *LawContacts::find(int i, tagint partner, const double *normal, d
                                   double size) const
 {
   constexpr double PARTED = 0.1;    // of the sum of radii
-  // Nothing has moved since the last step when a run starts, in which the surfaces may have
-  // collided from afar.
+  // In the last step surfaces may have collided from afar, and nothing has moved since when a run
+  // starts: there the gap tells nothing.
   if (step_.kick == Kick::WHOLE && gap > PARTED * size) return nullptr;
   return memory_.find(i, partner, normal);
 }
@@ -115,9 +115,10 @@ void LawContacts::take_impulses()
   }
 }
 
-// In the half kick with which a run starts velocities are at the end of the last step already; the
-// next run may start with the same half kick. Then what a contact has asked for counts again, also
-// one that the law need not keep, whose values begin anew.
+// The entry holds the speed that LAMMPS's velocities have at the end of the step: the mean of those
+// before and after a whole kick, or those before the half kick with which a run starts, which the
+// next run may repeat. There the demand counts again, also of a contact that the law need not keep,
+// whose values begin anew.
 LawEntry LawContacts::entry_of(std::size_t c) const
 {
   const inelastic::ContactProblem &problem = step_.problem;

@@ -1,6 +1,6 @@
 // The contacts of a step as the contact law sees them. Constraints ask here what the law asks of
-// them, and after the step the law takes the impulses. Without a law this room is empty, and is
-// asked for nothing but whether there is one and what it remembers: nothing.
+// them, and after the step the law takes the impulses. Without a law this room is empty: others ask
+// it only whether there is a law, and whether that remembers a contact, which it does not.
 
 #ifndef INELASTIC_LAW_CONTACTS_H
 #define INELASTIC_LAW_CONTACTS_H
@@ -26,8 +26,8 @@ class LawContacts : protected Pointers {
   void begin_step() { step_.law_states.clear(); }
 
   // Asks the law about a contact of slots i and j (unknowns.h), which is the next one of the step,
-  // and notes the answer with it. The wall closes the gap by `wall_motion` [length] in the step. Of
-  // a bad start the law only asks which impulse is allowed.
+  // and notes the answer with it. A wall closes the gap by `wall_motion` [length] in the step. In a
+  // bad start the answer counts for the impulses alone: no speed is asked for.
   void ask(Contact &contact, double wall_motion, int i, int j, const double *normal,
            bool bad_start);
 
@@ -48,15 +48,15 @@ class LawContacts : protected Pointers {
   void remember(GhostExchange &ranks);
 
  private:
-  // The half kick with which a run starts takes the place of the second half of the last step of
-  // the run before, whose impulses the law has taken: it is given the difference. [mass length /
-  // time]
+  // Returns the part of a contact's impulse that the law has taken already [mass length / time]:
+  // the half kick with which a run starts repeats the second half of the last kick of the run
+  // before. The law is given the difference.
   double taken_before(const LawState &state) const
   { return is_repeated(state) ? step_.kicks() * state.last_impulse : 0.0; }
   bool is_repeated(const LawState &state) const { return state.known && step_.kick == Kick::HALF; }
 
-  // Looks for what is remembered of a contact with this gap and sum of radii [length]. One whose
-  // surfaces something else than a step has parted begins anew.
+  // Looks for what is remembered of a contact with this gap and sum of radii [length]. A contact
+  // whose surfaces were parted by something else than a step begins anew.
   const LawEntry *find(int i, tagint partner, const double *normal, double gap, double size) const;
   void check(const inelastic::Demand &demand, int i);
   bool is_pushed_apart(std::size_t c) const;

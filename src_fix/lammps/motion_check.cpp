@@ -59,7 +59,7 @@ void MotionCheck::end_run(bool pushing)
   ended_pushing_ = pushing;
 }
 
-// All ranks together, and before a time step is shortened for what is no number.
+// All ranks stop together, and before a number that is not finite shortens the time step.
 void MotionCheck::before_step()
 {
   const std::string broken = break_in_run();
@@ -98,9 +98,9 @@ std::string MotionCheck::not_finite() const
   return "";
 }
 
-// Without a setup the next step follows from the last one's forces: it lacks what the end of the
-// run has taken out of the velocities, or what somebody has changed since. Empty if that is
-// nothing.
+// Returns why the step cannot follow from the last one; empty if it can. It cannot where the box
+// has changed, nor in a run without a setup (`run pre no`) if the end of the run before took a push
+// out of the velocities.
 std::string MotionCheck::break_in_run()
 {
   first_without_setup_ = false;

@@ -62,8 +62,8 @@ class MotionCheck : protected Pointers {
   SceneCheck scene_;
   bool goes_on_ = false;                // between setup and the end of the run
   bool first_without_setup_ = false;    // the step is the first of a run that is not set up
-  bool ended_pushing_ =
-      false;    // velocities lack the push that the last run's end took out of them
+  // Velocities lack the push that the end of the last run took out of them.
+  bool ended_pushing_ = false;
   double largest_change_ = 0.0;    // [velocity] on any rank
 };
 

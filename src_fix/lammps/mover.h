@@ -1,5 +1,5 @@
-// Those who know how particles move, free spheres and bodies, behind one interface: rooms ask all
-// of them together, and know none of them by name.
+// The interface of the rooms that know how particles move, free spheres or bodies: other rooms ask
+// all of them together, and know none of them by name.
 
 #ifndef INELASTIC_MOVER_H
 #define INELASTIC_MOVER_H
@@ -23,8 +23,8 @@ class Mover {
   // step and its check need. `contact_force` is 3 per particle.
   virtual void apply(const double *contact_force) = 0;
 
-  // Tells whether particles turn about one another in a step. Those of movers that turn nothing go
-  // along straight lines, and what follows is not called for them.
+  // Tells whether particles turn about one another in a step. The particles of movers that turn
+  // nothing go along straight lines, and the functions below are not called for them.
   virtual bool turns() const { return false; }
 
   // At the start of a run.
@@ -64,7 +64,8 @@ class Mover {
   {
   }
 
-  // Particles are to have other velocities than contact forces give them (hold_still.h).
+  // Takes note that particles are to have the velocities `wanted` in place of those that contact
+  // forces give them (hold_still.h).
   virtual void note_stop(const inelastic::ContactProblem & /*problem*/,
                          const std::vector<double> & /*by_contacts*/,
                          const std::vector<double> & /*wanted*/)
@@ -83,7 +84,7 @@ class Movers {
   void predict();
   void apply(const double *contact_force);
 
-  // What turns particles. See Mover.
+  // The movers that turn particles. See Mover.
   bool any_turns() const { return !turning_.empty(); }
   void begin_run();
   std::string find();

@@ -56,8 +56,8 @@ class OverlapWatch : protected Pointers {
   bool pushes_in_velocity_ = false;
   double left_ = EXTREME;      // [length] the largest that the last step may have left
   double unexpected_ = 0.0;    // [length] the largest of this step that no step has left
-  bool appeared_ = false;      // on any rank
-  std::string who_;            // overlaps so
+  bool appeared_ = false;      // such an overlap, on any rank
+  std::string who_;            // the two that overlap so
   long unexpected_steps_ = 0;
 };
 

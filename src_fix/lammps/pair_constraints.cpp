@@ -265,8 +265,8 @@ long PairConstraints::relinearise()
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
     const bool too_deep = rules_.ends_too_deep(contact, gap);
-    // A push is to move no contact, but it may turn a held pair back, and the gap that made room
-    // for its turning would be an overlap.
+    // A push leaves held pairs as they are, unless it turns a pair back: the gap that was set to
+    // make room for its turning would then be an overlap.
     const bool follows = step_.phase == Phase::CONTACT || gap < -step_.settings.tolerance;
     if (may_hold && follows && !rules_.overlaps().is_bad(contact.gap_now)) {
       const double along = dot(&contacts.normal[3 * c], away) / norm(away);

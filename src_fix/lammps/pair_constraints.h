@@ -34,12 +34,12 @@ class PairConstraints : protected Pointers {
   long add_violated();
 
   // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The
-  // distance between turning bodies is not convex. The length that the end of the step lacks beside
-  // the linearised gap is put into the gap of the constraint; where the end has more, nothing
-  // changes. The normal stays that of the positions from which the force acts: along any other, two
-  // opposite forces would be a couple, and angular momentum would not be kept. The lacking length
-  // is made up along the normal, hence the division by a cosine. Returns how many constraints
-  // changed.
+  // distance between turning bodies is not convex: at the end of the step it may be less than the
+  // linearised gap. The gap of the constraint is then lowered by the difference over the cosine of
+  // the angle between the normal and the line of the centres at the end, since the spheres make it
+  // up along the normal; where the distance is more, nothing changes. The normal stays that of the
+  // positions from which the force acts: along any other, two opposite forces would be a couple,
+  // and angular momentum would not be kept. Returns how many constraints changed.
   long relinearise();
 
  private:
@@ -69,10 +69,10 @@ class PairConstraints : protected Pointers {
   // One search of a step finds those that may meet; later rounds look at these alone, as long as no
   // particle goes much farther.
   std::vector<Candidate> candidates_;    // in the order of the list
-  double widest_ = 0.0;    // [length] between surfaces at the end of the step: no farther ones
-  std::vector<double>
-      motion_;    // [length] per particle: at most so far in this step, as far as known
-  std::vector<double> allowed_;    // [length] up to so far candidates_ holds all that may meet
+  double widest_ = 0.0;    // [length] the widest gap of a candidate at the end of the step
+  // [length] Per particle: how far it moves in this step at most, by the velocities so far; and how
+  // far it may move as long as candidates_ holds all pairs that may meet.
+  std::vector<double> motion_, allowed_;
   std::vector<Range> ranges_;
   std::vector<int> row_;    // the places in a row of the list that were found
 };

@@ -44,7 +44,7 @@ bool Periods::wrap(double *where, double *image) const
   return wrapped;
 }
 
-// The same in a box whose periods are not at right angles.
+// Wraps a point in a box whose periods are not at right angles.
 bool Periods::wrap_tilted(double *where, double *image) const
 {
   double of_box[3], widths[3] = {0.0, 0.0, 0.0};

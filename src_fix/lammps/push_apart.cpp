@@ -10,7 +10,7 @@ using namespace LAMMPS_NS;
 
 namespace {
 
-// All overlaps may not be had opened at once: spheres jam for a moment. Then so much less is asked
+// Spheres that jam for a moment cannot all be taken apart at once: then this part of it is asked
 // for.
 constexpr double LESS = 0.25;
 
@@ -65,7 +65,7 @@ void PushApart::ask_for(double part, const Atom *atom)
   inelastic::ContactSet &contacts = step_.problem.contacts;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const Contact &contact = step_.contact_of(c);
-    // A gap that counts as closed is one here.
+    // A gap that counted as closed in the first projection is taken as it is here.
     if (contact.gap_now <= step_.settings.tolerance)
       contacts.gap[c] =
           (contact.gap_now < 0.0 ? part : 1.0) * constraints_.rules().effective_gap(contact) -
@@ -75,7 +75,7 @@ void PushApart::ask_for(double part, const Atom *atom)
   if (movers_.any_turns()) constraints_.entangled().disentangle(atom, constraints_.overlaps());
 }
 
-// The next step begins with what was to be had, and now and then asks for more.
+// The next step begins with the part that was solved, and now and then asks for more.
 void PushApart::note_solved(double part, bool at_once)
 {
   constexpr int EASY = 8;    // steps

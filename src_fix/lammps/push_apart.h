@@ -41,11 +41,12 @@ class PushApart {
   Constraints &constraints_;
   Movers &movers_;
 
-  double part_ = 1.0;    // of what overlaps are opened by, as the last step could
-  int easy_ = 0;         // steps in a row that could at once
-  int looked_ = 0;       // steps since the largest overlap [length] was this
-  double largest_before_ = 0.0;
-  bool stuck_ = false;    // it has not got smaller, so that all is asked for
+  // The part of the length by which overlaps are to open that the last step could open them by.
+  double part_ = 1.0;
+  int easy_ = 0;                   // steps in a row in which the first trial was solved
+  int looked_ = 0;                 // steps since the largest overlap was largest_before_
+  double largest_before_ = 0.0;    // [length]
+  bool stuck_ = false;             // overlaps get no smaller, so that all is asked for
 };
 
 }    // namespace LAMMPS_NS

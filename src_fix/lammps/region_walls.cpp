@@ -116,9 +116,9 @@ void RegionWalls::view(const Viewpoints &viewpoints, bool inexact_only, const Fo
   }
 }
 
-// What LAMMPS shows of a region from a point, and within reach of it. To points outside a cone
-// whose radius is a variable it shows nothing beyond the largest radius at first and the reach: it
-// is given a longer one.
+// Finds the walls of a region that LAMMPS shows from a point, within reach of it. To points outside
+// a cone whose radius is a variable it shows nothing beyond the largest radius at first and the
+// reach: it is given a longer one.
 void RegionWalls::look(Region *region, const double *x, double reach, Contacts &found) const
 {
   found.clear();

@@ -25,15 +25,15 @@ constexpr double QUIET = 0.1;
 // So many quiet steps come first: a force that nothing balances would show.
 constexpr double PATIENCE = 8.0;
 // For so many steps held particles are stopped and contacts are solved more accurately. In the last
-// of them velocities are what forces make that do not balance.
+// of these steps velocities show which forces do not balance.
 constexpr double TRIAL = 4.0;
-// The part of the accuracy to which they are solved then. The residuals of a bed, which is
+// The part of the accuracy to which contacts are solved then. The residuals of a bed, which is
 // isostatic, make velocities of some fifty times their size.
 constexpr double REFINED = 1.0 / 4.0;
 // After a trial in which something held moved the next one comes so many quiet steps later.
 constexpr double PAUSE = 50.0;
-// What is at rest is no faster than so many accuracies, of a finer one where the accuracy is
-// coarse.
+// A particle at rest is no faster than so many accuracies; a coarser accuracy counts as the one
+// below.
 constexpr double AT_REST = 5.0;
 constexpr double COARSEST_ACCURACY = 1.0e-3;
 // A cluster moves if it is faster than this part of what it would be without contacts, whatever
@@ -86,9 +86,9 @@ void Rest::compare_loads()
 
 bool Rest::look(const inelastic::ProjectionResult &result)
 {
-  // What a shortened step, or one that pushes spheres apart, ends with is no rest. Uzawa starts
-  // every step from no forces at all: rest would save it nothing. Without atoms there are no
-  // bodies, either.
+  // A step that is shortened, or pushes spheres apart, tells nothing of rest. Uzawa starts every
+  // step from no forces at all: rest would save it nothing. Without atoms there are no bodies,
+  // either.
   looks_ = step_.settings.rest && step_.settings.solver != "uzawa" && step_.largest_radius > 0.0 &&
       step_.problem.timestep == step_.regular_timestep && !step_.bad_start &&
       result.status == inelastic::Status::CONVERGED;
@@ -187,8 +187,8 @@ Rest::Motion Rest::motion_of(int i) const
 double Rest::unit(int i, const Motion &motion) const
 { return std::min(motion.taken, motions_[clusters_.of(i)].without_contacts); }
 
-// What does not move is held as far as it is pressed. What still closes a gap is not: a force would
-// stay across it.
+// Tells whether a particle is held, as one without motion is. One that still has a gap to close is
+// not: its force would stay across the gap.
 bool Rest::is_held(int i, const Motion &motion) const
 { return !motion.closes && (motion.speed == 0.0 || motion.resisted >= HELD * unit(i, motion)); }
 
@@ -245,8 +245,8 @@ Rest::ClusterMotion Rest::motion_of_cluster(const double *s, const double *m) co
   if (!(s[MASS] > 0.0)) return cluster;
   cluster.mass = s[MASS];
   cluster.without_contacts = s[SPEEDS] / s[NUMBER];
-  // Of most of its particles: single ones that come to it, and have not been quiet, do not begin
-  // the count anew.
+  // The count is that of most of its particles: single ones that join the cluster, and have not
+  // been quiet, do not begin it anew.
   cluster.quiet_steps = std::round(s[STEPS] / s[NUMBER]);
   cluster.supported = m[SUPPORTED] > 0.0;
   cluster.driven = m[DRIVEN] > 0.0;
@@ -275,8 +275,8 @@ Rest::ClusterMotion Rest::motion_of_cluster(const double *s, const double *m) co
   return cluster;
 }
 
-// What needs the motion of the clusters: what resists it, and how fast held particles are beside
-// it.
+// Measures what needs the motion of the clusters: the resistance to it, and the speeds of held
+// particles.
 void Rest::measure_clusters_by_motion()
 {
   const inelastic::ContactProblem &problem = step_.problem;

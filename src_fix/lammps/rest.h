@@ -74,7 +74,7 @@ class Rest : protected Pointers {
     double speed = 0.0;    // [length / time] of that motion, root mean square by mass
     double quiet_steps = 0.0;
     bool supported = false, driven = false;
-    // What needs the above:
+    // Measured with the help of the above:
     double resisted = 0.0;      // [length / time] of the motion as a rigid body, as in Motion
     double held_speed = 0.0;    // [length / time] root mean square of the held particles
     bool held_moves = false;

@@ -82,8 +82,9 @@ void RigidMotion::gather_momenta(double kick)
     for (int d = 0; d < 3; ++d) {
       const double forced = kick * atom->f[i][d];
       linear_[3 * i + d] = m * (atom->v[i][d] - push.velocity[d]) + forced;
-      // Point masses on a line show L by v: it sets right the round-off of short arms in what is
-      // carried along. Otherwise this would be off by a change of I, and unstable.
+      // The velocities of point masses on a line determine L: what they differ from the expected
+      // ones corrects the L that is carried along. With the round-off of short arms that L would
+      // otherwise belong to another I than theirs, which is unstable.
       change_[3 * i + d] = forced;
       if (!carried)
         change_[3 * i + d] += m * atom->v[i][d];
@@ -97,8 +98,8 @@ void RigidMotion::gather_momenta(double kick)
   ranks_.share_with_ghosts(carried_part_.data());
 }
 
-// The angular momentum that a body has beside that of forces at its members' arms: the first member
-// holds it for all, and solid spheres each hold their own at the start of a run.
+// Sets the part of a body's angular momentum that does not act at its members' arms: the first
+// member holds it for all, and solid spheres each hold their own at the start of a run.
 void RigidMotion::take_carried(int i)
 {
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
@@ -109,7 +110,7 @@ void RigidMotion::take_carried(int i)
     const BodyInertia &inertia = inertias_[b];
     const Carried &of_body = state_.momenta()[i];
     const Push &push = carried ? of_body.next : of_body.held;
-    // Forces on the spheres can take away no more of a push than this.
+    // Forces on the spheres can take away no more of the push than `removed`.
     double pushed[3], slow[3], removed[3];
     for (int d = 0; d < 3; ++d)
       pushed[d] = push.angular_momentum[d] + (carried ? of_body.left_over[d] : 0.0);
@@ -337,15 +338,17 @@ void RigidMotion::keep(int i, const Push &push, const double *contact_force)
   const double angle = step_.problem.timestep *
       (std::sqrt(dot(body.angular_velocity_end, body.angular_velocity_end)) +
        step_.impulse_per_force * moments * (inverse[0] + inverse[1] + inverse[2]));
-  // The angular momentum is carried along, and with it what an earlier step's moments have rounded.
+  // The largest angle of all steps counts: the angular momentum that is carried along keeps the
+  // round-off of earlier moments.
   of_body.angle = std::max(angle, carries(i) ? of_body.angle : angle_of_first_momentum(b));
   std::copy_n(body.angular_momentum_end, 3, of_body.angular_momentum.begin());
   of_body.continues = true;
 }
 
-// At the start of a run LAMMPS takes the angular momentum of a body from velocities that hold the
-// common one, and its centre of mass is rounded as coordinates are: to about M |dx| |v|. This is
-// the angle whose square magnifies the round-off of positions as much as that does.
+// Returns the angle whose square magnifies the round-off of positions as much as the start of a run
+// does. LAMMPS then takes the angular momentum of a body of mass M from its spheres' velocities,
+// which contain its velocity v, about a centre of mass with the round-off dx of coordinates: an
+// error of about M |dx| |v|.
 double RigidMotion::angle_of_first_momentum(int b) const
 {
   // Ten times the machine epsilon, of the part of coordinates that is allowed for round-off.

@@ -1,4 +1,4 @@
-// The log gets these lines about a run when it has ended.
+// This room writes what the log says about a run when it has ended.
 
 #ifndef INELASTIC_RUN_SUMMARY_H
 #define INELASTIC_RUN_SUMMARY_H

@@ -20,8 +20,8 @@ SqueezedGrains::SqueezedGrains(LAMMPS *lmp, const Step &step, GhostExchange &ran
 {
 }
 
-// [length / time] Of walls and of spheres without contacts. Positions are known to the tolerance,
-// and so are speeds.
+// Returns the largest speed of walls, and of spheres without contacts [length / time]; at least a
+// tolerance a step, since speeds are known no better.
 double SqueezedGrains::fastest_before() const
 {
   const inelastic::ContactProblem &problem = step_.problem;

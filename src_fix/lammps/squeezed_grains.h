@@ -1,7 +1,7 @@
 // Grains that walls squeeze out from between them. Two walls that close at a small angle to one
-// another leave a sphere that fills the room between them one way out, along which it moves as many
-// times faster than they as the angle is small. That is where it goes, and it is told, for no grain
-// would.
+// another leave a sphere that fills the room between them one way out, along which it moves at
+// their speed over the angle. The projection sends it there; the log tells so, since a real grain
+// would not go.
 
 #ifndef INELASTIC_SQUEEZED_GRAINS_H
 #define INELASTIC_SQUEEZED_GRAINS_H
@@ -22,13 +22,13 @@ class SqueezedGrains : protected Pointers {
 
   void begin_run() { told_ = false; }
 
-  // Looks for the sphere at a closing wall that a projection makes most times as fast as anything
-  // moved before. Collective.
+  // Looks for the fastest sphere at a closing wall after the projection, if it is many times as
+  // fast as anything moved before. Collective.
   void look();
-  // Nothing was looked for.
+  // Forgets the last look, in a step in which nothing is looked for.
   void skip() { said_.clear(); }
 
-  // What happens to it; empty where no sphere is so fast.
+  // What happens to that sphere; empty where none is so fast.
   const std::string &said() const { return said_; }
 
   // Warns of it, once a run.

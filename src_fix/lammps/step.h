@@ -37,8 +37,8 @@ constexpr double EXTREME = 1.0e300;
 
 // What lives as long as a run. The room that writes a field stands behind it, here and below.
 struct RunState {
-  // A step of this run came before, so that momenta are carried along and its prediction can be
-  // compared with what moved. (motion_check)
+  // A step of this run came before: bodies that made it carry momenta along (carried_momenta.h),
+  // and its prediction can be compared with what moved. (motion_check)
   bool continues = false;
   // [time] as the deck sets it; problem.timestep may be shorter (step_length)
   double regular_timestep = 0.0;
@@ -64,13 +64,13 @@ struct StepState {
   // (rest)
   std::vector<double> load_change;
 
-  // What solves it.
+  // What solves the step.
   std::vector<double> velocity;    // 3 per slot, the projection (the core, hold_still)
   // 3 per slot, the mean velocity during the step; only in a scene with bodies, which turn (the
   // movers)
   std::vector<double> motion_of_bodies;
 
-  // What is known after constraints were collected.
+  // What is known once constraints are collected.
   Phase phase = Phase::CONTACT;    // (constraints, push_apart)
   bool bad_start = false;    // some overlap at the start is beyond the regular ones (overlap_watch)
   // Regular overlaps are given back by the push out of bad ones alone. (fix_inelastic)

@@ -36,8 +36,8 @@ constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon
 // An atom may stray by this part of what its rank owns of the box: LAMMPS brings it back from the
 // next part alone.
 constexpr double MOST_STRAYED = 0.5;
-// Of the smallest radius: a tolerance that serves nearly every packing, and one beyond which there
-// is little of one.
+// Parts of the smallest radius: a tolerance that serves nearly every packing, and one beyond which
+// a packing means little.
 constexpr double USUAL_TOLERANCE = 0.001, COARSE_TOLERANCE = 0.1;
 
 }    // namespace
@@ -197,7 +197,7 @@ void StepLength::measure_farthest()
   }
 }
 
-// Collective: how far some atom will have gone since the list was built, as a part of that.
+// Collective: how far some atom will have gone since the list was built, as a part of farthest_.
 double StepLength::part_of_farthest()
 {
   if (std::min({farthest_[0], farthest_[1], farthest_[2]}) == EXTREME) return 0.0;
@@ -366,7 +366,6 @@ void StepLength::shorten(double factor, const std::string &named)
   shortened_ = true;
 }
 
-// Before the next step, or the next run.
 void StepLength::restore()
 {
   if (shortened_ && update->dt != step_.regular_timestep) set_timestep(step_.regular_timestep);
@@ -382,7 +381,7 @@ void StepLength::set_regular_timestep(double timestep)
 bool StepLength::is_shortened() const
 { return update->dt != step_.regular_timestep; }
 
-// The fix's own changes return to the regular step.
+// A change by the fix itself leaves the regular time step what it is.
 void StepLength::timestep_was_set()
 {
   if (!setting_timestep_) step_.regular_timestep = update->dt;

@@ -37,7 +37,7 @@ class StepLength : protected Pointers {
   // the spheres. Collective.
   void list_built();
 
-  // At the start of a step: a time step that was shortened is the regular one again. Collective.
+  // At the start of a step: measures how far atoms have moved since the list was built. Collective.
   void begin_step();
 
   // Shortens the step where the list cannot reach as far as atoms would move without contacts:
@@ -59,8 +59,9 @@ class StepLength : protected Pointers {
   // Collective.
   bool needs_new_list();
 
+  // Before a step, or a run: a time step that was shortened is the regular one again.
   void restore();
-  // The timestep command, also where no run is set up after it (run pre no).
+  // Call it when the time step was changed, also where no run is set up after it (run pre no).
   void timestep_was_set();
   bool is_shortened() const;
   void set_regular_timestep(double timestep);
@@ -86,10 +87,10 @@ class StepLength : protected Pointers {
   double smallest_radius_ = 0.0;    // [length] in the group, on all ranks
   bool one_cutoff_ = true;
   double list_reach_ = 0.0;    // [length] the gap beyond which a pair may lack in a new list
-  double spread_at_start_ =
-      0.0;                  // [length] largest relative displacement since the list was built
+  // [length] The largest relative displacement since the list was built
+  double spread_at_start_ = 0.0;
   double growth_ = 0.0;     // [length] of a radius since then
-  double strayed_ = 0.0;    // largest displacement since then, of the width that a rank owns
+  double strayed_ = 0.0;    // largest displacement since then, as a part of own_width_
   // [length] The part of the box that this rank owns; no limit where nothing is beyond.
   double own_width_[3] = {EXTREME, EXTREME, EXTREME};
   // LAMMPS loses an atom that goes further than this part of the box, in one direction, between two

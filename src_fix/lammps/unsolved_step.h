@@ -38,8 +38,8 @@ class UnsolvedStep : protected Pointers {
   // Notes that it is certain that there are no velocities for the step as long as it was.
   void note_no_room() { no_room_ = true; }
 
-  // Tells whether the contact law asks surfaces to part that cannot all do so, perhaps, in a step
-  // so long. Collective.
+  // Tells whether the contact law asks surfaces to part, which perhaps cannot all do so in so long
+  // a step. Collective.
   bool law_parts() const;
 
   // Stops the run, or warns where the keyword maxiter allows it. Collective.

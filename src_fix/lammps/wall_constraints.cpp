@@ -95,8 +95,8 @@ double WallConstraints::opening_of(int i, int wall, const double *normal,
   return step_.problem.timestep * dot(normal, relative);
 }
 
-// [length] The gap of an atom that is seen where the step takes it, and of the wall where contacts
-// take that.
+// [length] The gap at the end of the step of an atom that is seen from there, with the motion that
+// contacts give the wall.
 double WallConstraints::gap_at_end(const WallView &view, int i) const
 {
   const double *const of_wall = &step_.velocity[3 * step_.problem.slot_of_wall(view.wall - 1)];
@@ -108,8 +108,8 @@ void WallConstraints::collect(double margin)
   constraint_.clear();
   if (walls_.empty()) return;
   const double *const velocity = step_.problem.predicted_velocity.data();
-  // A look further than needed tells for most atoms that no other is, in this step. (Not where
-  // parts of a region hide others.)
+  // A first look that goes further than needed spares most atoms all other looks of this step. (Not
+  // where parts of a region hide others.)
   const double further = walls_.exact() ? 2.0 * step_.largest_radius : 0.0;
   clear_of_walls_.assign(atom->nlocal, 0.0);
   const Viewpoints &far = viewpoints(velocity, margin + further);
@@ -202,7 +202,7 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   Contact unseen = contact_with(i, view.wall, view.convex ? std::max(0.0, to_plane) : to_plane);
   const Contact &contact = known ? step_.contact_of(existing->second) : unseen;
   rules_.overlaps().note(contact.gap_now, i, -view.wall);
-  // This makes it exact for this motion, also where a body turns.
+  // With `turning` the gap is exact for this motion, also where a body turns.
   const double turning = step_.is_member(i)
       ? h * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]))
       : 0.0;
@@ -210,8 +210,8 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   if (known && is_same_plane(existing->second, n))
     return rules_.follow(existing->second, gap, too_deep);
   if (!too_deep) return 0;
-  // Behind a periodic boundary a sphere that passes an obstacle in one step sees its far side: a
-  // plane there would throw it on. The step is too long.
+  // A sphere that passes an obstacle behind a periodic boundary in one step sees its far side,
+  // where a plane would push the sphere on: no plane is added, and the step is too long.
   if (is_image(from) && view.convex && to_plane < -step_.settings.tolerance) {
     step_.excess = std::max(step_.excess, -gap_there);
     return 0;
@@ -272,8 +272,8 @@ long WallConstraints::hold(std::size_t c, double gap_at_end, const double *norma
   return rules_.hold(c, gap_at_end, opening, dot(normal, normal_at_end));
 }
 
-// From where a body ends, a part of an intersection of regions may not show the wall that a
-// constraint was set for: the plane tells how far it is.
+// Sets constraints again whose walls are not seen from where a body ends (a part of an intersection
+// of regions may hide them): the plane tells how far the wall is.
 long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
                                     const Viewpoints &beyond)
 {
@@ -295,8 +295,8 @@ long WallConstraints::follow_unseen(const std::unordered_set<std::size_t> &seen,
   return changed;
 }
 
-// From beyond a wall nothing is seen: planes are added for the last place from which the wall is.
-// Collective.
+// Adds planes for spheres that end beyond a wall, from where nothing is seen: those of the last
+// place from which the wall is seen. Collective.
 long WallConstraints::add_planes_within(const Viewpoints &beyond)
 {
   double number_beyond = static_cast<double>(beyond.size());

@@ -28,8 +28,8 @@ class WallConstraints : protected Pointers {
   WallConstraints(class LAMMPS *lmp, Step &step, GapRules &rules, ContactRows &rows, Walls &walls,
                   GhostExchange &ranks, const Movers &movers);
 
-  // Tells whether the end of a step must be looked at: bodies turn, walls curve, or contacts may
-  // hold spheres to an obstacle, about which they turn.
+  // Tells whether the end of a step must be looked at: bodies turn, walls curve, spheres may cross
+  // a periodic boundary, or contacts may hold spheres to an obstacle, about which they turn.
   bool need_relinearising() const { return !walls_.empty() && !(walls_.exact() && only_inexact()); }
 
   // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
@@ -51,7 +51,7 @@ class WallConstraints : protected Pointers {
   std::uint64_t key(int i, int wall) const
   { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
 
-  // Tells whether only walls without exact constraints can be met at the end of a step.
+  // Tells whether a look at the end of a step may leave out the walls whose constraints are exact.
   bool only_inexact() const { return !movers_.any_turns() && !periods_.any() && !rows_.may_hold(); }
   bool wrap(Viewpoint &) const;
   void note_overlaps_with_moving_walls();

@@ -52,8 +52,8 @@ class Walls {
   // Tells whether any wall moves in a way that is prescribed.
   virtual bool any_moves() const = 0;
 
-  // All walls flat (or convex obstacles): the linearised constraint is exact or on the safe side,
-  // and no look at the end of the step is needed.
+  // Tells whether all walls are flat, or convex obstacles: the linearised constraint is then exact
+  // or on the safe side, and no look at the end of the step is needed for free spheres.
   virtual bool exact() const = 0;
 
   // Calls found(viewpoint, view) for every wall within reach. outside(viewpoint, wall) is called

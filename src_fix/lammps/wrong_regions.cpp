@@ -110,9 +110,8 @@ Endless ends_of_block(Region *block, double size)
   return ends;
 }
 
-// Of a cone or a prism, which are convex: the mean of places on its surface is inside. Places on
-// the side of a cone are right even where an end is at infinity, but for the coordinate along its
-// axis.
+// Cones and prisms are convex: the mean of places on the surface is inside. Places on the side of a
+// cone are right even where an end is at infinity, but for the coordinate along its axis.
 Endless ends_of_convex(Region *region, double size)
 {
   const bool cone = has_style(region, "cone");

@@ -1,5 +1,5 @@
-// What LAMMPS shows wrong of a region's walls (up to update 4 of 22 Jul 2025), and the region is
-// refused for, or a flag of it mends. What the way of looking at it mends is in RegionWalls::look.
+// Regions whose walls LAMMPS shows wrong (up to update 4 of 22 Jul 2025): they are refused, or
+// mended by a flag of the region. RegionWalls::look mends others by its way of looking.
 
 #ifndef INELASTIC_WRONG_REGIONS_H
 #define INELASTIC_WRONG_REGIONS_H

@@ -8,12 +8,12 @@
 //
 //   w = D + h n.u >= 0   or   w = h (n.u - s) >= 0,      lambda >= l,      (lambda - l) w = 0
 //
-// A law chooses s, the speed with which the surfaces must part at least, and the set of impulses
-// (../core/admissible_set.h), which has l <= 0, the least one. With l = 0 a contact only pushes.
-// With l < 0 it is held: it pulls by up to -l, and opens only where it pulls by as much.
+// Where both are asked, w is the smaller one. A law chooses s, the speed with which the surfaces
+// must part at least, and the set of impulses (../core/admissible_set.h), which has l <= 0, the
+// least one. With l = 0 a contact only pushes. With l < 0 it is held: it pulls by up to -l, and
+// opens only where it pulls by as much.
 //
-// The inelastic law (no s, l = 0) is none of these classes: a scene that names no other law asks
-// nobody.
+// The inelastic law (no s, l = 0) has no class: in a scene that names no other law nobody is asked.
 
 #pragma once
 
@@ -26,7 +26,7 @@
 
 namespace inelastic {
 
-// Counts the changes of what stands in this file: laws are built for one of them.
+// The version of this interface. A law is built for one version, and refused by others.
 constexpr int CONTACT_LAW_VERSION = 2;
 
 // A contact at the start of a step.
@@ -45,7 +45,7 @@ struct ContactState {
 
 // What a contact asks for in a step: the gap, and which impulses it may carry.
 struct Demand {
-  // Whether s is asked for, too, in place of D + h n.u >= 0 where that is less
+  // Whether s is asked for, too: w is then the smaller one of the two gaps above
   bool parts = false;
   double parting_speed = 0.0;    // s [length / time], >= 0
   HalfLine<double> set;          // [mass length / time]
@@ -69,9 +69,9 @@ class ContactLaw {
 
   // Takes the impulse that a contact has carried in a step that is solved, and sets what is
   // remembered of it. Returns whether that must be kept: such a contact belongs to the next step
-  // whether it touches or not, and is in the output; one that need not be kept begins anew. Where a
-  // run begins, half of the last step is made again, and this takes the difference to what it took
-  // before.
+  // whether it touches or not, and is in the output; any other begins anew. Where a run begins,
+  // half of the last step is made again: the impulse is then the difference to the one that was
+  // taken before.
   virtual bool remember(const Impulse & /*impulse*/, double * /*remembered*/) const
   { return false; }
 
@@ -81,8 +81,8 @@ class ContactLaw {
   virtual void turn_round(double * /*remembered*/) const {}
 };
 
-// Makes a law of the words that follow its name in `law NAME ...`. Returns nullptr, and says in
-// `error` what is allowed, if it does not like them.
+// Makes a law of the words that follow its name in `law NAME ...`. For words that are not allowed
+// it returns nullptr, and says in `error` what is.
 using MakeLaw = std::unique_ptr<ContactLaw> (*)(const std::vector<std::string> &words,
                                                 std::string &error);
 

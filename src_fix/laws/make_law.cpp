@@ -14,7 +14,7 @@ namespace {
     return nullptr;
   }
 
-  // Those of this folder, of which each needs one line here, then those that were added.
+  // The laws of this folder, one line each, then those that plugins have added.
   std::vector<NamedLaw> &laws()
   {
     static std::vector<NamedLaw> all = {

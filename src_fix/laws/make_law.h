@@ -11,8 +11,8 @@ struct NamedLaw {
   MakeLaw make;
 };
 
-// Adds a law, or replaces one that was added before. Returns what is wrong: the name is that of a
-// law of this folder; otherwise an empty text.
+// Adds a law, or replaces one that was added before. Returns what is wrong where the name is that
+// of a law of this folder; otherwise an empty text.
 std::string add_law(const std::string &name, MakeLaw make);
 
 // Returns the law with this name, or nullptr.

@@ -2,8 +2,8 @@
 //
 // It holds where the surfaces would overlap at the end of the step, D + h n.u* < 0, and approach
 // with more than the forces of the step have given them: a = min(-n.u_before, -n.u*) > |n.u* -
-// n.u_before|. All others are inelastic, so that a bed comes to rest: a sphere that bounces on a
-// floor stays there when its speed has fallen below g h.
+// n.u_before|. All other contacts are inelastic, so that a bed comes to rest: a sphere that bounces
+// on a floor stays there when its speed has fallen below g h.
 //
 // Energy never rises where steps have one length. The projection changes the kinetic energy by 1/2
 // the sum of lambda (n.u + n.u*) over all contacts. Where one has collided, n.u = E a, and n.u* <=
