@@ -31,8 +31,9 @@ class GapRules {
   // Takes what is remembered of the contact of slots i and j (unknowns.h), and finds the gap at
   // which it is closed, and what it has to stop in this step: the length by which the two approach
   // one another without contacts, or a tenth of that by which the force opens the gap, whichever is
-  // more. A small overlap gives back at most the accuracy's part of this length in a step, no more
-  // than the errors of velocities. A wall closes the gap by `wall_motion` [length] in the step.
+  // more. An overlap of up to 0.8 tolerances gives back at most the accuracy's part of this length
+  // in a step, no more than the errors of velocities. A wall closes the gap by `wall_motion`
+  // [length] in the step.
   void begin(Contact &contact, const FirstGuess &last, double wall_motion, int i, int j,
              const double *normal) const;
 
