@@ -82,8 +82,8 @@ struct StepState {
   // Rounds that have looked at the end of the step. (constraints, push_apart)
   int relinearisations = 0;
   bool at_rest = false;    // nothing moves in this step (rest)
-  // What went wrong on this rank while collecting; empty if nothing. (pair_constraints,
-  // wall_constraints)
+  // What went wrong on this rank while constraints were collected; empty if nothing.
+  // (pair_constraints, wall_constraints, law_contacts)
   std::string problem_found;
 };
 
