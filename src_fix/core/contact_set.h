@@ -6,16 +6,16 @@
 //
 //   n_c    is a unit normal. It points from the second side to the first (from the wall to the
 //          particle).
-//   gap_c  is the distance between the two surfaces; it is negative when they overlap. Where the
-//          motion of a wall is prescribed, what it is during the step is already in the gap, and
-//          the wall has no velocity here.
+//   gap_c  is the distance between the two surfaces; it is negative when they overlap. A
+//          wall whose motion is prescribed has no velocity here: gap_c already has the length by
+//          which it comes nearer during the step.
 //   h      is the time step.
 //   C_c    is the compliance of the contact, 0 for a rigid one: under its impulse the gap may be
 //          smaller by C_c lambda_c.
 //
 // Each constraint carries one impulse lambda_c [mass length / time]: +lambda_c n_c acts on the
-// first particle and -lambda_c n_c on the second. Which impulses it may be is its admissible set
-// (admissible_set.h): those of at least l_c <= 0.
+// first side and -lambda_c n_c on the second. The admissible set of a constraint (admissible_set.h)
+// holds the impulses that it may carry: those of at least l_c <= 0.
 //
 // G_c . V = n_c . (v_first - v_second) takes velocities to the speeds with which gaps open. How
 // many numbers an impulse has, and how they meet velocities, is known here and in the packed passes

@@ -16,7 +16,8 @@ namespace {
   constexpr double IN_NETWORKS = 1.0 / 16.0;
   // Bodies turn, too: the softest motions of their networks are softer.
   constexpr double OF_BODIES = 1.0 / 48.0;
-  // Of what a contact carries, where that changes no velocity.
+  // The part of the length by which a contact's own impulse opens its gap, to which the contact is
+  // resolved even where that impulse, balanced by others, changes no velocity.
   constexpr double PART_OF_LOAD = 2.0e-5;
   // Gaps are known to a few units of round-off of what they are added up from.
   constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();

@@ -57,10 +57,11 @@ class ContactTargets {
                            const GapOperator &gap_operator, const std::vector<double> &gap,
                            Host &host);
 
-  // What follows is as judge() left it, without what changes of velocity add.
-  // [length] The target is at least that.
+  // The functions below give what the last judge() has found.
+  // [length] The lower bound of each target, whatever the changes of velocity are.
   const std::vector<double> &least() const { return least_; }
-  // By this a change of velocity counts: A/16, or A/48, times the refinement.
+  // The factor from a length h |change of velocity| to a target: A/16, or A/48, times the
+  // refinement.
   const std::vector<double> &part() const { return part_; }
   // [length / time] The changes of velocity by the first guess, 3 per slot.
   const std::vector<double> &change_by_guess() const { return change_by_guess_; }

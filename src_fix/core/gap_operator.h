@@ -40,7 +40,7 @@ class GapOperator {
     // |G^T lambda|^2 in the norm of M^-1 [mass length^2 / time^2]: twice the kinetic energy that
     // the impulses give to particles and bodies at rest.
     double squared;
-    // The mass of what impulses act on.
+    // [mass] Of all particles, bodies and walls on which an impulse acts.
     double mass;
   };
 

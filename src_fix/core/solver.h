@@ -42,7 +42,8 @@ enum class Status {
   OUT_OF_ROUNDS,
   // The largest number of iterations was made, and the residual is above the tolerance.
   OUT_OF_ITERATIONS,
-  // The tolerance, too, is below the round-off of the gaps where impulses act.
+  // Where impulses act gaps are known to no better than their round-off, and the tolerance is below
+  // that.
   ROUND_OFF,
   // A number in the problem or in the iterations is infinite or no number.
   NOT_FINITE,
@@ -107,9 +108,8 @@ class Solver {
   GapOperator &gap_operator() { return gap_operator_; }
 
  protected:
-  // Judges the impulses of the problem, of which those below the least become that, and sets the
-  // diagonal and what the targets need of the first guess. The operator must be prepared for the
-  // problem. Collective.
+  // Makes the impulses of the problem admissible and judges them as the first guess. Sets the
+  // diagonal, and tells the targets. The operator must be prepared for the problem. Collective.
   Guess judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host);
 
   GapOperator gap_operator_;
