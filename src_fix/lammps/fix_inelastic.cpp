@@ -1,7 +1,7 @@
 #include "fix_inelastic.h"
 
-#include "lammps_versions.h"
-#include "make_solver.h"
+#include "inelastic_lammps_versions.h"
+#include "inelastic_make_solver.h"
 
 #include "atom.h"
 #include "comm.h"
@@ -20,6 +20,7 @@
 #include <limits>
 
 using namespace LAMMPS_NS;
+using namespace Inelastic_NS;
 using namespace FixConst;
 
 namespace {
@@ -353,7 +354,8 @@ void FixInelastic::advance(int vflag, Kick kick)
   finish(result);
 }
 
-// Solves the step once more, from its solution, where contacts are to be known better (rest.h).
+// Solves the step once more, from its solution, where contacts are to be known better
+// (inelastic_rest.h).
 void FixInelastic::refine(inelastic::ProjectionResult &result)
 {
   const inelastic::ProjectionResult refined = project(settings_.max_iterations - result.iterations);

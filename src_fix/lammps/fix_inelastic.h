@@ -16,27 +16,27 @@ FixStyle(inelastic,FixInelastic);
 #ifndef LMP_FIX_INELASTIC_H
 #define LMP_FIX_INELASTIC_H
 
-#include "atom_state.h"
-#include "constraints.h"
-#include "contact_output.h"
-#include "fix_settings.h"
-#include "ghost_exchange.h"
-#include "hold_still.h"
-#include "law_contacts.h"
-#include "motion_check.h"
-#include "phase_clock.h"
-#include "problem_record.h"
-#include "push_apart.h"
-#include "region_walls.h"
-#include "rest.h"
-#include "rigid_motion.h"
-#include "run_summary.h"
-#include "solver.h"
-#include "sphere_motion.h"
-#include "squeezed_grains.h"
-#include "step.h"
-#include "step_length.h"
-#include "unsolved_step.h"
+#include "inelastic_atom_state.h"
+#include "inelastic_constraints.h"
+#include "inelastic_contact_output.h"
+#include "inelastic_ghost_exchange.h"
+#include "inelastic_hold_still.h"
+#include "inelastic_law_contacts.h"
+#include "inelastic_motion_check.h"
+#include "inelastic_phase_clock.h"
+#include "inelastic_problem_record.h"
+#include "inelastic_push_apart.h"
+#include "inelastic_region_walls.h"
+#include "inelastic_rest.h"
+#include "inelastic_rigid_motion.h"
+#include "inelastic_run_summary.h"
+#include "inelastic_settings.h"
+#include "inelastic_solver.h"
+#include "inelastic_sphere_motion.h"
+#include "inelastic_squeezed_grains.h"
+#include "inelastic_step.h"
+#include "inelastic_step_length.h"
+#include "inelastic_unsolved_step.h"
 
 #include "fix.h"
 
@@ -85,28 +85,28 @@ class FixInelastic : public Fix {
 
  private:
   // In the order in which they need one another.
-  Settings settings_;
-  PhaseClock clock_;
-  Step step_;
-  GhostExchange ranks_;
-  AtomState state_;
-  LawContacts laws_;
-  std::unique_ptr<RigidMotion> bodies_;    // null in a scene of free spheres
-  SphereMotion spheres_;
-  Movers movers_;    // the free spheres, then the bodies
-  RegionWalls walls_;
-  Constraints constraints_;
+  Inelastic_NS::Settings settings_;
+  Inelastic_NS::PhaseClock clock_;
+  Inelastic_NS::Step step_;
+  Inelastic_NS::GhostExchange ranks_;
+  Inelastic_NS::AtomState state_;
+  Inelastic_NS::LawContacts laws_;
+  std::unique_ptr<Inelastic_NS::RigidMotion> bodies_;    // null in a scene of free spheres
+  Inelastic_NS::SphereMotion spheres_;
+  Inelastic_NS::Movers movers_;    // the free spheres, then the bodies
+  Inelastic_NS::RegionWalls walls_;
+  Inelastic_NS::Constraints constraints_;
   std::unique_ptr<inelastic::Solver> solver_;
-  PushApart push_apart_;
-  StepLength length_;
-  Rest rest_;
-  HoldStill hold_still_;
-  MotionCheck check_;
-  UnsolvedStep unsolved_;
-  SqueezedGrains squeezed_;
-  ContactOutput output_;
-  RunSummary summary_;
-  ProblemRecord record_;
+  Inelastic_NS::PushApart push_apart_;
+  Inelastic_NS::StepLength length_;
+  Inelastic_NS::Rest rest_;
+  Inelastic_NS::HoldStill hold_still_;
+  Inelastic_NS::MotionCheck check_;
+  Inelastic_NS::UnsolvedStep unsolved_;
+  Inelastic_NS::SqueezedGrains squeezed_;
+  Inelastic_NS::ContactOutput output_;
+  Inelastic_NS::RunSummary summary_;
+  Inelastic_NS::ProblemRecord record_;
   std::string law_in_restart_;    // the law whose memory a restart file holds; empty for none
 
   void announce_to_lammps();
@@ -119,7 +119,7 @@ class FixInelastic : public Fix {
   void check_run() const;
   void check_volume();
   void begin_summary();
-  void advance(int vflag, Kick kick);
+  void advance(int vflag, Inelastic_NS::Kick kick);
   inelastic::ProjectionResult solve();
   void refine(inelastic::ProjectionResult &result);
   void predict();

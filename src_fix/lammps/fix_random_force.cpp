@@ -1,7 +1,7 @@
 #include "fix_random_force.h"
 
-#include "lammps_versions.h"
-#include "random.h"
+#include "inelastic_lammps_versions.h"
+#include "inelastic_random.h"
 
 #include "atom.h"
 #include "error.h"
@@ -12,6 +12,7 @@
 #include <cstring>
 
 using namespace LAMMPS_NS;
+using namespace Inelastic_NS;
 using namespace FixConst;
 
 FixRandomForce::FixRandomForce(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg)

@@ -1,10 +1,10 @@
 // Registers the fixes and the command when LAMMPS loads this file as a plugin.
 
-#include "contact_law_plugin.h"
 #include "fix_inelastic.h"
 #include "fix_random_force.h"
-#include "make_law.h"
-#include "parameters.h"
+#include "inelastic_contact_law_plugin.h"
+#include "inelastic_make_law.h"
+#include "inelastic_parameters.h"
 
 #include "comm.h"
 #include "error.h"

@@ -30,5 +30,5 @@ def build() -> dict[str, str]:
 
 
 def include_folder() -> str:
-    """Folder that holds ``contact_law_plugin.h``, for contact laws of one's own."""
+    """Folder that holds ``inelastic_contact_law_plugin.h``, for contact laws of one's own."""
     return f"{__path__[0]}/include"

@@ -1,11 +1,11 @@
 // The compiled part of the Python module lammps_inelastic.core. It takes the objects of problem.py,
 // which have checked their arrays, and checks nothing itself.
 
-#include "contact_problem.h"
-#include "gap_operator.h"
-#include "make_solver.h"
-#include "random.h"
-#include "solver.h"
+#include "inelastic_contact_problem.h"
+#include "inelastic_gap_operator.h"
+#include "inelastic_make_solver.h"
+#include "inelastic_random.h"
+#include "inelastic_solver.h"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>

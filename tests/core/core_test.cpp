@@ -3,15 +3,15 @@
 // undefined-behaviour sanitizers; the solvers are judged in test_solver*.py. Returns 1 when a check
 // failed.
 
-#include "contact_problem.h"
-#include "contact_set.h"
-#include "gap_operator.h"
-#include "host.h"
-#include "make_solver.h"
-#include "projection.h"
-#include "random.h"
-#include "rigid_bodies.h"
-#include "solver.h"
+#include "inelastic_contact_problem.h"
+#include "inelastic_contact_set.h"
+#include "inelastic_gap_operator.h"
+#include "inelastic_host.h"
+#include "inelastic_make_solver.h"
+#include "inelastic_projection.h"
+#include "inelastic_random.h"
+#include "inelastic_rigid_bodies.h"
+#include "inelastic_solver.h"
 
 #include <algorithm>
 #include <array>

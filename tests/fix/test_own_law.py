@@ -34,7 +34,7 @@ RADIUS = 0.5
 # mistake. `remember` is not told the contact: the law relies on being called for all contacts of a
 # step in the order in which it was asked, as it is where no step is repeated.
 WITNESS = """
-#include "contact_law_plugin.h"
+#include "inelastic_contact_law_plugin.h"
 
 #include <algorithm>
 #include <deque>
@@ -128,7 +128,8 @@ def example() -> str:
 
 def version_of_today() -> int:
     found = re.search(
-        r"CONTACT_LAW_VERSION = (\d+);", (Path(include_folder()) / "contact_law.h").read_text()
+        r"CONTACT_LAW_VERSION = (\d+);",
+        (Path(include_folder()) / "inelastic_contact_law.h").read_text(),
     )
     assert found is not None
     return int(found[1])
@@ -178,8 +179,8 @@ def test_the_name_of_another_law(tmp_path: Path, refused: Callable[..., str]) ->
 def test_a_law_of_an_earlier_version(age: int, tmp_path: Path, refused: Callable[..., str]) -> None:
     version = version_of_today() - age
     assert version >= 0
-    source = example().replace('#include "contact_law_plugin.h"', "", 1)
-    header = (Path(include_folder()) / "contact_law_plugin.h").read_text()
+    source = example().replace('#include "inelastic_contact_law_plugin.h"', "", 1)
+    header = (Path(include_folder()) / "inelastic_contact_law_plugin.h").read_text()
     other = header.replace("inelastic::CONTACT_LAW_VERSION", str(version))
     build(other.replace("#pragma once", "") + source, tmp_path)
     line = refused(deck(tmp_path, "restitution/above 0.8 0.3", 1.0) + "run 1\n")
@@ -207,7 +208,7 @@ def test_a_source_for_version_1(line: str, told: str, tmp_path: Path) -> None:
 
 # A contact that may pull, by next to nothing, and counts its steps in vain.
 FORGETFUL = """
-#include "contact_law_plugin.h"
+#include "inelastic_contact_law_plugin.h"
 
 using namespace inelastic;
 

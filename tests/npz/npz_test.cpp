@@ -2,7 +2,7 @@
 // when a file cannot be written, and leaves files in FOLDER for test_npz.py to read with NumPy.
 // Returns 1 when a check failed.
 
-#include "npz.h"
+#include "inelastic_npz.h"
 
 #include <cerrno>
 #include <csignal>

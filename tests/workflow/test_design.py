@@ -90,7 +90,7 @@ def test_a_file_that_is_not_listed_is_seen() -> None:
     lines = text.splitlines(keepends=True)
     for start, missing in (
         ("- `gather.py`", "workflow/running/gather.py"),
-        ("- `gluey.{h,cpp}`", "src_fix/laws/gluey.h"),
+        ("- `inelastic_gluey.{h,cpp}`", "src_fix/laws/inelastic_gluey.h"),
         ("- `sections/`", "workflow/report/sections/agitation.py"),
     ):
         assert is_listed(ROOT / missing, listed_in_rooms(text))

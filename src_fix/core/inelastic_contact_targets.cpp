@@ -1,0 +1,128 @@
+#include "inelastic_contact_targets.h"
+
+#include "inelastic_solver_limits.h"
+#include "inelastic_vector3.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace inelastic {
+
+namespace {
+
+  // In a bed of many contacts residuals make velocities of some hundred times their size, in a
+  // chain of n up to n times (which inelastic_accelerated_gradient.h looks at).
+  constexpr double IN_NETWORKS = 1.0 / 16.0;
+  // Bodies turn, too: the softest motions of their networks are softer.
+  constexpr double OF_BODIES = 1.0 / 48.0;
+  // The part of the length by which a contact's own impulse opens its gap, to which the contact is
+  // resolved even where that impulse, balanced by others, changes no velocity.
+  constexpr double PART_OF_LOAD = 2.0e-5;
+  // Gaps are known to a few units of round-off of what they are added up from.
+  constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();
+
+  // The slot that stands for all those that move together with this one.
+  int mover(const Unknowns &unknowns, int i)
+  {
+    const RigidBodies &bodies = unknowns.bodies;
+    return unknowns.is_member(i) ? bodies.member[bodies.start[bodies.body[i]]] : i;
+  }
+
+}    // namespace
+
+void ContactTargets::begin(const ContactProblem &problem, const SolverLimits &limits,
+                           const GapOperator &gap_operator, const std::vector<double> &gap,
+                           const std::vector<double> &diagonal)
+{
+  const ContactSet &contacts = problem.contacts;
+  diagonal_ = diagonal;
+  change_by_guess_ = gap_operator.change();
+  of_guess_.resize(contacts.size());
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    of_guess_[c] = std::max(contacts.residual(c, gap.data()).largest(),
+                            PART_OF_LOAD * contacts.magnitude(c) * diagonal[c]);
+  set_least(problem, limits, gap_operator);
+}
+
+void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits &limits,
+                               const GapOperator &gap_operator)
+{
+  const ContactSet &contacts = problem.contacts;
+  const std::size_t count = contacts.size();
+  least_.resize(count);
+  part_.resize(count);
+  if (limits.accuracy == 0.0) {
+    std::fill(least_.begin(), least_.end(), limits.tolerance);
+    std::fill(part_.begin(), part_.end(), 0.0);
+    return;
+  }
+  carried_.assign(problem.slots(), 0.0);
+  for (std::size_t c = 0; c < count; ++c) {
+    const double load = contacts.magnitude(c) * diagonal_[c];
+    carried_[mover(problem, contacts.first[c])] += load;
+    carried_[mover(problem, contacts.second[c])] += load;
+  }
+  for (int slot = problem.particles; slot < problem.slots(); ++slot)
+    if (!problem.is_mobile(slot)) carried_[slot] = 0.0;
+  const double *const v = problem.predicted_velocity.data();
+  const auto length_of = [&](int i) {
+    return carried_[mover(problem, i)] +
+        problem.timestep * norm(v + 3 * static_cast<std::size_t>(i));
+  };
+  for (std::size_t c = 0; c < count; ++c) {
+    const bool of_bodies = problem.is_member(contacts.first[c]) ||
+        problem.is_member(contacts.second[c]);
+    part_[c] = (of_bodies ? OF_BODIES : IN_NETWORKS) * limits.accuracy * limits.coarseness *
+        contacts.refinement[c];
+    const double length = std::abs(gap_operator.free_gap()[c]) + length_of(contacts.first[c]) +
+        length_of(contacts.second[c]);
+    least_[c] = std::max({ROUND_OFF * length, limits.least_length,
+                          std::numeric_limits<double>::epsilon() * limits.tolerance,
+                          part_[c] * of_guess_[c]});
+  }
+}
+
+double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &limits,
+                             const GapOperator &gap_operator, const std::vector<double> &gap,
+                             Host &host)
+{ return judge(problem, limits, gap_operator, gap, Counts::ALL, host); }
+
+double ContactTargets::judge_feasibility(const ContactProblem &problem, const SolverLimits &limits,
+                                         const GapOperator &gap_operator,
+                                         const std::vector<double> &gap, Host &host)
+{ return judge(problem, limits, gap_operator, gap, Counts::FEASIBILITY, host); }
+
+double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &limits,
+                             const GapOperator &gap_operator, const std::vector<double> &gap,
+                             Counts counts, Host &host)
+{
+  const ContactSet &contacts = problem.contacts;
+  const std::vector<double> &change = gap_operator.change();
+  constexpr double NEAR = 5.0;    // tolerances
+  set_least(problem, limits, gap_operator);
+  constexpr double NONE = std::numeric_limits<double>::max();
+  std::vector<double> of_slot(problem.slots(), NONE);
+  for (std::size_t i = 0; limits.accuracy > 0.0 && i < of_slot.size(); ++i) {
+    if (!problem.is_mobile(static_cast<int>(i))) continue;
+    const double *const now = &change[3 * i], *const before = &change_by_guess_[3 * i];
+    const double added[3] = {now[0] - before[0], now[1] - before[1], now[2] - before[2]};
+    of_slot[i] = problem.timestep * std::max(norm(now), norm(added));
+  }
+  double maxima[2] = {0.0, 0.0};    // the largest part of a target, the largest target
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const double by_velocity =
+        part_[c] * std::min(of_slot[contacts.first[c]], of_slot[contacts.second[c]]);
+    const double target = std::min(limits.tolerance, std::max(least_[c], by_velocity));
+    const Residual left = contacts.residual(c, gap.data());
+    maxima[0] =
+        std::max(maxima[0], (counts == Counts::ALL ? left.largest() : left.feasibility) / target);
+    if (contacts.is_loaded(c) || gap[c] < NEAR * limits.tolerance)
+      maxima[1] = std::max(maxima[1], target);
+  }
+  host.reduce(nullptr, 0, maxima, 2);
+  largest_ = maxima[1];
+  return maxima[0];
+}
+
+}    // namespace inelastic

@@ -1,0 +1,33 @@
+#include "inelastic_infeasibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace inelastic {
+
+bool is_infeasible(const ContactProblem &problem, GapOperator &gap_operator,
+                   const SolverLimits &limits, Host &host)
+{
+  constexpr double FAR = 10.0;
+  // Any impulses that push give a bound. Contacts that pull let go where there is no room.
+  std::vector<double> impulse = problem.contacts.impulse;
+  for (double &value : impulse) value = std::max(0.0, value);
+  const std::vector<double> &free_gap = gap_operator.free_gap();
+  double lacking = 0.0, farthest = 0.0;
+  for (std::size_t c = 0; c < impulse.size(); ++c) {
+    const double give = problem.contacts.compliance[c] * impulse[c];
+    lacking -= impulse[c] * (free_gap[c] + give + limits.tolerance);
+    farthest = std::max(farthest, -free_gap[c]);
+  }
+  for (int i = 0; i < problem.slots(); ++i) {
+    const double *const v = &problem.predicted_velocity[3 * static_cast<std::size_t>(i)];
+    farthest = std::max(farthest, problem.timestep * std::hypot(v[0], v[1], v[2]));
+  }
+  const GapOperator::ImpulseNorm norm = gap_operator.impulse_norm(problem, impulse.data(), host);
+  double sums[3] = {lacking, norm.squared, norm.mass};
+  host.reduce(sums, 3, &farthest, 1);
+  return sums[0] > std::max(limits.reach, FAR * farthest) * std::sqrt(sums[1] * sums[2]);
+}
+
+}    // namespace inelastic

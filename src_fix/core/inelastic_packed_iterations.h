@@ -1,0 +1,153 @@
+// The iterations of inelastic_accelerated_gradient.h on packed arrays (inelastic_packed_kernels.h):
+// this class packs a problem, runs the passes in the order that the exchange between ranks needs,
+// and unpacks impulses.
+//
+// The unknown is the change of the impulses since the start of the search, not the impulses, and
+// the gaps are those at the start plus what the change makes of them. Round-off is then in
+// proportion to the change, and single precision can find what a heavy bed still lacks.
+//
+// Constraints that have no more than their least impulse and whose gaps are far from closed are
+// idle: iterations leave them out until they are looked at and found to be near. The others are
+// working. Each rank chooses for itself; nothing is communicated for it.
+//
+// Constraints and slots (inelastic_unknowns.h) are packed as normals with gaps, diagonal entries,
+// compliances and least changes, one for each constraint, and vectors, one for each slot.
+// Everything has units in which the largest length is near 1, so that single precision can hold it.
+
+#pragma once
+
+#include "inelastic_contact_problem.h"
+#include "inelastic_contact_targets.h"
+#include "inelastic_host.h"
+#include "inelastic_packed_kernels.h"
+
+#include <array>
+#include <vector>
+
+namespace inelastic {
+
+// The weights of the momentum in inelastic_accelerated_gradient.h.
+struct Weights {
+  double along, beyond, back;
+};
+
+// The units of packed numbers. Both are powers of two, so that a scene in other units takes the
+// same steps bit by bit.
+struct Scales {
+  double length;     // [length]
+  double impulse;    // [mass length / time]
+};
+
+template <typename Real> class PackedIterations {
+ public:
+  // Packs a problem, whose impulses are the start. `diagonal` is that of A, `gap` has the gaps w of
+  // these impulses, one number per constraint each (inelastic_contact_problem.h). Constraints
+  // without an impulse whose gap is above `idle_gap` [length] are idle. `change` are the changes of
+  // velocity by these impulses (GapOperator::change), and the targets were judged with them. No
+  // target is above the tolerance [length].
+  void prepare(const ContactProblem &problem, const std::vector<double> &diagonal,
+               const std::vector<double> &gap, double idle_gap, const Scales &scales,
+               const ContactTargets &targets, const std::vector<double> &change, double tolerance);
+
+  // Sets the targets by the present changes of velocity (inelastic_contact_targets.h). Call it
+  // between finish and advance.
+  void set_targets();
+
+  // Keeps the present changes of velocity; the last two that were kept can be compared with.
+  void keep_velocities();
+
+  // Returns by how much velocities have changed since those that were kept last but one: the
+  // largest change on either side of the working constraints with an impulse, in units of the
+  // target divided by `accuracy`, which is above 0. Before two were kept the change is that since
+  // the start of the search. A change that may be round-off does not count. Call it after finish
+  // and set_targets.
+  double moved_since_kept(double accuracy) const;
+
+  // Begins an iteration with a step of 1 / L: the next impulses become the present ones. Returns
+  // sums and maxima over this rank's constraints; those of gaps and changes are of the impulses
+  // before. Residuals below `blur`, in packed units, may be round-off.
+  packed::Passed advance(const Weights &weights, double step, double blur);
+
+  // Ends an iteration: computes the changes of velocity of the present impulses. Collective. The
+  // host must know which ghosts are in constraints (Host::choose_ghosts).
+  void finish(Host &host);
+
+  // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units. Makes
+  // the working ones idle that have no impulse and gaps above it, where they are more than a few.
+  // Call it between finish and advance.
+  void look(double idle_gap);
+
+  // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per
+  // constraint of the problem [length].
+  void join(const std::vector<double> &gap, const Scales &scales);
+
+  // Writes the present impulses, in the order of the problem's constraints.
+  void impulses(const Scales &scales, std::vector<double> &impulse) const
+  { unpack(unbound_, scales, impulse); }
+  // Writes the impulses that the last iteration started from: the sums and maxima that advance
+  // returned are those of these impulses.
+  void impulses_before(const Scales &scales, std::vector<double> &impulse) const
+  { unpack(change_before_, scales, impulse); }
+
+ private:
+  using Vector = packed::Vector<Real>;
+  using Set = HalfLine<Real>;
+
+  struct Constraints {
+    std::vector<std::size_t> source;    // the place in the problem
+    std::vector<packed::Ends> ends;
+    std::vector<Vector> normal;    // the fourth number: the gap of the impulses at the start
+    std::vector<Real> diagonal, compliance;
+    std::vector<Set> set;                                    // of the changes since the start
+    std::vector<Real> least_target, part, inverse_target;    // inelastic_contact_targets.h
+
+    std::size_t size() const { return source.size(); }
+    void resize(std::size_t count);
+    // Copies constraint k of `other` to place `to`.
+    void copy(const Constraints &other, std::size_t k, std::size_t to);
+  };
+
+  void pack(const ContactSet &contacts, const std::vector<std::size_t> &places,
+            const std::vector<double> &diagonal, const std::vector<double> &gap,
+            const Scales &scales, const ContactTargets &targets, Constraints &packed);
+  Real free_target(const Constraints &constraints, std::size_t k) const;
+  void wake(const std::vector<std::size_t> &near, const Real *gap);
+  void set_idle();
+  void add_up_walls(Host &host);
+  void pack_bodies(const RigidBodies &bodies, double mobility_unit);
+  bool pack_rod(const RigidBodies &bodies, std::size_t b, double mobility_unit);
+  void pack_body(const RigidBodies &bodies, std::size_t b, double mobility_unit);
+  void unpack(const std::vector<Real> &change, const Scales &scales,
+              std::vector<double> &impulse) const;
+
+  Constraints working_, idle_;
+  // Returns the arrays of numbers that iterations change, one for each working constraint.
+  std::array<std::vector<Real> *, 3> states() { return {&unbound_, &change_before_, &gap_before_}; }
+
+  // As in packed::Pass
+  std::vector<Real> unbound_, change_before_, gap_before_;
+  std::vector<double> start_;                    // impulses, in the order of the problem
+  std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
+  double step_before_ = 0.0;                     // 1 / L of the last iteration
+  double inverse_diagonals_ = 0.0;               // their sum over all constraints
+  std::vector<Vector> looked_;                   // gaps of the idle ones, four in each
+  int looks_ = 0;                                // since the start of the search
+  Real idle_gap_ = 0;                            // above it a constraint without an impulse is idle
+  std::vector<Real> inverse_mass_;               // per slot; 1 for particles in bodies
+  std::vector<Vector> sum_, velocity_;
+  int first_wall_ = 0;         // the slot of the first wall
+  bool walls_move_ = false;    // by impulses
+  // Per slot: the change of velocity by the impulses at the start of the search, in all and since
+  // the first guess of the solve
+  std::vector<Vector> at_start_, since_guess_;
+  std::vector<char> mobile_;    // per slot
+  // Per slot that can move: the change of velocity of which targets are a part (set_targets)
+  std::vector<Real> changed_;
+  std::vector<Vector> kept_, kept_before_;    // of velocity_
+  Real most_target_ = 0;
+  std::vector<packed::Rod<Real>> rods_;
+  std::vector<packed::Body<Real>> bodies_;       // bodies that are no rods
+  std::vector<packed::Member<Real>> members_;    // of all bodies, as in RigidBodies::member
+};
+
+}    // namespace inelastic

@@ -1,0 +1,61 @@
+#include "inelastic_solver.h"
+
+#include <cmath>
+
+namespace inelastic {
+
+Residual residual(const double *gap_at_end, const ContactSet &contacts)
+{
+  Residual worst;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const Residual here = contacts.residual(c, gap_at_end);
+    worst.feasibility = std::max(worst.feasibility, here.feasibility);
+    worst.complementarity = std::max(worst.complementarity, here.complementarity);
+  }
+  return worst;
+}
+
+Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contacts, Host &host)
+{
+  const Residual mine = residual(gap_at_end, contacts);
+  double maxima[2] = {mine.feasibility, mine.complementarity};
+  host.reduce(nullptr, 0, maxima, 2);
+  return {maxima[0], maxima[1]};
+}
+
+Guess Solver::judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host)
+{
+  ContactSet &contacts = problem.contacts;
+  const std::vector<double> &free_gap = gap_operator_.free_gap();
+  const std::size_t count = contacts.size();
+  gap_.resize(count);
+  diagonal_.resize(count);
+  contacts.make_admissible();
+  gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
+  const Residual mine = residual(gap_.data(), contacts);
+  Guess guess;
+  for (std::size_t c = 0; c < count; ++c) {
+    diagonal_[c] = problem.diagonal(c);
+    guess.largest_length = std::max(
+        {guess.largest_length, std::abs(free_gap[c]), contacts.magnitude(c) * diagonal_[c]});
+    guess.largest_diagonal = std::max(guess.largest_diagonal, diagonal_[c]);
+  }
+  double maxima[4] = {mine.feasibility, mine.complementarity, guess.largest_length,
+                      guess.largest_diagonal};
+  host.reduce(nullptr, 0, maxima, 4);
+  guess.residual = {maxima[0], maxima[1]};
+  guess.largest_length = maxima[2];
+  guess.largest_diagonal = maxima[3];
+  targets_.begin(problem, limits, gap_operator_, gap_, diagonal_);
+  return guess;
+}
+
+void settle_for_tolerance(const SolverLimits &limits, double reached, SolverResult &result)
+{
+  const bool stopped_short = result.status == Status::OUT_OF_ITERATIONS ||
+      result.status == Status::ROUND_OFF;
+  if (!stopped_short || !(reached <= limits.tolerance)) return;
+  result.status = Status::CONVERGED;
+}
+
+}    // namespace inelastic

@@ -1,0 +1,121 @@
+// The interface of all solvers of the projection problem (inelastic_contact_problem.h).
+//
+// Solvers work on the dual problem: they look for the impulses lambda. All are judged by the same
+// two residuals, in units of length, with w the gaps at the end of the step and l the least
+// impulses:
+//
+//   feasibility       the largest -w_c of all constraints: what is lacking of the gap that they ask
+//                     for; where l_c < 0 and lambda_c > l_c also the largest w_c: the contact holds
+//   complementarity   the largest w_c of the constraints with lambda_c > l_c: the gap that is left
+//                     where a force acts
+//
+// A solver that warm-starts takes its first guess from ContactSet::impulse, of which it takes the
+// nearest admissible one. Every solver leaves its result there.
+
+#pragma once
+
+#include "inelastic_contact_problem.h"
+#include "inelastic_contact_targets.h"
+#include "inelastic_gap_operator.h"
+#include "inelastic_host.h"
+#include "inelastic_solver_limits.h"
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+namespace inelastic {
+
+// Returns the residual of this rank's constraints with their impulses; UNSOLVED if a number is not
+// finite.
+Residual residual(const double *gap_at_end, const ContactSet &contacts);
+
+// Returns the same over the constraints of all ranks. Collective.
+Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contacts, Host &host);
+
+// How the search for the impulses of a step has ended.
+enum class Status {
+  // The residual is within the target, or within the tolerance where no smaller one was to be had.
+  CONVERGED,
+  // Each solve converged, but the last one allowed left constraints to add or change
+  // (inelastic_projection.h).
+  OUT_OF_ROUNDS,
+  // The largest number of iterations was made, and the residual is above the tolerance.
+  OUT_OF_ITERATIONS,
+  // Where impulses act gaps are known to no better than their round-off, and the tolerance is below
+  // that.
+  ROUND_OFF,
+  // A number in the problem or in the iterations is infinite or no number.
+  NOT_FINITE,
+  // It is certain that no sensible velocities are admissible (inelastic_infeasibility.h).
+  INFEASIBLE
+};
+
+// The history of the larger residual during the iterations of a solver. When the residual no longer
+// comes down, more iterations are of no use.
+class ResidualTrend {
+ public:
+  // Takes the residual of an iteration. Iterations count from 1.
+  void see(long iteration, double residual)
+  {
+    least_ = std::min(least_, residual);
+    if (iteration < 2 * mark_) return;
+    before_mark_ = at_mark_;
+    at_mark_ = least_;
+    mark_ = iteration;
+  }
+
+  // Returns the least residual so far.
+  double least() const { return least_; }
+  // Returns the least residual after the first quarter to half of the iterations; infinity if there
+  // were too few iterations to tell.
+  double earlier() const { return before_mark_; }
+
+ private:
+  static constexpr double NONE = std::numeric_limits<double>::infinity();
+  long mark_ = 1;    // the last iteration that was a power of two
+  double least_ = NONE, at_mark_ = NONE, before_mark_ = NONE;
+};
+
+// What is known before the iterations, from the first guess of the impulses; over all ranks.
+struct Guess {
+  Residual residual;
+  double largest_length =
+      0.0;    // [length] The largest gap without impulses, or change by an impulse.
+  double largest_diagonal = 0.0;    // [time / mass] of A
+};
+
+struct SolverResult {
+  Status status = Status::OUT_OF_ITERATIONS;
+  long iterations = 0;
+  Residual residual;         // over all ranks
+  double round_off = 0.0;    // [length] of the gaps where impulses act; no residual gets below it
+  ResidualTrend trend;
+};
+
+// Makes a search that has ended above its targets, but within the tolerance, a solution.
+void settle_for_tolerance(const SolverLimits &limits, double reached, SolverResult &result);
+
+class Solver {
+ public:
+  virtual ~Solver() = default;
+
+  // Solves the problem for problem.contacts.impulse. Collective.
+  virtual SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) = 0;
+
+  // Returns the operator, prepared for the problem of the last solve. If that solve has converged,
+  // the operator was last applied to its result.
+  GapOperator &gap_operator() { return gap_operator_; }
+
+ protected:
+  // Makes the impulses of the problem admissible and judges them as the first guess. Sets the
+  // diagonal, and tells the targets. The operator must be prepared for the problem. Collective.
+  Guess judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host);
+
+  GapOperator gap_operator_;
+  ContactTargets targets_;
+  std::vector<double> gap_;         // [length] at the end of the step, one per constraint
+  std::vector<double> diagonal_;    // of A [time / mass]
+};
+
+}    // namespace inelastic

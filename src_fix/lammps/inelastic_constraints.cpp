@@ -1,0 +1,90 @@
+#include "inelastic_constraints.h"
+
+#include "inelastic_ghost_exchange.h"
+#include "inelastic_mover.h"
+
+#include <algorithm>
+
+using namespace LAMMPS_NS;
+using namespace Inelastic_NS;
+
+namespace {
+
+constexpr double FIRST_MARGIN = 0.02;    // of the smallest radius
+
+}    // namespace
+
+Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClock &clock,
+                         const FirstGuesses &guesses, LawContacts &laws, Walls &walls,
+                         Movers &movers) :
+    Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), movers_(movers), walls_(walls),
+    overlaps_(lmp, step, ranks), rules_(step, overlaps_), rows_(step, rules_, laws, guesses),
+    entangled_(step), pairs_(lmp, step, rules_, rows_, entangled_, movers),
+    wall_constraints_(lmp, step, rules_, rows_, walls, ranks, movers)
+{
+}
+
+void Constraints::begin_run(double smallest_radius)
+{
+  if (margin_ < 0.0 && step_.largest_radius > 0.0) margin_ = FIRST_MARGIN * smallest_radius;
+}
+
+void Constraints::collect()
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
+  step_.phase = Phase::CONTACT;
+  rows_.begin_step();
+  step_.problem_found.clear();
+  step_.excess = 0.0;
+  step_.relinearisations = 0;
+  overlaps_.begin_step();
+  entangled_.clear();
+  came_back_ = relinearised_ = solved_relinearised_ = false;
+  pairs_.collect(margin_);
+  wall_constraints_.collect(margin_);
+  ranks_.fail_together(step_.problem_found);
+}
+
+// The velocities are those of the step, `problem` is its problem.
+long Constraints::refine(const std::vector<double> &velocity, inelastic::ContactProblem &problem)
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
+  step_.problem_found.clear();
+  solved_relinearised_ = relinearised_;
+  movers_.turn(problem, velocity, step_.motion_of_bodies);
+  const long added = pairs_.add_violated() + wall_constraints_.add_violated();
+  const long changed = step_.phase == Phase::CONTACT ? rules_.keep_within_tolerance(velocity) : 0;
+  long relinearised = 0;
+  step_.excess = 0.0;
+  if (movers_.any_turns() || rows_.may_hold() || wall_constraints_.need_relinearising()) {
+    ++step_.relinearisations;
+    if (movers_.any_turns() || rows_.may_hold()) relinearised += pairs_.relinearise();
+    if (wall_constraints_.need_relinearising())
+      relinearised += wall_constraints_.relinearise(margin_);
+  }
+  double sums[3] = {static_cast<double>(added), static_cast<double>(relinearised),
+                    static_cast<double>(changed)};
+  ranks_.reduce(sums, 3, &step_.excess, 1);
+  came_back_ = came_back_ || sums[0] > 0.0;
+  relinearised_ = relinearised_ || sums[1] > 0.0;
+  ranks_.fail_together(step_.problem_found);
+  return added + changed + relinearised;
+}
+
+long Constraints::add_violated()
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
+  step_.problem_found.clear();
+  double added = static_cast<double>(pairs_.add_violated() + wall_constraints_.add_violated());
+  ranks_.reduce(&added, 1, nullptr, 0);
+  ranks_.fail_together(step_.problem_found);
+  return static_cast<long>(added);
+}
+
+void Constraints::adapt_margin(double reach)
+{
+  constexpr double MORE = 1.1, FEWER = 0.95;
+  const double least = 4.0 * step_.settings.tolerance;
+  margin_ *= came_back_ ? MORE : FEWER;
+  margin_ = std::clamp(margin_, least, std::max(least, reach));
+}

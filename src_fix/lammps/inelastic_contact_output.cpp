@@ -1,0 +1,203 @@
+#include "inelastic_contact_output.h"
+
+#include "inelastic_ghost_exchange.h"
+
+#include "atom.h"
+#include "memory.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+
+using namespace LAMMPS_NS;
+using namespace Inelastic_NS;
+
+ContactOutput::ContactOutput(LAMMPS *lmp, const Step &step, GhostExchange &ranks) :
+    Pointers(lmp), step_(step), ranks_(ranks),
+    remembered_(step.settings.law ? step.settings.law->remembers() : 0)
+{
+}
+
+ContactOutput::~ContactOutput()
+{
+  memory->destroy(per_atom_);
+  memory->destroy(local_);
+}
+
+void ContactOutput::set_walls(int number_of_walls)
+{
+  wall_force_.assign(3 * static_cast<std::size_t>(number_of_walls), 0.0);
+  wall_force_total_ = wall_force_;
+}
+
+void ContactOutput::take(const inelastic::ProjectionResult &result, long shortened_steps,
+                         const VirialTarget &virial)
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const double force_per_impulse = 1.0 / step_.impulse_per_force;
+  clear_sums(virial.per_atom);
+  int active = 0;
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    if (is_contact(c)) ++active;
+  if (active > local_room_) {
+    local_room_ = active * 5 / 4 + 16;
+    memory->grow(local_, local_room_, local_columns(), "inelastic:array_local");
+  }
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    if (is_contact(c)) add_contact(c, contacts.impulse[c] * force_per_impulse, virial);
+  share(virial);
+
+  double sums[5] = {counts_[0], counts_[1], static_cast<double>(contacts.size()), counts_[2],
+                    counts_[3]};
+  ranks_.reduce(sums, 5, &largest_change_, 1);
+  vector_[PARTICLE_CONTACTS] = sums[0];
+  vector_[WALL_CONTACTS] = sums[1];
+  vector_[CONSTRAINTS] = sums[2];
+  vector_[ITERATIONS] = static_cast<double>(result.iterations);
+  vector_[FEASIBILITY] = result.residual.feasibility;
+  vector_[COMPLEMENTARITY] = result.residual.complementarity;
+  vector_[OVERLAP] = step_.largest_overlap;
+  vector_[ROUNDS] = result.rounds;
+  vector_[TOTAL_ITERATIONS] += static_cast<double>(result.iterations);
+  vector_[SHORTENED_STEPS] = static_cast<double>(shortened_steps);
+  vector_[EXCESS] = step_.excess;
+  vector_[PUSHED_STEPS] += step_.bad_start ? 1.0 : 0.0;
+  vector_[AT_REST] = step_.at_rest ? 1.0 : 0.0;
+  vector_[PRESSED_CONTACTS] = sums[3];
+  vector_[HELD_CONTACTS] = sums[4];
+}
+
+// Tells whether a row is a contact of the output: it carries a force, or the law remembers
+// something of its contact. Of several rows of one contact only those with a force count.
+bool ContactOutput::is_contact(std::size_t c) const
+{
+  if (step_.problem.contacts.impulse[c] != 0.0) return true;
+  const LawState *const law = step_.law_state_of(c);
+  return law && law->kept && law->impulse.normal == 0.0;
+}
+
+void ContactOutput::clear_sums(bool virial_per_atom)
+{
+  const std::size_t size = 3 * static_cast<std::size_t>(step_.problem.slots());
+  contact_force_.assign(size, 0.0);
+  contact_count_.assign(size, 0.0);
+  if (virial_per_atom) {
+    virial_diagonal_.assign(size, 0.0);
+    virial_off_diagonal_.assign(size, 0.0);
+  }
+  std::fill(wall_force_.begin(), wall_force_.end(), 0.0);
+  wall_force_step_ = -1;
+  local_rows_ = 0;
+  std::fill_n(counts_, 4, 0.0);
+  largest_change_ = 0.0;
+}
+
+// `strength` is the force of the contact.
+void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarget &virial)
+{
+  const inelastic::ContactProblem &problem = step_.problem;
+  const int i = problem.contacts.first[c];
+  const int j = problem.contacts.second[c];
+  const double *const n = &problem.contacts.normal[3 * c];
+  const Contact &contact = step_.contact_of(c);
+  const bool is_wall = contact.is_with_wall();
+  counts_[is_wall] += 1.0;
+  if (strength > 0.0) counts_[2] += 1.0;
+  const LawState *const law = step_.law_state_of(c);
+  if (law && law->kept) counts_[3] += 1.0;
+  largest_change_ = std::max(largest_change_,
+                             std::abs(problem.contacts.impulse[c]) *
+                                 (problem.inverse_mass[i] + problem.inverse_mass[j]));
+  contact_count_[3 * i + is_wall] += 1.0;
+  for (int d = 0; d < 3; ++d) {
+    contact_force_[3 * i + d] += strength * n[d];
+    contact_force_[3 * j + d] -= strength * n[d];
+    if (is_wall) wall_force_[3 * (contact.wall() - 1) + d] -= strength * n[d];
+  }
+  if (!is_wall) contact_count_[3 * j] += 1.0;
+  const double to_point = atom->radius[i] + (is_wall ? contact.gap_now : 0.5 * contact.gap_now);
+  list_contact(c, strength, to_point);
+  if (virial.global || virial.per_atom) {
+    const double arm = is_wall ? to_point : contact.size + contact.gap_now;
+    add_virial(c, arm * strength, virial);
+  }
+}
+
+void ContactOutput::list_contact(std::size_t c, double strength, double to_point)
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const int i = contacts.first[c];
+  const double *const n = &contacts.normal[3 * c];
+  const Contact &contact = step_.contact_of(c);
+  double *const out = local_[local_rows_++];
+  out[0] = static_cast<double>(atom->tag[i]);
+  out[1] = static_cast<double>(contact.partner);
+  for (int d = 0; d < 3; ++d) {
+    out[2 + d] = atom->x[i][d] - to_point * n[d];
+    out[5 + d] = n[d];
+  }
+  out[8] = contact.gap_now;
+  out[9] = strength;
+  if (remembered_ > 0)
+    std::copy_n(step_.law_state_of(c)->remembered.begin(), remembered_, out + LOCAL_COLUMNS);
+}
+
+// `weight` is the distance over which the force acts, times the force. Half goes to each side; a
+// wall's half goes to the sphere as well.
+void ContactOutput::add_virial(std::size_t c, double weight, const VirialTarget &virial)
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const double *const n = &contacts.normal[3 * c];
+  const double v[6] = {weight * n[0] * n[0], weight * n[1] * n[1], weight * n[2] * n[2],
+                       weight * n[0] * n[1], weight * n[0] * n[2], weight * n[1] * n[2]};
+  if (virial.global)
+    for (int k = 0; k < 6; ++k) virial.total[k] += v[k];
+  if (!virial.per_atom) return;
+  const int i = contacts.first[c];
+  const int j = step_.contact_of(c).is_with_wall() ? i : contacts.second[c];
+  for (int k = 0; k < 3; ++k) {
+    virial_diagonal_[3 * i + k] += 0.5 * v[k];
+    virial_diagonal_[3 * j + k] += 0.5 * v[k];
+    virial_off_diagonal_[3 * i + k] += 0.5 * v[3 + k];
+    virial_off_diagonal_[3 * j + k] += 0.5 * v[3 + k];
+  }
+}
+
+void ContactOutput::share(const VirialTarget &virial)
+{
+  if (virial.per_atom) {
+    ranks_.sum_over_ghosts(virial_diagonal_.data());
+    ranks_.sum_over_ghosts(virial_off_diagonal_.data());
+    for (int i = 0; i < atom->nlocal; ++i)
+      for (int k = 0; k < 3; ++k) {
+        virial.atoms[i][k] += virial_diagonal_[3 * i + k];
+        virial.atoms[i][3 + k] += virial_off_diagonal_[3 * i + k];
+      }
+  }
+  ranks_.sum_over_ghosts(contact_force_.data());
+  ranks_.sum_over_ghosts(contact_count_.data());
+  for (int i = 0; i < atom->nlocal; ++i) {
+    per_atom_[i][0] = contact_count_[3 * i];
+    per_atom_[i][1] = contact_count_[3 * i + 1];
+    for (int d = 0; d < 3; ++d) per_atom_[i][2 + d] = contact_force_[3 * i + d];
+  }
+}
+
+double ContactOutput::wall_force(int wall, int direction)
+{
+  if (wall_force_step_ != update->ntimestep) {
+    MPI_Allreduce(wall_force_.data(), wall_force_total_.data(),
+                  static_cast<int>(wall_force_.size()), MPI_DOUBLE, MPI_SUM, world);
+    wall_force_step_ = update->ntimestep;
+  }
+  return wall_force_total_[3 * wall + direction];
+}
+
+void ContactOutput::grow(int atoms)
+{ memory->grow(per_atom_, atoms, PER_ATOM_COLUMNS, "inelastic:array_atom"); }
+
+void ContactOutput::copy(int from, int to)
+{ std::copy_n(per_atom_[from], PER_ATOM_COLUMNS, per_atom_[to]); }
+
+void ContactOutput::clear(int i)
+{ std::fill_n(per_atom_[i], PER_ATOM_COLUMNS, 0.0); }

@@ -1,0 +1,245 @@
+#include "inelastic_gap_rules.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+using namespace LAMMPS_NS;
+using namespace Inelastic_NS;
+
+namespace {
+
+// In tolerances: a smaller overlap at the end of the step changes no constraint.
+constexpr double RELINEARISE_BEYOND = 1.1;
+// In tolerances: a contact is closed, whatever its exact gap, within this distance from touching.
+constexpr double CLOSED = 0.5;
+// Beyond that a contact closes in a step by at most this part of what it has to stop.
+constexpr double CLOSING = 0.01;
+
+}    // namespace
+
+void GapRules::begin(Contact &contact, const FirstGuess &last, double wall_motion, int i, int j,
+                     const double *normal) const
+{
+  constexpr double PART_OF_LOAD = 0.1;
+  constexpr double SAME = 1.0e-9;    // round-off of forces
+  contact.force = last.force;
+  const auto changes = load_changes(i, j);
+  // Loads of particles at rest that change by one factor change contact forces by it.
+  if (changes && std::abs((*changes)[1] - (*changes)[0]) <= SAME * (*changes)[0])
+    contact.force *= (*changes)[0];
+  const inelastic::ContactProblem &problem = step_.problem;
+  const double *const v = problem.predicted_velocity.data();
+  double opening = 0.0;
+  for (int d = 0; d < 3; ++d) opening += normal[d] * (v[3 * i + d] - v[3 * j + d]);
+  const double load =
+      step_.impulse_per_force * contact.force * problem.mobility_of_pair(i, j, normal);
+  contact.to_stop = std::max({PART_OF_LOAD * load, wall_motion - problem.timestep * opening, 0.0});
+  // A contact at rest is closed where it is: to close the gap would be a motion that no force
+  // makes.
+  contact.closed_gap =
+      closed_gap(contact, last.closed_gap, changes ? 0.0 : CLOSING * contact.to_stop);
+}
+
+// The factors by which the loads of two particles have changed that were at rest in the last step,
+// one of them twice beside a wall or a frozen particle; nothing if one was not at rest.
+std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
+{
+  const inelastic::ContactProblem &problem = step_.problem;
+  if (step_.load_change.empty()) return std::nullopt;
+  if (problem.inverse_mass[i] == 0.0) std::swap(i, j);
+  if (problem.is_wall(j) || problem.inverse_mass[j] == 0.0) j = i;
+  const double one = step_.load_change[3 * static_cast<std::size_t>(i)];
+  const double other = step_.load_change[3 * static_cast<std::size_t>(j)];
+  if (!(one > 0.0 && other > 0.0)) return std::nullopt;
+  return std::array<double, 2>{one, other};
+}
+
+// Returns the gap at which a contact counts as closed [length]. A gap under a force counts as
+// closed where it is, up to half a tolerance: positions are not known better, and to correct them
+// in a step would give velocities that no force makes. These add up along chains and differ from
+// step to step: a bed would never be quiet. A wider gap closes, so little that the force stays.
+// When the force goes, the contact is still closed at that gap until the two have parted: a sphere
+// on a contact that loses its force for a step does not fall.
+double GapRules::closed_gap(const Contact &contact, double last, double most_closing) const
+{
+  const double tolerance = step_.settings.tolerance;
+  const double gap = std::max(0.0, contact.gap_now);
+  if (contact.force > 0.0 && gap <= tolerance)
+    return gap - std::clamp(gap - CLOSED * tolerance, 0.0, most_closing);
+  // The tolerance may have been lowered.
+  const bool parted = last == Contact::NOT_CLOSED || last > tolerance || gap > last + tolerance;
+  return parted ? Contact::NOT_CLOSED : std::min(gap, last);
+}
+
+// Returns the length by which a contact may close [length]. An overlap of up to half a tolerance
+// counts as closed, too; a deeper one is given back little by little.
+double GapRules::contact_gap(const Contact &contact) const
+{
+  const double gap = contact.gap_now;
+  if (gap <= 0.0) return -given_back(contact);
+  return gap - std::max(0.0, contact.closed_gap);
+}
+
+// Returns the part of an overlap that is given back in the step [length]. It grows smoothly: from 0
+// at half a tolerance, by the accuracy's part of what the contact has to stop at 0.8 tolerances.
+// The part beyond the tolerance, which turning bodies and curved walls leave, is given back at
+// once: with the next step's it could become a bad start.
+double GapRules::given_back(const Contact &contact) const
+{
+  constexpr double FULL = 0.8;    // tolerances
+  const double tolerance = step_.settings.tolerance;
+  const double beyond = -contact.gap_now - CLOSED * tolerance;
+  if (beyond <= 0.0 || step_.keeps_overlaps) return 0.0;
+  const double x = beyond / ((FULL - CLOSED) * tolerance);
+  const double softly = step_.settings.accuracy * contact.to_stop * x * std::max(1.0, x * x);
+  return std::min(beyond, std::max(softly, -contact.gap_now - tolerance));
+}
+
+// Does the same for a contact that may pull, which counts as under a force whatever its last one
+// was.
+double GapRules::held_gap(const Contact &contact) const
+{
+  if (contact.gap_now <= 0.0) return -given_back(contact);
+  const double open = std::max(0.0, contact.gap_now - CLOSED * step_.settings.tolerance);
+  return std::min(open, most_closed(contact));
+}
+
+// Returns the most by which the step may close the gap of a held contact [length]: the accuracy's
+// part of what it has to stop, or as much as the surfaces would part without contacts, which adds
+// nothing to the kinetic energy.
+double GapRules::most_closed(const Contact &contact) const
+{
+  return std::max(step_.settings.accuracy * contact.to_stop,
+                  step_.problem.timestep * contact.predicted_speed);
+}
+
+double GapRules::effective_gap(const Contact &contact) const
+{
+  const double gap = contact.gap_now;
+  if (step_.phase == Phase::CONTACT) {
+    if (overlaps_.is_bad(gap)) return 0.0;
+    if (contact.asked.set.may_pull()) return held_gap(contact);
+    const double closed = contact_gap(contact);
+    const double parted = -step_.problem.timestep * contact.asked.parting_speed;
+    return contact.asked.parts ? std::min(closed, parted) : closed;
+  }
+  const double limit = PUSH_LIMIT * contact.size * step_.problem.timestep / step_.regular_timestep;
+  return std::max(gap, -std::max(limit, REGULAR_OVERLAP * step_.settings.tolerance));
+}
+
+double GapRules::wanted_gap(const Contact &contact) const
+{
+  constexpr double MOST_LEFT = 0.5;    // tolerances
+  const double wanted = contact.gap_now - effective_gap(contact);
+  return overlaps_.is_bad(contact.gap_now)
+      ? wanted
+      : std::max(wanted, -MOST_LEFT * step_.settings.tolerance);
+}
+
+bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
+{
+  const double tolerance = step_.settings.tolerance;
+  const bool bad = overlaps_.is_bad(contact.gap_now);
+  const double allowed = bad ? contact.gap_now : 0.0;
+  step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
+  const double wanted = bad ? wanted_gap(contact) : 0.0;
+  return wanted - gap_at_end > RELINEARISE_BEYOND * tolerance;
+}
+
+long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
+{
+  inelastic::ContactSet &contacts = step_.problem.contacts;
+  constexpr double LEFT = 0.75;    // tolerances
+  const double tolerance = step_.settings.tolerance;
+  // Once a constraint has to change, later ones that are near the tolerance change with it: in a
+  // chain each would otherwise need a round of its own.
+  double allowed = tolerance;
+  long changed = 0;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    Row &row = step_.rows[c];
+    const Contact &contact = step_.contact_of(c);
+    const double linear_gap = contact.gap_now - row.wall_motion;
+    const double lessened = linear_gap + LEFT * tolerance;
+    // Gaps that were set by the end of the step are kept there by follow().
+    if (!row.as_at_start && contacts.gap[c] != lessened) continue;
+    if (contacts.gap[c] == linear_gap || overlaps_.is_bad(contact.gap_now)) continue;
+    if (step_.is_member(contacts.first[c]) || step_.is_member(contacts.second[c])) continue;
+    if (contact.asked.parts) continue;
+    const double at_end = gap_at_end(c, velocity);
+    // A held contact is closed no faster than its gap asks for.
+    const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
+    const bool may_stay = holds || contacts.impulse[c] == 0.0;
+    if ((at_end >= -allowed || step_.keeps_overlaps) && (at_end <= allowed || may_stay)) continue;
+    allowed = LEFT * tolerance;
+    if (contacts.impulse[c] > 0.0) contacts.set[c].least = 0.0;
+    const bool first_time = row.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
+    contacts.gap[c] = first_time ? lessened : linear_gap;
+    row.as_at_start = false;
+    ++changed;
+  }
+  return changed;
+}
+
+long GapRules::hold(std::size_t c, double gap_at_end, double opening, double along)
+{
+  const double tolerance = step_.settings.tolerance;
+  inelastic::ContactSet &contacts = step_.problem.contacts;
+  Row &row = step_.rows[c];
+  const Contact &contact = step_.contact_of(c);
+  double gap = gap_at_end - opening;
+  if (gap_at_end < -tolerance) {
+    gap = std::min(gap, contact.gap_now - row.wall_motion);
+    if (step_.relinearisations > MAX_RELINEARISATIONS) return 0;
+  } else {
+    if (gap_at_end <= RELINEARISE_BEYOND * tolerance || !step_.holds(c) || along < LEAST_ALONG ||
+        step_.relinearisations > MAX_RELINEARISATIONS / 2)
+      return 0;
+    if (contacts.impulse[c] > 0.0) {
+      // Surfaces that approach across a gap need no pull, and no push before they touch.
+      contacts.set[c].least = 0.0;
+    } else {
+      gap = std::min(gap, most_closed(contact) - row.wall_motion);
+      if (gap <= contacts.gap[c]) return 0;
+    }
+  }
+  if (contacts.gap[c] == gap) return 0;
+  contacts.gap[c] = gap;
+  row.as_at_start = false;
+  return 1;
+}
+
+double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const Row &row = step_.rows[c];
+  const Contact &contact = step_.contact_of(c);
+  const int i = contacts.first[c], j = contacts.second[c];
+  double opening = 0.0;
+  for (int d = 0; d < 3; ++d)
+    opening += contacts.normal[3 * c + d] * (velocity[3 * i + d] - velocity[3 * j + d]);
+  return contact.gap_now - row.wall_motion + step_.problem.timestep * opening;
+}
+
+long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
+{
+  inelastic::ContactSet &contacts = step_.problem.contacts;
+  Row &row = step_.rows[c];
+  const Contact &contact = step_.contact_of(c);
+  const double linear_gap = effective_gap(contact) - row.wall_motion;
+  double gap = std::min(exact_gap, linear_gap);
+  // A contact that may keep its overlap, and with the residual still gets too deep, has to give it
+  // back.
+  if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(contact.gap_now))
+    gap = std::min(gap, contact.gap_now - row.wall_motion);
+  if (!too_deep) {
+    const bool worth_it = contacts.impulse[c] > 0.0 &&
+        gap - contacts.gap[c] > RELINEARISE_BEYOND * step_.settings.tolerance &&
+        step_.relinearisations <= MAX_RELINEARISATIONS / 2;
+    if (!worth_it) return 0;
+  }
+  contacts.gap[c] = gap;
+  row.as_at_start = false;
+  row.followed = step_.is_member(contacts.first[c]) || step_.is_member(contacts.second[c]);
+  return 1;
+}
