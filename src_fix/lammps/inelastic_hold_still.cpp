@@ -80,10 +80,8 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   moving_.timestep = problem.timestep;
-  moving_.resize(problem.particles, problem.walls);
-  moving_.inverse_mass = problem.inverse_mass;
-  moving_.bodies = problem.bodies;
-  std::copy_n(step_.velocity.begin(), step_.velocity.size(), moving_.predicted_velocity.begin());
+  static_cast<inelastic::Unknowns &>(moving_) = problem;
+  moving_.predicted_velocity = step_.velocity;
   for (std::size_t i = 0; i < still.size(); ++i) {
     if (!still[i]) continue;
     moving_.inverse_mass[i] = 0.0;

@@ -93,8 +93,7 @@ void PushApart::run(const Atom *atom, inelastic::ProjectionResult &result, const
   inelastic::ContactProblem &problem = step_.problem;
   const inelastic::ContactSet contacts = problem.contacts;
   const std::size_t number_of_contacts = step_.contacts.size();
-  std::copy_n(step_.velocity.begin(), 3 * static_cast<std::size_t>(problem.particles),
-              problem.predicted_velocity.begin());
+  problem.predicted_velocity = step_.velocity;
   step_.phase = Phase::PUSH;
   step_.relinearisations = 0;
   if (movers_.any_turns()) constraints_.entangled().find();

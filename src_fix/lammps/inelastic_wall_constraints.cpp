@@ -32,6 +32,15 @@ WallConstraints::WallConstraints(LAMMPS *lmp, Step &step, GapRules &rules, Conta
 {
 }
 
+// [length] By how much contacts and loads may bring a wall nearer in the step.
+double WallConstraints::travel_of_walls(const double *velocity) const
+{
+  double fastest = 0.0;
+  for (int slot = step_.problem.particles; slot < step_.problem.slots(); ++slot)
+    fastest = std::max(fastest, norm(velocity + 3 * static_cast<std::size_t>(slot)));
+  return step_.problem.timestep * fastest;
+}
+
 // Points from which to look at the walls from where atoms are, as far as the step takes them.
 const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *velocity,
                                                                double beyond)
@@ -41,10 +50,11 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
   // A wall that moves away from a sphere that it holds may be far at the end of the step.
   const bool may_be_far = rows_.may_hold() && walls_.any_moves();
   const double anywhere = periods_.widest();
+  const double nearer = beyond + travel_of_walls(velocity);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
-    const double near = atom->radius[i] + beyond + h * norm(velocity + 3 * i);
+    const double near = atom->radius[i] + nearer + h * norm(velocity + 3 * i);
     const double reach = may_be_far && rows_.remembers_wall(i) ? std::max(near, anywhere) : near;
     if (reach >= clear_of_walls_[i]) viewpoints_.push_back({i, {x[0], x[1], x[2]}, reach});
   }
@@ -63,6 +73,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
   const std::vector<double> &moved = step_.motion();
   viewpoints_.clear();
   const double h = step_.problem.timestep;
+  const double nearer = travel_of_walls(step_.velocity.data());
   std::unordered_set<int> followed;
   for (std::size_t c = 0; c < step_.rows.size(); ++c) {
     const int i = step_.problem.contacts.first[c];
@@ -76,7 +87,8 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
     const double reach = followed.count(i) ? EXTREME
-                                           : atom->radius[i] + (movers_.any_turns() ? margin : 0.0);
+                                           : atom->radius[i] + nearer +
+            (movers_.any_turns() ? margin : 0.0);
     Viewpoint end = {i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach};
     const bool may_differ = !walls_.exact() || step_.is_member(i) || followed.count(i) != 0;
     if (may_differ && reach + h * norm(v) >= clear_of_walls_[i]) viewpoints_.push_back(end);
@@ -194,7 +206,8 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   double from_here[3];
   for (int d = 0; d < 3; ++d) from_here[d] = from.where[d] + from.image[d] - x[d];
   const double gap_there = gap_at_end(view, i);
-  const double gap_here = gap_there - dot(n, from_here);
+  // Of the wall where it is prescribed to be: the row adds what contacts make of it.
+  const double gap_here = view.distance - atom->radius[i] - dot(n, from_here);
   const double wall_motion = view.distance_now - view.distance;
   // A region can show a wall late: from inside one part of a union the others are not seen. An
   // obstacle that is overlapped is seen; its plane at the end of the step may lie beyond where the

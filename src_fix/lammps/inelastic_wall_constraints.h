@@ -62,6 +62,7 @@ class WallConstraints : protected Pointers {
   Viewpoints last_inside(const Viewpoints &beyond);
   double opening_of(int i, int wall, const double *normal, const double *velocity) const;
   double gap_at_end(const WallView &view, int i) const;
+  double travel_of_walls(const double *velocity) const;
   bool may_hold(std::size_t c, const double *normal_at_end) const;
   long hold(std::size_t c, double gap_at_end, const double *normal_at_end);
   long add_plane(const Viewpoint &, const WallView &, bool too_deep);
