@@ -46,12 +46,37 @@ void ContactSet::add(int first_particle, int second_slot, const double *unit_nor
   refinement.push_back(refinement_value);
 }
 
+void ContactSet::add_of(const ContactSet &other, std::size_t c)
+{
+  add(other.first[c], other.second[c], &other.normal[3 * c], other.gap[c], 0.0, other.compliance[c],
+      other.set[c].least, other.refinement[c]);
+}
+
 void ContactSet::forget_impulses(std::size_t from)
 { std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(from), impulse.end(), 0.0); }
 
 void ContactSet::make_admissible()
 {
   for (std::size_t c = 0; c < size(); ++c) impulse[c] = set[c].project(impulse[c]);
+}
+
+std::vector<double> ContactSet::pushing() const
+{
+  std::vector<double> pushes = impulse;
+  for (double &value : pushes) value = std::max(0.0, value);
+  return pushes;
+}
+
+double ContactSet::lacking(const double *impulses, const double *free_gap, double tolerance,
+                           double &farthest) const
+{
+  double sum = 0.0;
+  for (std::size_t c = 0; c < size(); ++c) {
+    const double give = compliance[c] * impulses[c];
+    sum -= impulses[c] * (free_gap[c] + give + tolerance);
+    farthest = std::max(farthest, -free_gap[c]);
+  }
+  return sum;
 }
 
 double ContactSet::diagonal(std::size_t c, const Unknowns &unknowns, double timestep) const

@@ -52,6 +52,9 @@ struct ContactSet {
            double impulse_guess, double compliance_value = 0.0, double least_impulse = 0.0,
            double refinement_value = 1.0);
 
+  // Adds constraint c of another set as it is, but for its impulse, which is zero.
+  void add_of(const ContactSet &other, std::size_t c);
+
   // Sets the impulses of all constraints from one on to zero.
   void forget_impulses(std::size_t from);
 
@@ -63,6 +66,12 @@ struct ContactSet {
   double magnitude(std::size_t c) const { return std::abs(impulse[c]); }
   // Tells whether a contact pushes with these impulses, which are in the order of `impulse`.
   bool pushes(std::size_t c, const double *impulses) const { return impulses[c] > 0.0; }
+  // Returns the impulses of this set, without those that pull.
+  std::vector<double> pushing() const;
+  // Returns -lambda . (free_gap + C lambda + tolerance) [mass length^2 / time] for such impulses,
+  // and raises `farthest` to the largest overlap without impulses [length].
+  double lacking(const double *impulses, const double *free_gap, double tolerance,
+                 double &farthest) const;
   // Tells whether the gap of a contact must be closed at the end of the step.
   bool is_loaded(std::size_t c) const { return set[c].is_loaded(impulse[c]); }
 

@@ -11,15 +11,10 @@ bool is_infeasible(const ContactProblem &problem, GapOperator &gap_operator,
 {
   constexpr double FAR = 10.0;
   // Any impulses that push give a bound. Contacts that pull let go where there is no room.
-  std::vector<double> impulse = problem.contacts.impulse;
-  for (double &value : impulse) value = std::max(0.0, value);
-  const std::vector<double> &free_gap = gap_operator.free_gap();
-  double lacking = 0.0, farthest = 0.0;
-  for (std::size_t c = 0; c < impulse.size(); ++c) {
-    const double give = problem.contacts.compliance[c] * impulse[c];
-    lacking -= impulse[c] * (free_gap[c] + give + limits.tolerance);
-    farthest = std::max(farthest, -free_gap[c]);
-  }
+  const std::vector<double> impulse = problem.contacts.pushing();
+  double farthest = 0.0;
+  const double lacking = problem.contacts.lacking(impulse.data(), gap_operator.free_gap().data(),
+                                                  limits.tolerance, farthest);
   for (int i = 0; i < problem.slots(); ++i) {
     const double *const v = &problem.predicted_velocity[3 * static_cast<std::size_t>(i)];
     farthest = std::max(farthest, problem.timestep * std::hypot(v[0], v[1], v[2]));

@@ -102,10 +102,11 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
     // included.
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
         (1.0 - DEEPER) * step_.settings.tolerance;
+    contacts.add_of(problem.contacts, c);
+    contacts.gap.back() = std::min(problem.contacts.gap[c], ends_within);
     // With the step's own impulse the contact still pushes, or pulls by no more than it may.
-    contacts.add(
-        i, j, n, std::min(problem.contacts.gap[c], ends_within), 0.0, 0.0,
-        std::min(0.0, problem.contacts.set[c].changes_of(problem.contacts.impulse[c]).least));
+    const auto changes = problem.contacts.set[c].changes_of(problem.contacts.impulse[c]);
+    contacts.set.back() = {std::min(0.0, changes.least)};
     source.push_back(c);
   }
   inelastic::SolverLimits limits;

@@ -35,9 +35,7 @@ void PushApart::begin_trial(const inelastic::ContactSet &contacts)
   inelastic::ContactSet &present = step_.problem.contacts;
   const inelastic::ContactSet last = present;
   present = contacts;
-  for (std::size_t c = contacts.size(); c < last.size(); ++c)
-    present.add(last.first[c], last.second[c], &last.normal[3 * c], last.gap[c], 0.0,
-                last.compliance[c], last.set[c].least, last.refinement[c]);
+  for (std::size_t c = contacts.size(); c < last.size(); ++c) present.add_of(last, c);
 }
 
 // A push that begins asks for everything.

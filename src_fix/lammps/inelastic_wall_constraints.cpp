@@ -86,9 +86,9 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
     if (step_.problem.inverse_mass[i] == 0.0) continue;
     const double *const x = atom->x[i];
     const double *const v = &moved[3 * i];
-    const double reach = followed.count(i) ? EXTREME
-                                           : atom->radius[i] + nearer +
-            (movers_.any_turns() ? margin : 0.0);
+    const double reach = followed.count(i)
+        ? EXTREME
+        : atom->radius[i] + nearer + (movers_.any_turns() ? margin : 0.0);
     Viewpoint end = {i, {x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2]}, reach};
     const bool may_differ = !walls_.exact() || step_.is_member(i) || followed.count(i) != 0;
     if (may_differ && reach + h * norm(v) >= clear_of_walls_[i]) viewpoints_.push_back(end);

@@ -1387,7 +1387,6 @@ void test_two_ranks(double tolerance)
       }
 }
 
-// No rank has anything at all.
 // A lid lies on two columns, one on each rank, and half of its weight on each of them.
 void test_lid_over_two_ranks()
 {
@@ -1423,6 +1422,7 @@ void test_lid_over_two_ranks()
   }
 }
 
+// No rank has anything at all.
 void test_two_ranks_with_nothing()
 {
   const ContactProblem nothing = make_problem({}, {});
