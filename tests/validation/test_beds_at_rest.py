@@ -28,7 +28,7 @@ def test_it_comes_to_rest(bed: str, tolerance: float, timestep: float, tmp_path:
     # In units of the speed that a step takes away from every particle. A bed may still give way
     # somewhere after it has been at rest; the page's table has 0 but for round-off.
     assert max(one.speed for one in found) <= 0.02
-    # Held grains need no iteration. A grain that slides on among them, on slopes of 1e-4, takes some
-    # in a step, and hundreds in one in which it meets others: a tenth of what the fall takes.
+    # Held grains need no iteration. A grain that slides on among them, on slopes of 1e-4, takes
+    # some in a step, and hundreds where it meets others: a tenth of what the fall takes.
     assert all(one.iterations == 0.0 for one in found if one.speed == 0.0)
     assert statistics.median(one.iterations for one in found) <= 100.0

@@ -18,8 +18,8 @@ def test_error_falls_with_the_time_step(name: str, tolerance: float, tmp_path: P
     exact = SCENES[name]()
     errors = [exact.error(tmp_path, tolerance, steps, accuracy=1e-7) for steps in STEPS]
     print(f"{name}, eps {tolerance:g} d: errors", " ".join(f"{error:.1e}" for error in errors))
-    # In so many diameters: positions follow velocities that are known to 1e-7, and overlaps of up to
-    # a tolerance, where turning surfaces leave them, stay (a tenth more where it is gone through).
+    # In so many diameters: positions follow velocities that are known to 1e-7, and overlaps of up
+    # to a tolerance, where turning surfaces leave them, stay (a tenth more for what comes on top).
     floor = max(1e-6, 1.1 * tolerance)
     # Where within a step two spheres meet changes the error by a few percent.
     for longer, shorter in pairwise(errors):
