@@ -20,6 +20,7 @@ from tests.benchmark.scenes_without import (
 from tests.helpers.bodies import body_scene, dimer, placed
 from tests.helpers.cpp_functions import functions, give_bodies
 from tests.helpers.lammps_run import plugin_file, run_lmp
+from tests.helpers.programs import missing
 from tests.helpers.scenes import scene as scene_of
 
 RADIUS = 0.05
@@ -113,9 +114,11 @@ def test_what_is_cut_is_gone(without: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
 def test_unused_code_costs_next_to_nothing(without: Path) -> None:
     """A scene models only what it requires."""
+    if shutil.which("valgrind") is None:
+        # It counts instructions; seconds differ from run to run by more than what is measured.
+        missing("valgrind is not installed")
     cost = instructions(plugin_file().parent, 20) / instructions(without, 20) - 1
     # It was 1.5 % after version 0.2, from run to run within 0.1 %.
     assert 0 < cost < 0.02
