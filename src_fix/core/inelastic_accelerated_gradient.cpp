@@ -1,6 +1,7 @@
 #include "inelastic_accelerated_gradient.h"
 
 #include "inelastic_infeasibility.h"
+#include "inelastic_settling.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,56 +32,6 @@ namespace {
   // contacts that closed in the step came in late.)
   constexpr long LOOK_EVERY = 20;
   constexpr double IDLE_GAP = 5.0;
-
-  // Changes of velocity, and with them the targets, move most in the first iterations of a search.
-  constexpr long TARGETS_EVERY = 20;
-  bool sets_targets(long iteration)
-  {
-    return iteration == 2 || iteration == 4 || iteration == 8 || iteration == 14 ||
-        iteration % TARGETS_EVERY == 0;
-  }
-
-  // In a chain residuals add up, and the error of a velocity is many times that of a gap. So a
-  // search goes on while velocities differ by more than a fortieth of what contacts change from
-  // those of a half to two thirds as many iterations. The fortieth is this part of the sixteenth by
-  // which targets are set (inelastic_contact_targets.cpp; for bodies a third as much).
-  constexpr double MOST_MOVED = 0.4;
-
-  // Whether the velocities of a search have come to what they end with.
-  template <typename Real> class Settling {
-   public:
-    // Velocities that are not `asked` for have always settled.
-    Settling(PackedIterations<Real> &iterations, bool asked, long iterations_before) :
-        iterations_(iterations), asked_(asked), next_kept_(iterations_before + 2)
-    {
-    }
-
-    // Collective.
-    bool has_settled(double accuracy, Host &host)
-    {
-      if (!asked_) return true;
-      iterations_.set_targets();
-      double moved = iterations_.moved_since_kept(accuracy);
-      host.reduce(nullptr, 0, &moved, 1);
-      return moved <= MOST_MOVED;
-    }
-
-    // Call it after each iteration.
-    void see(long iteration)
-    {
-      if (!asked_) return;
-      if (iteration >= next_kept_) {
-        iterations_.keep_velocities();
-        next_kept_ = iteration + iteration / 2 + 4;
-      }
-      if (sets_targets(++in_search_)) iterations_.set_targets();
-    }
-
-   private:
-    PackedIterations<Real> &iterations_;
-    bool asked_;
-    long next_kept_, in_search_ = 0;
-  };
 
   // The weights of inelastic_accelerated_gradient.h.
   class Momentum {
@@ -198,8 +149,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
                      targets_, gap_operator_.change(), limits.tolerance);
   std::vector<double> &impulse = problem.contacts.impulse;
   Momentum momentum;
-  Settling<Real> settling(iterations, limits.accuracy > 0.0 && limits.coarseness == 1.0,
-                          result.iterations);
+  Settling settling(iterations, limits.accuracy > 0.0 && limits.coarseness == 1.0,
+                    result.iterations);
   long next_check = 0, failures = 0;
   double blur = 0.0;
   while (result.iterations < limits.max_iterations) {
@@ -287,7 +238,8 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
     return result.status == Status::CONVERGED || result.status == Status::INFEASIBLE ||
         result.iterations >= limits.max_iterations;
   };
-  const bool of_use = unsolved < WITHIN_SINGLE;
+  bool of_use = unsolved < WITHIN_SINGLE;
+  if (of_use) of_use = search_first(problem, limits, scales, host, result);
   for (int search = 0; of_use && search < MOST_SEARCHES && !settled(); ++search) {
     result.status = iterate(single_, problem, limits, scales, host, result);
     // All other ends of a search have judged what they leave.

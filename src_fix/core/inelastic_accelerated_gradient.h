@@ -43,19 +43,17 @@
 
 namespace inelastic {
 
-class AcceleratedProjectedGradient final : public Solver {
+class AcceleratedProjectedGradient : public Solver {
  public:
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
 
- private:
-  // Iterates from the impulses in `problem`, whose gaps are gap_, until all residuals, judged in
-  // double precision, are at most their targets and velocities settle, or more iterations in this
-  // precision are of no use. Returns OUT_OF_ITERATIONS also if iterations are left and this
-  // precision does not suffice.
-  template <typename Real>
-  Status iterate(PackedIterations<Real> &iterations, ContactProblem &problem,
-                 const SolverLimits &limits, const Scales &scales, Host &host,
-                 SolverResult &result);
+ protected:
+  // Searches before the searches of this solver do, which go on from the impulses that it leaves if
+  // `result` is not yet settled. The first guess is judged, and the ghosts are chosen. Returns
+  // whether another search in single precision may be of use. Collective.
+  virtual bool search_first(ContactProblem &, const SolverLimits &, const Scales &, Host &,
+                            SolverResult &)
+  { return true; }
 
   // Sets the gaps gap_, the residual and the targets of the impulses in `problem`. Returns whether
   // every residual is at most its target.
@@ -67,11 +65,22 @@ class AcceleratedProjectedGradient final : public Solver {
   std::optional<Status> judge_prospects(const ContactProblem &problem, const SolverLimits &limits,
                                         bool single_precision, Host &host, SolverResult &result);
 
+  ResidualTrend trend_of_targets_;    // of the largest residual as a part of its target
+
+ private:
+  // Iterates from the impulses in `problem`, whose gaps are gap_, until all residuals, judged in
+  // double precision, are at most their targets and velocities settle, or more iterations in this
+  // precision are of no use. Returns OUT_OF_ITERATIONS also if iterations are left and this
+  // precision does not suffice.
+  template <typename Real>
+  Status iterate(PackedIterations<Real> &iterations, ContactProblem &problem,
+                 const SolverLimits &limits, const Scales &scales, Host &host,
+                 SolverResult &result);
+
   // Raises L if the last change of the impulses shows it too small.
   void raise_curvature(const packed::Passed &passed);
 
-  double curvature_ = 0.0;            // L; 0 = not yet known
-  ResidualTrend trend_of_targets_;    // of the largest residual as a part of its target
+  double curvature_ = 0.0;    // L; 0 = not yet known
   PackedIterations<float> single_;
   PackedIterations<double> double_;
 };

@@ -21,13 +21,6 @@ namespace {
   // A gap is known to a few units of round-off of the largest change.
   constexpr double ROUND_OFFS = 2.0;
 
-  // Where one of two particles in contact has changed its velocity more than the other, this part
-  // of the larger change counts, if it is more than the smaller one.
-  constexpr double ALONE = 0.5;
-
-  // A velocity, which is a sum of some impulses, is known to so many units of its own round-off.
-  constexpr int BLURRED = 16;
-
   struct RodShape {
     double axis[3];    // unit vector
     double arm[2];     // of the two members along the axis [length]
@@ -75,9 +68,6 @@ namespace {
                                              static_cast<Real>(z), static_cast<Real>(fourth)};
   }
 
-  template <typename Real> Real length(const typename packed::Vector<Real>::Lanes &a)
-  { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
-
   // Returns the slot whose vector is at a place, in bytes.
   template <typename Real> std::size_t index(std::uint32_t place)
   { return place / sizeof(packed::Vector<Real>); }
@@ -117,73 +107,36 @@ void PackedIterations<Real>::prepare(const ContactProblem &problem,
   pack_bodies(problem.bodies, mobility_unit);
   sum_.assign(slots, Vector{});
   velocity_.assign(slots, Vector{});
-  kept_before_ = kept_ = velocity_;
-
-  const double per_length = problem.timestep / scales.length;
-  const std::vector<double> &guess = targets.change_by_guess();
-  at_start_.resize(slots);
-  since_guess_.resize(slots);
-  for (std::size_t i = 0; i < slots; ++i) {
-    const double *const v = &change[3 * i], *const g = &guess[3 * i];
-    set_lanes(at_start_[i], per_length * v[0], per_length * v[1], per_length * v[2], 0.0);
-    set_lanes(since_guess_[i], per_length * (v[0] - g[0]), per_length * (v[1] - g[1]),
-              per_length * (v[2] - g[2]), 0.0);
-  }
-  mobile_.resize(slots);
-  for (std::size_t i = 0; i < slots; ++i) mobile_[i] = problem.is_mobile(static_cast<int>(i));
-  most_target_ = static_cast<Real>(tolerance / scales.length);
+  targets_.begin(problem, scales, targets, change, tolerance);
   set_targets();
 }
 
 template <typename Real> void PackedIterations<Real>::set_targets()
 {
-  changed_.resize(velocity_.size());
-  for (std::size_t i = 0; i < changed_.size(); ++i)
-    changed_[i] = !mobile_[i] ? std::numeric_limits<Real>::max()
-                              : std::max(length<Real>(at_start_[i].lanes + velocity_[i].lanes),
-                                         length<Real>(since_guess_[i].lanes + velocity_[i].lanes));
+  targets_.set(velocity_);
   for (Constraints *const some : {&working_, &idle_})
     for (std::size_t k = 0; k < some->size(); ++k)
-      some->inverse_target[k] = 1 / std::min(most_target_, free_target(*some, k));
+      some->inverse_target[k] = 1 /
+          targets_.target(index<Real>(some->ends[k].first), index<Real>(some->ends[k].second),
+                          some->least_target[k], some->part[k]);
 }
 
 template <typename Real> void PackedIterations<Real>::keep_velocities()
-{
-  kept_before_.swap(kept_);
-  kept_ = velocity_;
-}
+{ targets_.keep(velocity_); }
 
-template <typename Real> double PackedIterations<Real>::moved_since_kept(double accuracy) const
+template <typename Real> double PackedIterations<Real>::moved_since_kept(double accuracy)
 {
-  std::vector<Real> moved(velocity_.size());
-  for (std::size_t i = 0; i < moved.size(); ++i) {
-    const Real blur =
-        BLURRED * std::numeric_limits<Real>::epsilon() * length<Real>(velocity_[i].lanes);
-    moved[i] = std::max(Real(0), length<Real>(velocity_[i].lanes - kept_before_[i].lanes) - blur);
-  }
+  targets_.compare(velocity_);
   Real most = 0;
   for (std::size_t k = 0; k < working_.size(); ++k) {
     if (!working_.set[k].is_loaded(unbound_[k])) continue;
     const std::size_t i = index<Real>(working_.ends[k].first);
     const std::size_t j = index<Real>(working_.ends[k].second);
-    const Real both = !mobile_[i] ? moved[j]
-        : !mobile_[j]             ? moved[i]
-                                  : std::min(moved[i], moved[j]);
-    const Real by = std::max(both, static_cast<Real>(ALONE) * std::max(moved[i], moved[j]));
-    most = std::max(most, by / free_target(working_, k));
+    most = std::max(most,
+                    targets_.moved(i, j) /
+                        targets_.free_target(i, j, working_.least_target[k], working_.part[k]));
   }
   return accuracy * static_cast<double>(most);
-}
-
-// Returns the target of a constraint without the bound by the tolerance.
-template <typename Real>
-Real PackedIterations<Real>::free_target(const Constraints &constraints, std::size_t k) const
-{
-  const packed::Ends &ends = constraints.ends[k];
-  return std::max(
-      constraints.least_target[k],
-      constraints.part[k] *
-          std::min(changed_[index<Real>(ends.first)], changed_[index<Real>(ends.second)]));
 }
 
 template <typename Real>

@@ -17,9 +17,9 @@
 #pragma once
 
 #include "inelastic_contact_problem.h"
-#include "inelastic_contact_targets.h"
 #include "inelastic_host.h"
 #include "inelastic_packed_kernels.h"
+#include "inelastic_packed_targets.h"
 
 #include <array>
 #include <vector>
@@ -29,13 +29,6 @@ namespace inelastic {
 // The weights of the momentum in inelastic_accelerated_gradient.h.
 struct Weights {
   double along, beyond, back;
-};
-
-// The units of packed numbers. Both are powers of two, so that a scene in other units takes the
-// same steps bit by bit.
-struct Scales {
-  double length;     // [length]
-  double impulse;    // [mass length / time]
 };
 
 template <typename Real> class PackedIterations {
@@ -49,6 +42,13 @@ template <typename Real> class PackedIterations {
                const std::vector<double> &gap, double idle_gap, const Scales &scales,
                const ContactTargets &targets, const std::vector<double> &change, double tolerance);
 
+  // Changes of velocity, and with them the targets, move most in the first iterations of a search.
+  static bool sets_targets(long iteration)
+  {
+    return iteration == 2 || iteration == 4 || iteration == 8 || iteration == 14 ||
+        iteration % TARGETS_EVERY == 0;
+  }
+
   // Sets the targets by the present changes of velocity (inelastic_contact_targets.h). Call it
   // between finish and advance.
   void set_targets();
@@ -61,7 +61,7 @@ template <typename Real> class PackedIterations {
   // target divided by `accuracy`, which is above 0. Before two were kept the change is that since
   // the start of the search. A change that may be round-off does not count. Call it after finish
   // and set_targets.
-  double moved_since_kept(double accuracy) const;
+  double moved_since_kept(double accuracy);
 
   // Begins an iteration with a step of 1 / L: the next impulses become the present ones. Returns
   // sums and maxima over this rank's constraints; those of gaps and changes are of the impulses
@@ -90,6 +90,8 @@ template <typename Real> class PackedIterations {
   { unpack(change_before_, scales, impulse); }
 
  private:
+  static constexpr long TARGETS_EVERY = 20;
+
   using Vector = packed::Vector<Real>;
   using Set = HalfLine<Real>;
 
@@ -110,7 +112,6 @@ template <typename Real> class PackedIterations {
   void pack(const ContactSet &contacts, const std::vector<std::size_t> &places,
             const std::vector<double> &diagonal, const std::vector<double> &gap,
             const Scales &scales, const ContactTargets &targets, Constraints &packed);
-  Real free_target(const Constraints &constraints, std::size_t k) const;
   void wake(const std::vector<std::size_t> &near, const Real *gap);
   void set_idle();
   void add_up_walls(Host &host);
@@ -137,14 +138,7 @@ template <typename Real> class PackedIterations {
   std::vector<Vector> sum_, velocity_;
   int first_wall_ = 0;         // the slot of the first wall
   bool walls_move_ = false;    // by impulses
-  // Per slot: the change of velocity by the impulses at the start of the search, in all and since
-  // the first guess of the solve
-  std::vector<Vector> at_start_, since_guess_;
-  std::vector<char> mobile_;    // per slot
-  // Per slot that can move: the change of velocity of which targets are a part (set_targets)
-  std::vector<Real> changed_;
-  std::vector<Vector> kept_, kept_before_;    // of velocity_
-  Real most_target_ = 0;
+  PackedTargets<Real> targets_;
   std::vector<packed::Rod<Real>> rods_;
   std::vector<packed::Body<Real>> bodies_;       // bodies that are no rods
   std::vector<packed::Member<Real>> members_;    // of all bodies, as in RigidBodies::member

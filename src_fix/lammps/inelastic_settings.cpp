@@ -150,7 +150,7 @@ void Reader::read_law(const std::string &name)
 void Reader::read_solver(const char *name)
 {
   if (!inelastic::make_solver(name))
-    error_at(error_, FLERR, at_ - 1, "Fix inelastic solver must be apgd or uzawa, not {}", name);
+    error_at(error_, FLERR, at_ - 1, "Fix inelastic solver must be sweeps, apgd or uzawa, not {}", name);
   settings_.solver = name;
 }
 

@@ -26,7 +26,7 @@ struct Settings {
   // A: a step is solved to this fraction of what contacts change in it, where that is below EPS.
   double accuracy = 1.0e-3;
   // The name that make_solver() of the core knows.
-  std::string solver = "apgd";
+  std::string solver = "sweeps";
   // Iterations in one time step. Beyond, the run stops, or goes on with a warning.
   long max_iterations = 100000;
   bool warn_only = false;

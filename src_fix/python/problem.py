@@ -86,7 +86,7 @@ class Problem:
     normal : unit vectors from the second side to the first, (m, 3)
     gap : distance of the surfaces, negative for an overlap; what a wall moves towards the particle
         in the step is taken off, length, (m,)
-    impulse_guess : from which "apgd" starts; 0 by default, mass length/time, (m,)
+    impulse_guess : from which "sweeps" and "apgd" start; 0 by default, mass length/time, (m,)
     least_impulse : at most 0; contacts can pull by as much; 0 by default, mass length/time, (m,)
     compliance : at least 0, makes springs of contacts; 0 by default, time/mass, (m,)
     refinement : above 0 to 1; the part of ``Limits.accuracy`` that a contact has; 1 by default,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,9 @@ from lammps_inelastic.core.problem import Floats, Problem, impulses_of, positive
 
 # How a search for the impulses can end.
 Status = Literal["converged", "out of iterations", "round-off", "not finite", "infeasible"]
-# Accelerated gradient, as in the fix, or the paper's Uzawa (docs/method/solvers.md).
-Solver = Literal["apgd", "uzawa"]
+# Coloured sweeps, as in the fix, accelerated gradient, or the paper's Uzawa
+# (docs/method/solvers.md).
+Solver = Literal["sweeps", "apgd", "uzawa"]
 
 
 @dataclass(frozen=True)
@@ -88,13 +89,13 @@ class Projection:
         return self.status == "converged"
 
 
-def project(problem: Problem, limits: Limits, *, solver: Solver = "apgd") -> Projection:
+def project(problem: Problem, limits: Limits, *, solver: Solver = "sweeps") -> Projection:
     """Project the predicted velocities onto those that keep every contact apart.
 
     Raises ValueError for another solver.
     """
-    if solver not in ("apgd", "uzawa"):
-        raise ValueError(f"solver is {solver!r}: it must be 'apgd' or 'uzawa'")
+    if solver not in get_args(Solver):
+        raise ValueError(f"solver is {solver!r}: it must be 'sweeps', 'apgd' or 'uzawa'")
     return Projection(
         *_core.project(
             problem,

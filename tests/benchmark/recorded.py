@@ -93,7 +93,9 @@ class Solved:
     seconds: float
 
 
-def _solve(problem: core.Problem, tolerance: float, solver: core.Solver = "apgd") -> Solved | None:
+def _solve(
+    problem: core.Problem, tolerance: float, solver: core.Solver = "sweeps"
+) -> Solved | None:
     limits = core.Limits(tolerance, max_iterations=MOST_ITERATIONS)
     result, seconds = timed(problem, limits, solver)
     return Solved(result.iterations, seconds) if result.converged else None

@@ -128,7 +128,7 @@ constexpr double SINGLE_TOLERANCE = 1.0e-5;
 // Numbers near 1 after a few dozen additions.
 constexpr double ROUNDING = 1.0e-13;
 
-const std::vector<std::string> SOLVERS = {"apgd", "uzawa"};
+const std::vector<std::string> SOLVERS = {"sweeps", "apgd", "uzawa"};
 
 ContactProblem make_problem(const std::vector<double> &velocity,
                             const std::vector<double> &inverse_mass)

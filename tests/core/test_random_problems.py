@@ -174,7 +174,7 @@ def test_what_cannot_be_is_never_called_solved(
         normal=np.vstack([chosen.normal, normal, -normal]),
         gap=np.append(chosen.gap, [0.0, -depth]),
     )
-    for solver in ("apgd", "uzawa"):
+    for solver in ("sweeps", "apgd", "uzawa"):
         projection = infeasible.project(TOLERANCE, solver=solver, max_iterations=2000)
         assert not projection.converged
         # Half of it at least must stay, at one wall or at the other.

@@ -32,7 +32,7 @@ TOLERANCE = 1e-11
 ROUNDING = 1e-14
 
 
-@pytest.fixture(params=["apgd", "uzawa"])
+@pytest.fixture(params=["sweeps", "apgd", "uzawa"])
 def solve(request: pytest.FixtureRequest) -> Solve:
     """Return a function that solves a problem and says how accurate the result is.
 
@@ -44,14 +44,14 @@ def solve(request: pytest.FixtureRequest) -> Solve:
         projection = given.project(TOLERANCE, solver=request.param)
         assert projection.converged
         assert projection.feasibility <= TOLERANCE
-        if request.param == "apgd":
+        if request.param != "uzawa":
             assert projection.complementarity <= TOLERANCE
         return projection, residual_left(projection) / given.timestep + ROUNDING
 
     return solved
 
 
-@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+@pytest.mark.parametrize("solver", ["sweeps", "apgd", "uzawa"])
 def test_sphere_on_a_spring(solver: core.Solver) -> None:
     # gap + h V + C lambda = 0 and V = -3 + lambda / m: lambda = 0.02 / (h / m + C).
     given = problem([(0, 0, -3)], [2], [(0, WALL, UP, 0.01)], timestep=0.01)
@@ -63,7 +63,7 @@ def test_sphere_on_a_spring(solver: core.Solver) -> None:
     assert projection.feasibility <= TOLERANCE
 
 
-@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+@pytest.mark.parametrize("solver", ["sweeps", "apgd", "uzawa"])
 @pytest.mark.parametrize(
     ("least", "impulse", "speed"),
     [(0, 0, 3), (-4, -4, 1), (-6, -6, 0), (-60, -6, 0)],
@@ -273,7 +273,7 @@ def test_contact_given_three_times(solve: Solve) -> None:
     assert np.all(projection.impulse >= 0)
 
 
-@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+@pytest.mark.parametrize("solver", ["sweeps", "apgd", "uzawa"])
 def test_no_room_is_not_converged(solver: core.Solver) -> None:
     # Two walls leave 0.01 less than a diameter: one overlap is at least half of that.
     given = problem([(0, 0, 0)], [1], [(0, WALL, UP, 0), (0, WALL, (0, 0, -1), -0.01)])
@@ -441,24 +441,25 @@ def test_body_of_one_sphere_is_a_free_sphere(solve: Solve, inertia: float) -> No
     given = column([1, 3, 2, 1], [-1, -2, 0.5, -3])
     spheres = in_bodies(given, np.zeros((4, 3)), [(2,), (0,)])
     spheres.bodies.inverse_inertia[:] = np.eye(3) / inertia
-    free, _ = solve(given)
+    free, accuracy = solve(given)
     joined, _ = solve(spheres)
-    assert np.array_equal(joined.velocity, free.velocity)
-    assert np.array_equal(joined.impulse, free.impulse)
-    assert joined.iterations == free.iterations
+    # Sweeps take bodies for what they are, and round otherwise; velocities add up along the column.
+    assert_within(joined.velocity, free.velocity, 8 * accuracy)
+    assert_within(joined.impulse, free.impulse, 8 * 4 * 3 * accuracy)
 
 
 def test_body_that_cannot_move_acts_like_a_wall(solve: Solve) -> None:
     free = problem([(0.2, 0.1, -3)], [2], [(0, WALL, UP, 0.01)])
-    on_wall, _ = solve(free)
+    on_wall, accuracy = solve(free)
     given = problem([(0.2, 0.1, -3), (0, 0, 0), (0, 0, 0)], [2, 1, 1], [(0, 1, UP, 0.01)])
     given = in_bodies(given, [(0, 0, 1), (0, 0, 0), (1, 0, 0)], [(1, 2)])
     given.bodies.inverse_mass[:] = 0
     given.bodies.inverse_inertia[:] = 0
     on_body, _ = solve(given)
-    assert np.array_equal(on_body.velocity[0], on_wall.velocity[0])
+    # Sweeps round bodies otherwise than spheres.
+    assert_within(on_body.velocity[0], on_wall.velocity[0], 2 * accuracy)
     assert np.array_equal(on_body.velocity[1:], np.zeros((2, 3)))
-    assert np.array_equal(on_body.impulse, on_wall.impulse)
+    assert_within(on_body.impulse, on_wall.impulse, 2 * 2 * accuracy)
 
 
 def test_seesaw_hands_the_motion_on(solve: Solve) -> None:
@@ -504,5 +505,8 @@ SINGLE_CONTACTS = {
 def test_single_contact_takes_as_long_whatever_the_shape(given: Problem) -> None:
     # Divided by the mobility of its particles it is always the same problem, except for rounding
     # where an iteration ends at the tolerance.
-    free = problem([(0, 0, -1)], [1], [(0, WALL, UP, 0)]).project(TOLERANCE)
-    assert abs(given.project(TOLERANCE).iterations - free.iterations) <= 1
+    free = problem([(0, 0, -1)], [1], [(0, WALL, UP, 0)]).project(TOLERANCE, solver="apgd")
+    assert abs(given.project(TOLERANCE, solver="apgd").iterations - free.iterations) <= 1
+    # Sweeps solve it at once. A second one shows it, and at most three searches do so in turn,
+    # since single precision does not reach the tolerance.
+    assert given.project(TOLERANCE, solver="sweeps").iterations <= 3 * 3

@@ -57,7 +57,7 @@ def given(request: pytest.FixtureRequest) -> Problem:
     return request.param
 
 
-@pytest.fixture(params=["apgd", "uzawa"])
+@pytest.fixture(params=["sweeps", "apgd", "uzawa"])
 def solver(request: pytest.FixtureRequest) -> core.Solver:
     return request.param
 

@@ -90,7 +90,7 @@ def test_impulses_of_an_interior_point_method(name: str) -> None:
     assert_within(projection.impulse, impulse, 10 * TOLERANCE * pressed.sum() / softest)
 
 
-@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+@pytest.mark.parametrize("solver", ["sweeps", "apgd", "uzawa"])
 @pytest.mark.parametrize("name", ["overlapping 0", "dense crystal", "mixed, frozen 0"])
 def test_springs(name: str, solver: core.Solver) -> None:
     """Every other contact is a spring, soft or stiff; their impulses are unique."""
@@ -113,7 +113,7 @@ def test_springs(name: str, solver: core.Solver) -> None:
 
 @pytest.mark.parametrize(
     ("name", "solver"),
-    [(name, "apgd") for name in PROBLEMS]
+    [(name, solver) for name in PROBLEMS for solver in ("sweeps", "apgd")]
     + [(name, "uzawa") for name in ("overlapping 0", "mixed, frozen 0")],
 )
 def test_contacts_that_pull(name: str, solver: core.Solver) -> None:

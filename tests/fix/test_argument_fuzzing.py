@@ -118,7 +118,7 @@ NO_COUNT = ["0", "-5", "1.5", "1e5", "x", "nan", "99999999999999999999", "v_x", 
 RIGHT = {
     "region": ["container", "container lid", "lid container"],
     "law": ["inelastic", "gluey", "gluey limit 0.5", "restitution 0", "restitution 1"],
-    "solver": ["apgd", "uzawa"],
+    "solver": ["sweeps", "apgd", "uzawa"],
     "accuracy": ["1e-3", "1", "1e-9"],
     "maxiter": ["1000", "100000", "1000 warn", "2147483648"],
     "frozen": ["still"],

@@ -131,8 +131,16 @@ def test_grains_that_attract_one_another_slide(
     name: str, weights: float, speed: float, ranks: int, tmp_path: Path, lmp: Runner
 ) -> None:
     """On a floor, at a velocity in g h along the line of their centres and across it."""
+    solver = ""
+    if (name, weights) == ("dimers", 1e4):
+        # They lie side by side in an unstable equilibrium: raising one end of each by 1e-7
+        # diameters makes them roll over one another and leave the floor, with either solver. The
+        # iterations of apgd treat both ends alike, to the last bit.
+        solver = " solver apgd"
     velocity = speed * KICK * np.array([0.6, 0, 0.8])
-    steps = moved(CLUSTERS[name], [0, RADIUS, 0], velocity, weights, 400, tmp_path, lmp, ranks)
+    options = f"region floor{solver}"
+    at = [0, RADIUS, 0]
+    steps = moved(CLUSTERS[name], at, velocity, weights, 400, tmp_path, lmp, ranks, options=options)
     mean = steps[:, :, 3:].mean(axis=1)
     # In each step what they attract one another with is added, and taken away, to round-off.
     assert mean[:, [0, 2]] == pytest.approx(

@@ -34,7 +34,7 @@ from tests.helpers.scenes import (
 )
 
 RADIUS = 0.5
-SOLVERS = ("apgd", "uzawa")
+SOLVERS = ("sweeps", "apgd", "uzawa")
 # Tolerances a step, tolerance [diameters], time step.
 SPEEDS = (1e-3, 1e-2, 0.3, 1.0, 30.0, 1e3)
 TOLERANCES = (1e-2, 1e-5, 1e-8)

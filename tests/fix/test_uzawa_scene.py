@@ -91,7 +91,7 @@ def scene(folder: Path, solver: str) -> str:
     )
 
 
-@pytest.mark.parametrize("solver", ["apgd", "uzawa"])
+@pytest.mark.parametrize("solver", ["sweeps", "apgd", "uzawa"])
 def test_flat_walls_that_move(solver: str, tmp_path: Path, lmp: Runner) -> None:
     """Free spheres overlap one another and flat walls by at most EPS, after a new start, too."""
     deck = scene(tmp_path, solver) + DUMP_PARTICLES

@@ -96,7 +96,7 @@ class Problem:
         self,
         tolerance: float,
         *,
-        solver: core.Solver = "apgd",
+        solver: core.Solver = "sweeps",
         accuracy: float = 0.0,
         max_iterations: int = 100_000,
         **contacts: Any,

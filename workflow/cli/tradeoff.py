@@ -62,7 +62,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     )
     add("--dts", "0.01", "LIST", "longest time steps of hard contacts (default: {default})")
     solvers = ", ".join(rules["solver"].words)
-    add("--solvers", "apgd", "LIST", f"of hard contacts: {solvers} (default: {{default}})")
+    add("--solvers", "sweeps", "LIST", f"of hard contacts: {solvers} (default: {{default}})")
     add("--ranks", "1", "LIST", "MPI ranks; all is run with each number (default: {default})")
     add("--time", "3", "T", "time from the start to the end of a run (default: {default})")
     which = tradeoff.add_mutually_exclusive_group()

@@ -242,7 +242,7 @@ def errors(
 
 
 def timed(
-    problem: core.Problem, limits: core.Limits, solver: core.Solver = "apgd"
+    problem: core.Problem, limits: core.Limits, solver: core.Solver = "sweeps"
 ) -> tuple[core.Projection, float]:
     """Return a solution, and the median time [s] of three solves; of fewer where they take long."""
     long = 1.0  # second

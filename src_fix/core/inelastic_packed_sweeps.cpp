@@ -1,0 +1,713 @@
+#include "inelastic_packed_sweeps.h"
+
+#include "inelastic_vector3.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+
+namespace inelastic {
+
+namespace {
+
+  // As many colours as a mask has bits; constraints of the last one have a group each.
+  constexpr int COLOURS = 64, LAST = COLOURS - 1;
+
+  // At most so many lanes for each constraint, beside a group for each colour.
+  constexpr std::size_t MOST_LANES = 2;
+
+  // As in inelastic_packed_iterations.cpp.
+  constexpr std::size_t FEW = 10;
+  constexpr float IDLE_GAP = 5.0f;
+
+  template <typename Group> constexpr bool HAS_BODIES = std::is_same_v<Group, swept::BodyGroup>;
+
+  // Writes L by columns, the lower triangle with L L^T = A, of an inverse inertia A (xx yy zz xy xz
+  // yz). Where impulses do not turn the body about some axis, the column that is left over is 0.
+  void find_root(const double *a, double scale, double *l)
+  {
+    // Below it a diagonal entry is round-off of the others.
+    constexpr double NOTHING = 1.0e-12;
+    const double least = NOTHING * (a[0] + a[1] + a[2]);
+    std::fill(l, l + 9, 0.0);
+    if (a[0] > least) {
+      l[0] = std::sqrt(a[0]);
+      l[1] = a[3] / l[0];
+      l[2] = a[4] / l[0];
+    }
+    const double second = a[1] - l[1] * l[1];
+    if (second > least) {
+      l[4] = std::sqrt(second);
+      l[5] = (a[5] - l[1] * l[2]) / l[4];
+    }
+    const double third = a[2] - l[2] * l[2] - l[5] * l[5];
+    if (third > least) l[8] = std::sqrt(third);
+    for (int k = 0; k < 9; ++k) l[k] *= scale;
+  }
+
+}    // namespace
+
+template <typename Group> void PackedSweeps<Group>::Packed::clear()
+{
+  groups.clear();
+  rest.clear();
+  colour_end.clear();
+}
+
+template <typename Group>
+bool PackedSweeps<Group>::prepare(const ContactProblem &problem,
+                                  const std::vector<double> &diagonal,
+                                  const std::vector<double> &gap, double idle_gap,
+                                  const Scales &scales, const ContactTargets &targets,
+                                  const std::vector<double> &change, double tolerance, Host &host)
+{
+  const ContactSet &contacts = problem.contacts;
+  idle_gap_ = static_cast<float>(idle_gap / scales.length);
+  start_ = contacts.impulse;
+  of_impulses_ = contacts.set;
+  mobility_unit_ = problem.timestep * (scales.impulse / scales.length);
+  find_movers(problem);
+  std::vector<std::size_t> near, far;
+  for (std::size_t c = 0; c < gap.size(); ++c)
+    (of_impulses_[c].is_loaded(start_[c]) || !(gap[c] > idle_gap) ? near : far).push_back(c);
+  has_ghosts_ = host.has_ghosts();
+  if (has_ghosts_) find_shared(problem, near, diagonal, host);
+
+  working_.clear();
+  idle_.clear();
+  std::vector<int> first, second;
+  for (const std::size_t c : near) {
+    first.push_back(mover_[contacts.first[c]]);
+    second.push_back(mover_[contacts.second[c]]);
+  }
+  std::vector<std::size_t> places;
+  const std::size_t lanes = colour(first, second, working_, places);
+  for (std::size_t k = 0; k < near.size(); ++k)
+    write(problem, near[k], diagonal, gap, scales, targets, working_, places[k]);
+  add_groups(idle_, (far.size() + WIDTH - 1) / WIDTH);
+  for (std::size_t k = 0; k < far.size(); ++k)
+    write(problem, far[k], diagonal, gap, scales, targets, idle_, k);
+
+  states_.assign(static_cast<std::size_t>(movers_) + 1, State{});
+  before_ = states_;
+  sum_.assign(problem.slots(), Vector{});
+  own_ = sum_;
+  list_shared();
+  targets_.begin(problem, scales, targets, change, tolerance);
+  set_targets();
+  return lanes <= MOST_LANES * near.size() + COLOURS * WIDTH;
+}
+
+// Numbers what moves: slots, or bodies and the particles that are in none. One mover more stands
+// for the lanes that are empty.
+template <typename Group> void PackedSweeps<Group>::find_movers(const ContactProblem &problem)
+{
+  const int slots = problem.slots();
+  mover_.resize(slots);
+  movers_ = slots;
+  for (int i = 0; i < slots; ++i) mover_[i] = i;
+  if constexpr (HAS_BODIES<Group>) {
+    const RigidBodies &bodies = problem.bodies;
+    movers_ = static_cast<int>(bodies.size());
+    for (int i = 0; i < slots; ++i) mover_[i] = problem.is_member(i) ? bodies.body[i] : movers_++;
+  }
+  mobility_.assign(movers_, 0.0f);
+  moves_.assign(movers_, 0);
+  for (int i = 0; i < slots; ++i) {
+    const double inverse_mass = problem.is_member(i)
+        ? problem.bodies.inverse_mass[problem.bodies.body[i]]
+        : problem.inverse_mass[i];
+    mobility_[mover_[i]] = static_cast<float>(inverse_mass * mobility_unit_);
+    moves_[mover_[i]] = problem.is_mobile(i);
+  }
+  is_copy_.assign(slots, 0);
+  if constexpr (HAS_BODIES<Group>) find_bodies(problem.bodies);
+}
+
+template <typename Group> void PackedSweeps<Group>::find_bodies(const RigidBodies &bodies)
+{
+  spin_root_.resize(9 * bodies.size());
+  arm_.assign(3 * mover_.size(), 0.0);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    find_root(&bodies.inverse_inertia[6 * b], std::sqrt(mobility_unit_), &spin_root_[9 * b]);
+    for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) {
+      const std::size_t slot = bodies.member[k];
+      is_copy_[slot] = k >= bodies.start[b] + bodies.originals[b];
+      std::copy_n(&bodies.arm[3 * static_cast<std::size_t>(k)], 3, &arm_[3 * slot]);
+    }
+  }
+}
+
+// Returns what a unit impulse of a constraint adds to its own gap through one of its sides.
+template <typename Group>
+double PackedSweeps<Group>::mobility_of(const ContactProblem &problem, std::size_t c,
+                                        int slot) const
+{ return problem.timestep * problem.mobility(slot, &problem.contacts.normal[3 * c]); }
+
+// Finds the movers that other ranks have constraints of, and what from_other_ranks needs of them:
+// of particles sums of n n^T over these constraints, of bodies sums of the roots of mobilities.
+// Collective.
+template <typename Group>
+void PackedSweeps<Group>::find_shared(const ContactProblem &problem,
+                                      const std::vector<std::size_t> &working,
+                                      const std::vector<double> &diagonal, Host &host)
+{
+  const ContactSet &contacts = problem.contacts;
+  const std::size_t slots = mover_.size();
+  constexpr std::size_t NUMBERS = HAS_BODIES<Group> ? 2 : 7;
+  // The first number counts constraints, the others are of the working ones.
+  std::vector<double> mine(NUMBERS * slots, 0.0);
+  for (std::size_t c = 0; c < diagonal.size(); ++c)
+    for (const int slot : {contacts.first[c], contacts.second[c]}) mine[NUMBERS * slot] += 1.0;
+  for (const std::size_t c : working) {
+    const double *const n = &contacts.normal[3 * c];
+    for (const int slot : {contacts.first[c], contacts.second[c]}) {
+      double *const sums = &mine[NUMBERS * slot + 1];
+      if constexpr (HAS_BODIES<Group>) {
+        sums[0] += std::sqrt(mobility_of(problem, c, slot));
+      } else {
+        const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+        for (int k = 0; k < 6; ++k) sums[k] += n[row[k]] * n[column[k]];
+      }
+    }
+  }
+  std::vector<double> all = mine;
+  std::vector<double> three(3 * slots);
+  for (std::size_t from = 0; from < NUMBERS; from += 3) {
+    const std::size_t count = std::min<std::size_t>(3, NUMBERS - from);
+    for (std::size_t i = 0; i < slots; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        three[3 * i + k] = k < count ? mine[NUMBERS * i + from + k] : 0.0;
+    host.sum_over_ghosts(three.data());
+    for (std::size_t i = 0; i < slots; ++i)
+      for (std::size_t k = 0; k < count; ++k) all[NUMBERS * i + from + k] = three[3 * i + k];
+  }
+  shared_.assign(movers_, 0);
+  of_others_.assign((NUMBERS - 1) * static_cast<std::size_t>(movers_), 0.0f);
+  for (std::size_t i = 0; i < slots; ++i) {
+    const std::size_t m = mover_[i];
+    if (problem.is_wall(static_cast<int>(i)) || !moves_[m]) continue;
+    const double *const own = &mine[NUMBERS * i], *const total = &all[NUMBERS * i];
+    if (total[0] > own[0] + 0.5) shared_[m] = 1;
+    for (std::size_t k = 1; k < NUMBERS; ++k)
+      of_others_[(NUMBERS - 1) * m + k - 1] +=
+          static_cast<float>((is_copy_[i] ? 0.0 : total[k]) - own[k]);
+  }
+}
+
+// Returns the bound of the sum of |A_cd| over the constraints d of other ranks [time / mass].
+template <typename Group>
+double PackedSweeps<Group>::from_other_ranks(const ContactProblem &problem, std::size_t c) const
+{
+  double sum = 0.0;
+  for (const int slot : {problem.contacts.first[c], problem.contacts.second[c]}) {
+    const std::size_t m = mover_[slot];
+    if (!moves_[m] || !shared_[m]) continue;
+    const double mobility = mobility_of(problem, c, slot);
+    if constexpr (HAS_BODIES<Group>) {
+      sum += std::sqrt(mobility) * std::max(0.0f, of_others_[m]);
+    } else {
+      // By the inequality of Cauchy and Schwarz: (sum |n . n_d|)^2 <= count sum (n . n_d)^2.
+      const float *const t = &of_others_[6 * m];
+      const double *const n = &problem.contacts.normal[3 * c];
+      const double squares = t[0] * n[0] * n[0] + t[1] * n[1] * n[1] + t[2] * n[2] * n[2] +
+          2.0 * (t[3] * n[0] * n[1] + t[4] * n[0] * n[2] + t[5] * n[1] * n[2]);
+      const double count = t[0] + t[1] + t[2];
+      sum += mobility * std::sqrt(std::max(0.0, count * squares));
+    }
+  }
+  return sum;
+}
+
+// Adds groups of empty lanes.
+template <typename Group>
+void PackedSweeps<Group>::add_groups(Packed &packed, std::size_t count) const
+{
+  const std::size_t from = packed.lanes();
+  packed.groups.resize(packed.groups.size() + count);
+  packed.rest.resize(packed.groups.size());
+  for (std::size_t place = from; place < packed.lanes(); ++place) clear_lane(packed, place);
+}
+
+template <typename Group>
+void PackedSweeps<Group>::clear_lane(Packed &packed, std::size_t place) const
+{
+  Group &group = packed.groups[place / WIDTH];
+  Rest &rest = packed.rest[place / WIDTH];
+  const int lane = static_cast<int>(place % WIDTH);
+  group.first[lane] = group.second[lane] = static_cast<std::uint32_t>(movers_ * sizeof(State));
+  for (swept::Eight *const numbers :
+       {&group.give, &group.least, &group.now, &group.before, &group.inverse_target})
+    (*numbers)[lane] = 0.0f;
+  group.gap[lane] = 1.0f;
+  if constexpr (HAS_BODIES<Group>) {
+    group.first_row[lane] = group.second_row[lane] = swept::Eight{};
+  } else {
+    for (int d = 0; d < 4; ++d) group.row[lane % 4][4 * (lane / 4) + d] = 0.0f;
+    group.first_mobility[lane] = group.second_mobility[lane] = 0.0f;
+  }
+  rest.source[lane] = NONE;
+  rest.first[lane] = rest.second[lane] = 0;
+  rest.root[lane] = rest.least_target[lane] = rest.part[lane] = 0.0f;
+}
+
+// Colours constraints, given by the movers of both sides, and adds groups for them. `places` gets
+// the place of each. Returns how many lanes were added.
+template <typename Group>
+std::size_t PackedSweeps<Group>::colour(const std::vector<int> &first,
+                                        const std::vector<int> &second, Packed &packed,
+                                        std::vector<std::size_t> &places)
+{
+  std::vector<std::uint64_t> taken(movers_, 0);
+  std::vector<unsigned char> colours(first.size());
+  std::size_t counts[COLOURS] = {};
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    const bool one = moves_[first[k]], other = moves_[second[k]];
+    const std::uint64_t both = (one ? taken[first[k]] : 0) | (other ? taken[second[k]] : 0);
+    const int colour = ~both == 0 ? LAST : std::min(LAST, __builtin_ctzll(~both));
+    colours[k] = static_cast<unsigned char>(colour);
+    ++counts[colour];
+    const std::uint64_t bit = colour == LAST ? 0 : std::uint64_t{1} << colour;
+    if (one) taken[first[k]] |= bit;
+    if (other) taken[second[k]] |= bit;
+  }
+  std::size_t next[COLOURS];
+  const std::size_t from = packed.lanes();
+  for (int colour = 0; colour < COLOURS; ++colour) {
+    if (counts[colour] == 0) continue;
+    next[colour] = packed.lanes();
+    if (colour < LAST) {
+      add_groups(packed, (counts[colour] + WIDTH - 1) / WIDTH);
+      packed.colour_end.push_back(packed.groups.size());
+    }
+    for (std::size_t k = 0; colour == LAST && k < counts[colour]; ++k) {
+      add_groups(packed, 1);
+      packed.colour_end.push_back(packed.groups.size());
+    }
+  }
+  places.resize(first.size());
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    places[k] = next[colours[k]];
+    next[colours[k]] += colours[k] == LAST ? WIDTH : 1;
+  }
+  return packed.lanes() - from;
+}
+
+template <typename Group>
+void PackedSweeps<Group>::write(const ContactProblem &problem, std::size_t c,
+                                const std::vector<double> &diagonal, const std::vector<double> &gap,
+                                const Scales &scales, const ContactTargets &targets, Packed &packed,
+                                std::size_t place) const
+{
+  const ContactSet &contacts = problem.contacts;
+  Group &group = packed.groups[place / WIDTH];
+  Rest &rest = packed.rest[place / WIDTH];
+  const int lane = static_cast<int>(place % WIDTH);
+  const double per_length = 1.0 / scales.length;
+  const double unit = scales.impulse / scales.length;
+  const double whole = diagonal[c] + (has_ghosts_ ? from_other_ranks(problem, c) : 0.0);
+  const double root = std::sqrt(whole * unit);
+  const int first = mover_[contacts.first[c]], second = mover_[contacts.second[c]];
+  group.first[lane] = static_cast<std::uint32_t>(first * sizeof(State));
+  group.second[lane] = static_cast<std::uint32_t>(second * sizeof(State));
+  group.gap[lane] = static_cast<float>(gap[c] * per_length / root);
+  group.give[lane] = static_cast<float>(contacts.compliance[c] / whole);
+  group.least[lane] = static_cast<float>(contacts.set[c].changes_of(contacts.impulse[c]).least /
+                                         scales.impulse * root);
+  write_rows(problem, c, root, group, lane);
+  rest.source[lane] = c;
+  rest.first[lane] = contacts.first[c];
+  rest.second[lane] = contacts.second[c];
+  rest.root[lane] = static_cast<float>(root);
+  rest.least_target[lane] = static_cast<float>(targets.least()[c] * per_length);
+  rest.part[lane] = static_cast<float>(targets.part()[c]);
+}
+
+template <typename Group>
+void PackedSweeps<Group>::write_rows(const ContactProblem &problem, std::size_t c, double root,
+                                     Group &group, int lane) const
+{
+  const ContactSet &contacts = problem.contacts;
+  const double *const n = &contacts.normal[3 * c];
+  if constexpr (!HAS_BODIES<Group>) {
+    for (int d = 0; d < 3; ++d)
+      group.row[lane % 4][4 * (lane / 4) + d] = static_cast<float>(n[d] / root);
+    group.first_mobility[lane] = mobility_[contacts.first[c]];
+    group.second_mobility[lane] = mobility_[contacts.second[c]];
+  } else {
+    for (const bool is_first : {true, false}) {
+      const int slot = is_first ? contacts.first[c] : contacts.second[c];
+      swept::Eight &row = is_first ? group.first_row[lane] : group.second_row[lane];
+      row = swept::Eight{};
+      if (!problem.is_mobile(slot)) continue;
+      const double by = (is_first ? 1.0 : -1.0) / root;
+      const double slide = by * std::sqrt(static_cast<double>(mobility_[mover_[slot]]));
+      for (int d = 0; d < 3; ++d) row[d] = static_cast<float>(slide * n[d]);
+      if (!problem.is_member(slot)) continue;
+      double moment[3];
+      cross(&arm_[3 * static_cast<std::size_t>(slot)], n, moment);
+      const double *const l = &spin_root_[9 * static_cast<std::size_t>(mover_[slot])];
+      for (int d = 0; d < 3; ++d) row[4 + d] = static_cast<float>(by * dot(l + 3 * d, moment));
+    }
+  }
+}
+
+template <typename Group>
+void PackedSweeps<Group>::copy(const Packed &from, std::size_t source, Packed &to,
+                               std::size_t place)
+{
+  const Group &a = from.groups[source / WIDTH];
+  const Rest &rest_a = from.rest[source / WIDTH];
+  Group &b = to.groups[place / WIDTH];
+  Rest &rest_b = to.rest[place / WIDTH];
+  const int i = static_cast<int>(source % WIDTH), j = static_cast<int>(place % WIDTH);
+  b.first[j] = a.first[i];
+  b.second[j] = a.second[i];
+  b.gap[j] = a.gap[i];
+  b.give[j] = a.give[i];
+  b.least[j] = a.least[i];
+  b.now[j] = a.now[i];
+  b.before[j] = a.before[i];
+  b.inverse_target[j] = a.inverse_target[i];
+  if constexpr (HAS_BODIES<Group>) {
+    b.first_row[j] = a.first_row[i];
+    b.second_row[j] = a.second_row[i];
+  } else {
+    for (int d = 0; d < 4; ++d) b.row[j % 4][4 * (j / 4) + d] = a.row[i % 4][4 * (i / 4) + d];
+    b.first_mobility[j] = a.first_mobility[i];
+    b.second_mobility[j] = a.second_mobility[i];
+  }
+  rest_b.source[j] = rest_a.source[i];
+  rest_b.first[j] = rest_a.first[i];
+  rest_b.second[j] = rest_a.second[i];
+  rest_b.root[j] = rest_a.root[i];
+  rest_b.least_target[j] = rest_a.least_target[i];
+  rest_b.part[j] = rest_a.part[i];
+}
+
+template <typename Group>
+swept::Swept PackedSweeps<Group>::sweep(double along, double blur, Host &host)
+{
+  const auto by = static_cast<float>(along);
+  swept::lead_on(states_, before_, by);
+  if (has_ghosts_)
+    for (std::size_t k = 0; k < shared_lanes_.size(); ++k) {
+      const Group &group = working_.groups[shared_lanes_[k] / WIDTH];
+      const auto lane = shared_lanes_[k] % WIDTH;
+      led_[k] = group.now[lane] + by * (group.now[lane] - group.before[lane]);
+    }
+  const swept::Swept swept =
+      swept::sweep(working_.groups, states_.data(), by, static_cast<float>(blur));
+  if (has_ghosts_) {
+    for (std::size_t k = 0; k < shared_lanes_.size(); ++k)
+      led_[k] = working_.groups[shared_lanes_[k] / WIDTH].now[shared_lanes_[k] % WIDTH] - led_[k];
+    exchange(led_, states_, host);
+  }
+  return swept;
+}
+
+// Lists the working constraints of movers that other ranks have constraints of.
+template <typename Group> void PackedSweeps<Group>::list_shared()
+{
+  shared_lanes_.clear();
+  if (!has_ghosts_) return;
+  const auto is_shared = [this](int slot) {
+    return moves_[mover_[slot]] && shared_[mover_[slot]];
+  };
+  for (std::size_t place = 0; place < working_.lanes(); ++place) {
+    if (working_.is_empty(place)) continue;
+    const Rest &rest = working_.rest[place / WIDTH];
+    const auto lane = place % WIDTH;
+    if (is_shared(rest.first[lane]) || is_shared(rest.second[lane])) shared_lanes_.push_back(place);
+  }
+  led_.resize(shared_lanes_.size());
+}
+
+// Adds a change of the impulse of a constraint, in scaled units, to the sums of its slots, in
+// packed units.
+template <typename Group>
+void PackedSweeps<Group>::add_impulses_to(std::vector<Vector> &sums, const Group &group,
+                                          const Rest &rest, int lane, float change) const
+{
+  if constexpr (HAS_BODIES<Group>) {
+    for (const bool is_first : {true, false}) {
+      const int slot = is_first ? rest.first[lane] : rest.second[lane];
+      if (!moves_[mover_[slot]]) continue;
+      const swept::Eight &row = is_first ? group.first_row[lane] : group.second_row[lane];
+      const float by = change / std::sqrt(mobility_[mover_[slot]]);
+      for (int d = 0; d < 3; ++d) sums[slot].lanes[d] += by * row[d];
+    }
+  } else {
+    for (int d = 0; d < 3; ++d) {
+      const float push = change * group.row[lane % 4][4 * (lane / 4) + d];
+      sums[rest.first[lane]].lanes[d] += push;
+      sums[rest.second[lane]].lanes[d] -= push;
+    }
+  }
+}
+
+// Adds to the states of shared movers what the impulses of all ranks, sum_, make of them, less
+// those of this rank, own_.
+template <typename Group> void PackedSweeps<Group>::give_to_states(std::vector<State> &states) const
+{
+  for (std::size_t i = 0; i < mover_.size(); ++i) {
+    const std::size_t m = mover_[i];
+    if (!moves_[m] || !shared_[m]) continue;
+    const typename Vector::Lanes push =
+        (is_copy_[i] ? typename Vector::Lanes{} : sum_[i].lanes) - own_[i].lanes;
+    if constexpr (HAS_BODIES<Group>) {
+      const float slide = std::sqrt(mobility_[m]);
+      swept::Eight &state = states[m].lanes;
+      for (int d = 0; d < 3; ++d) state[d] += slide * push[d];
+      if (9 * m >= spin_root_.size()) continue;
+      const double s[3] = {push[0], push[1], push[2]};
+      double moment[3];
+      cross(&arm_[3 * i], s, moment);
+      for (int d = 0; d < 3; ++d)
+        state[4 + d] += static_cast<float>(dot(&spin_root_[9 * m + 3 * d], moment));
+    } else {
+      states[m].lanes += mobility_[m] * push;
+    }
+  }
+}
+
+// Adds to the states what other ranks make of them by changes of the impulses of their constraints;
+// `change` are those of this rank's, one for each of shared_lanes_.
+template <typename Group>
+void PackedSweeps<Group>::exchange(const std::vector<float> &change, std::vector<State> &states,
+                                   Host &host)
+{
+  std::fill(sum_.begin(), sum_.end(), Vector{});
+  for (std::size_t k = 0; k < shared_lanes_.size(); ++k) {
+    const std::size_t g = shared_lanes_[k] / WIDTH;
+    const int lane = static_cast<int>(shared_lanes_[k] % WIDTH);
+    add_impulses_to(sum_, working_.groups[g], working_.rest[g], lane, change[k]);
+  }
+  own_ = sum_;
+  host.sum_over_chosen_ghosts(reinterpret_cast<float *>(sum_.data()));
+  give_to_states(states);
+}
+
+template <typename Group> void PackedSweeps<Group>::refresh(Host &host)
+{
+  for (const swept::When when : {swept::When::NOW, swept::When::BEFORE}) {
+    const bool now = when == swept::When::NOW;
+    std::vector<State> &states = now ? states_ : before_;
+    std::fill(states.begin(), states.end(), State{});
+    swept::add_impulses(working_.groups, when, states.data());
+    if (!has_ghosts_) continue;
+    for (std::size_t k = 0; k < shared_lanes_.size(); ++k) {
+      const Group &group = working_.groups[shared_lanes_[k] / WIDTH];
+      const swept::Eight &impulse = now ? group.now : group.before;
+      led_[k] = impulse[shared_lanes_[k] % WIDTH];
+    }
+    exchange(led_, states, host);
+  }
+}
+
+// Returns the change of velocity of each slot.
+template <typename Group>
+const std::vector<typename PackedSweeps<Group>::Vector> &PackedSweeps<Group>::velocities()
+{
+  velocity_.resize(mover_.size());
+  for (std::size_t i = 0; i < mover_.size(); ++i) {
+    const std::size_t m = mover_[i];
+    if constexpr (HAS_BODIES<Group>) {
+      const swept::Eight &state = states_[m].lanes;
+      const double slide = std::sqrt(static_cast<double>(mobility_[m]));
+      double v[3] = {slide * state[0], slide * state[1], slide * state[2]};
+      if (9 * m < spin_root_.size()) {
+        const double *const l = &spin_root_[9 * m];
+        double spin[3], turning[3];
+        for (int d = 0; d < 3; ++d)
+          spin[d] = l[d] * state[4] + l[3 + d] * state[5] + l[6 + d] * state[6];
+        cross(spin, &arm_[3 * i], turning);
+        for (int d = 0; d < 3; ++d) v[d] += turning[d];
+      }
+      velocity_[i].lanes = typename Vector::Lanes{
+          static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), 0.0f};
+    } else {
+      velocity_[i].lanes = states_[m].lanes;
+    }
+  }
+  return velocity_;
+}
+
+template <typename Group> bool PackedSweeps<Group>::sets_targets(long sweep)
+{
+  // True for the numbers at which an eighth more than a power of two, or of that, is reached.
+  constexpr int IN_EIGHTHS = 3;
+  if (sweep < 2) return false;
+  int below = 0;
+  while ((sweep >> (below + 1)) > 0) ++below;
+  const long every = below > IN_EIGHTHS ? 1L << (below - IN_EIGHTHS) : 2;
+  return sweep % every == 0;
+}
+
+template <typename Group> void PackedSweeps<Group>::set_targets()
+{
+  targets_.set(velocities());
+  for (Packed *const some : {&working_, &idle_})
+    for (std::size_t g = 0; g < some->groups.size(); ++g) {
+      const Rest &rest = some->rest[g];
+      for (int lane = 0; lane < WIDTH; ++lane)
+        if (rest.source[lane] != NONE)
+          some->groups[g].inverse_target[lane] = rest.root[lane] /
+              targets_.target(rest.first[lane], rest.second[lane], rest.least_target[lane],
+                              rest.part[lane]);
+    }
+}
+
+template <typename Group> void PackedSweeps<Group>::keep_velocities()
+{ targets_.keep(velocities()); }
+
+template <typename Group> double PackedSweeps<Group>::moved_since_kept(double accuracy)
+{
+  targets_.compare(velocities());
+  float most = 0.0f;
+  for (std::size_t g = 0; g < working_.groups.size(); ++g) {
+    const Group &group = working_.groups[g];
+    const Rest &rest = working_.rest[g];
+    for (int lane = 0; lane < WIDTH; ++lane) {
+      if (!(group.now[lane] > group.least[lane])) continue;
+      const int i = rest.first[lane], j = rest.second[lane];
+      most = std::max(most,
+                      targets_.moved(i, j) /
+                          targets_.free_target(i, j, rest.least_target[lane], rest.part[lane]));
+    }
+  }
+  return accuracy * static_cast<double>(most);
+}
+
+template <typename Group> void PackedSweeps<Group>::look_at_idle(double least_idle_gap)
+{
+  set_idle(least_idle_gap);
+  looked_.resize(idle_.groups.size());
+  swept::find_gaps(idle_.groups, states_.data(), looked_.data());
+  std::vector<std::size_t> near;
+  for (std::size_t place = 0; place < idle_.lanes(); ++place)
+    if (!idle_.is_empty(place) && !(looked_gap(idle_, place) > idle_gap_)) near.push_back(place);
+  wake(near);
+}
+
+// Returns a gap that was looked at last, as a length in packed units.
+template <typename Group>
+float PackedSweeps<Group>::looked_gap(const Packed &packed, std::size_t place) const
+{
+  return looked_[place / WIDTH].lanes[place % WIDTH] *
+      packed.rest[place / WIDTH].root[place % WIDTH];
+}
+
+template <typename Group>
+void PackedSweeps<Group>::join(const std::vector<double> &gap, const Scales &scales)
+{
+  std::vector<std::size_t> near;
+  for (std::size_t place = 0; place < idle_.lanes(); ++place)
+    if (!idle_.is_empty(place) &&
+        !(gap[idle_.rest[place / WIDTH].source[place % WIDTH]] / scales.length > idle_gap_))
+      near.push_back(place);
+  wake(near);
+}
+
+// Makes idle constraints working, given by their places in ascending order.
+template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::size_t> &near)
+{
+  if (near.empty()) return;
+  std::vector<int> first, second;
+  for (const std::size_t place : near) {
+    first.push_back(mover_[idle_.rest[place / WIDTH].first[place % WIDTH]]);
+    second.push_back(mover_[idle_.rest[place / WIDTH].second[place % WIDTH]]);
+  }
+  std::vector<std::size_t> places;
+  colour(first, second, working_, places);
+  for (std::size_t k = 0; k < near.size(); ++k) copy(idle_, near[k], working_, places[k]);
+  std::size_t kept = near.front();
+  auto next = near.begin();
+  for (std::size_t place = kept; place < idle_.lanes(); ++place) {
+    if (next != near.end() && *next == place)
+      ++next;
+    else if (!idle_.is_empty(place))
+      copy(idle_, place, idle_, kept++);
+  }
+  const std::size_t groups = (kept + WIDTH - 1) / WIDTH;
+  idle_.groups.resize(groups);
+  idle_.rest.resize(groups);
+  for (std::size_t place = kept; place < idle_.lanes(); ++place) clear_lane(idle_, place);
+  list_shared();
+}
+
+// Sets the gap above which a constraint without an impulse is idle: by the present residual, or
+// `least_idle_gap` where that is more. Makes working constraints idle that have no impulse and are
+// far from closed; the others move up within their colour.
+template <typename Group> void PackedSweeps<Group>::set_idle(double least_idle_gap)
+{
+  looked_.resize(working_.groups.size());
+  swept::find_gaps(working_.groups, states_.data(), looked_.data());
+  float residual = 0.0f;
+  std::vector<std::size_t> without;    // an impulse
+  std::size_t constraints = 0;
+  for (std::size_t place = 0; place < working_.lanes(); ++place) {
+    if (working_.is_empty(place)) continue;
+    ++constraints;
+    const Group &group = working_.groups[place / WIDTH];
+    const auto lane = place % WIDTH;
+    const float gap = looked_gap(working_, place);
+    const bool is_loaded = group.now[lane] > group.least[lane];
+    residual = std::max(residual, is_loaded ? std::abs(gap) : -gap);
+    if (!is_loaded && group.now[lane] == 0.0f && group.before[lane] == 0.0f &&
+        !of_impulses_[working_.rest[place / WIDTH].source[lane]].may_pull())
+      without.push_back(place);
+  }
+  idle_gap_ = std::max(static_cast<float>(least_idle_gap), IDLE_GAP * residual);
+  std::vector<std::size_t> far;
+  for (const std::size_t place : without)
+    if (looked_gap(working_, place) > idle_gap_) far.push_back(place);
+  if (far.size() <= constraints / FEW) return;
+  std::size_t idle = idle_.lanes();
+  while (idle > 0 && idle_.is_empty(idle - 1)) --idle;
+  add_groups(idle_, (idle + far.size() + WIDTH - 1) / WIDTH - idle_.groups.size());
+  for (const std::size_t place : far) copy(working_, place, idle_, idle++);
+  Packed kept;
+  auto next = far.begin();
+  std::size_t begin = 0;
+  std::vector<std::size_t> of_colour;
+  for (const std::size_t end : working_.colour_end) {
+    of_colour.clear();
+    for (std::size_t place = begin * WIDTH; place < end * WIDTH; ++place) {
+      if (next != far.end() && *next == place)
+        ++next;
+      else if (!working_.is_empty(place))
+        of_colour.push_back(place);
+    }
+    begin = end;
+    if (of_colour.empty()) continue;
+    std::size_t to = kept.lanes();
+    add_groups(kept, (of_colour.size() + WIDTH - 1) / WIDTH);
+    kept.colour_end.push_back(kept.groups.size());
+    for (const std::size_t place : of_colour) copy(working_, place, kept, to++);
+  }
+  working_ = std::move(kept);
+  list_shared();
+}
+
+template <typename Group>
+void PackedSweeps<Group>::impulses(const Scales &scales, std::vector<double> &impulse) const
+{
+  for (std::size_t c = 0; c < impulse.size(); ++c) impulse[c] = of_impulses_[c].idle();
+  for (std::size_t g = 0; g < working_.groups.size(); ++g) {
+    const Group &group = working_.groups[g];
+    const Rest &rest = working_.rest[g];
+    for (int lane = 0; lane < WIDTH; ++lane) {
+      if (rest.source[lane] == NONE || !(group.now[lane] > group.least[lane])) continue;
+      const std::size_t c = rest.source[lane];
+      impulse[c] = of_impulses_[c].project(
+          start_[c] + scales.impulse * static_cast<double>(group.now[lane] / rest.root[lane]));
+    }
+  }
+}
+
+template class PackedSweeps<swept::ParticleGroup>;
+template class PackedSweeps<swept::BodyGroup>;
+
+}    // namespace inelastic

@@ -1,0 +1,155 @@
+// Coloured sweeps (inelastic_coloured_sweeps.h) on packed groups (inelastic_sweep_kernels.h): this
+// class packs a problem, sweeps, and unpacks impulses.
+//
+// Constraints are coloured in the order of the problem: each gets the first colour that no earlier
+// constraint of either of its movers has. (A mover is a particle that turns with nothing, or a
+// body.) Constraints of one colour share no mover, and fill groups. What no impulse moves is shared
+// freely.
+//
+// The unknown is the change of the impulses since the start of the search, as in
+// inelastic_packed_iterations.h; so are working and idle constraints.
+//
+// Each rank sweeps over its own constraints. What they do to movers that other ranks have
+// constraints of, too, is exchanged after the sweep. Two ranks that push one mover at the same time
+// push too far: so constraints of such movers have a larger diagonal, by the sum of the
+// off-diagonal entries with the constraints of other ranks (the l1 smoother of Baker, Falgout,
+// Kolev and Yang, SIAM J. Sci. Comput. 33 (2011) 2864), or a bound of it. A periodic image that a
+// rank has of its own particle counts as one of another rank.
+
+#pragma once
+
+#include "inelastic_contact_problem.h"
+#include "inelastic_contact_targets.h"
+#include "inelastic_host.h"
+#include "inelastic_packed_targets.h"
+#include "inelastic_sweep_kernels.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace inelastic {
+
+template <typename Group> class PackedSweeps {
+ public:
+  // Packs a problem, whose impulses are the start; the arguments are those of
+  // PackedIterations::prepare. Returns false where so many constraints have one mover in common
+  // that groups would be mostly empty. Collective; what is returned is this rank's answer.
+  bool prepare(const ContactProblem &problem, const std::vector<double> &diagonal,
+               const std::vector<double> &gap, double idle_gap, const Scales &scales,
+               const ContactTargets &targets, const std::vector<double> &change, double tolerance,
+               Host &host);
+
+  // Leads all impulses on by `along` times their last change, and visits each constraint once.
+  // Changes and residuals below `blur`, in scaled units, may be round-off. Collective; what is
+  // returned is of this rank's constraints.
+  swept::Swept sweep(double along, double blur, Host &host);
+
+  // Returns the largest residual of this rank's working constraints as a part of its target.
+  double unsolved(double blur) const
+  { return swept::find_unsolved(working_.groups, states_.data(), static_cast<float>(blur)); }
+
+  // Computes the states from the impulses: sums of many changes drift in single precision.
+  // Collective.
+  void refresh(Host &host);
+
+  // As in PackedIterations. Sweeps set the targets when there were an eighth more of them.
+  static bool sets_targets(long sweep);
+  void set_targets();
+  void keep_velocities();
+  double moved_since_kept(double accuracy);
+
+  // Makes the idle constraints working whose gaps are near closed: not above some residuals, or
+  // `least_idle_gap`, in packed units, where that is more. Makes the working ones idle that have no
+  // impulse and larger gaps, where they are more than a few.
+  void look_at_idle(double least_idle_gap);
+  // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per
+  // constraint of the problem [length].
+  void join(const std::vector<double> &gap, const Scales &scales);
+
+  // Writes the present impulses, in the order of the problem's constraints.
+  void impulses(const Scales &scales, std::vector<double> &impulse) const;
+
+ private:
+  using State = typename Group::State;
+  using Vector = packed::Vector<float>;
+  static constexpr int WIDTH = swept::WIDTH;
+
+  // What a sweep does not read of the constraints of a group.
+  struct Rest {
+    std::size_t source[WIDTH];          // the place in the problem, or NONE: an empty lane
+    int first[WIDTH], second[WIDTH];    // slots
+    float root[WIDTH];                  // of D
+    float least_target[WIDTH], part[WIDTH];
+  };
+  static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
+
+  struct Packed {
+    std::vector<Group> groups;
+    std::vector<Rest> rest;
+    std::vector<std::size_t> colour_end;    // in groups, one after the other
+
+    void clear();
+    std::size_t lanes() const { return groups.size() * WIDTH; }
+    bool is_empty(std::size_t lane) const
+    { return rest[lane / WIDTH].source[lane % WIDTH] == NONE; }
+  };
+
+  // One lane of a group, with all that belongs to it.
+  struct Place {
+    std::size_t group;
+    int lane;
+  };
+
+  void find_movers(const ContactProblem &problem);
+  void find_bodies(const RigidBodies &bodies);
+  void find_shared(const ContactProblem &problem, const std::vector<std::size_t> &working,
+                   const std::vector<double> &diagonal, Host &host);
+  double from_other_ranks(const ContactProblem &problem, std::size_t c) const;
+  double mobility_of(const ContactProblem &problem, std::size_t c, int slot) const;
+  void add_groups(Packed &packed, std::size_t count) const;
+  std::size_t colour(const std::vector<int> &first, const std::vector<int> &second, Packed &packed,
+                     std::vector<std::size_t> &places);
+  void write(const ContactProblem &problem, std::size_t c, const std::vector<double> &diagonal,
+             const std::vector<double> &gap, const Scales &scales, const ContactTargets &targets,
+             Packed &packed, std::size_t place) const;
+  void write_rows(const ContactProblem &problem, std::size_t c, double root, Group &group,
+                  int lane) const;
+  static void copy(const Packed &from, std::size_t source, Packed &to, std::size_t place);
+  void clear_lane(Packed &packed, std::size_t place) const;
+  void wake(const std::vector<std::size_t> &near);
+  void set_idle(double least_idle_gap);
+  float looked_gap(const Packed &packed, std::size_t place) const;
+  void list_shared();
+  void add_impulses_to(std::vector<Vector> &sums, const Group &group, const Rest &rest, int lane,
+                       float change) const;
+  void give_to_states(std::vector<State> &states) const;
+  void exchange(const std::vector<float> &change, std::vector<State> &states, Host &host);
+  const std::vector<Vector> &velocities();
+
+  Packed working_, idle_;
+  std::vector<State> states_, before_;
+  std::vector<Vector> velocity_, sum_, own_;    // per slot
+  std::vector<int> mover_;                      // per slot
+  std::vector<char> moves_;                     // per mover: whether impulses move it
+  int movers_ = 0;
+  std::vector<float> mobility_;    // per mover: the inverse mass, in packed units
+  // Per mover 9: F of F F^T = I^-1 by columns, in packed units; per member of a body its arm.
+  std::vector<double> spin_root_, arm_;
+  std::vector<int> originals_;    // slots of bodies whose impulses count, see RigidBodies
+  std::vector<char> is_copy_;     // per slot
+  double mobility_unit_ = 0.0;
+
+  // Of movers that other ranks, or images, have constraints of, too.
+  bool has_ghosts_ = false;
+  std::vector<char> shared_;                     // per mover
+  std::vector<float> of_others_;                 // per mover: what from_other_ranks needs
+  std::vector<std::size_t> shared_lanes_;        // working constraints of such movers
+  std::vector<float> led_;                       // their impulses before a sweep visits them
+  std::vector<double> start_;                    // impulses, in the order of the problem
+  std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
+  PackedTargets<float> targets_;
+  std::vector<swept::Gaps> looked_;
+  float idle_gap_ = 0.0f;    // above it a constraint without an impulse is idle
+};
+
+}    // namespace inelastic

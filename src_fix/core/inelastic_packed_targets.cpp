@@ -1,0 +1,99 @@
+#include "inelastic_packed_targets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace inelastic {
+
+namespace {
+
+  // Where one of two particles in contact has changed its velocity more than the other, this part
+  // of the larger change counts, if it is more than the smaller one.
+  constexpr double ALONE = 0.5;
+
+  // A velocity, which is a sum of some impulses, is known to so many units of its own round-off.
+  constexpr int BLURRED = 16;
+
+  template <typename Real> Real length(const typename packed::Vector<Real>::Lanes &a)
+  { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
+
+  template <typename Real>
+  void set_lanes(packed::Vector<Real> &vector, double x, double y, double z)
+  {
+    vector.lanes = typename packed::Vector<Real>::Lanes{static_cast<Real>(x), static_cast<Real>(y),
+                                                        static_cast<Real>(z), Real(0)};
+  }
+
+}    // namespace
+
+template <typename Real>
+void PackedTargets<Real>::begin(const ContactProblem &problem, const Scales &scales,
+                                const ContactTargets &targets, const std::vector<double> &change,
+                                double tolerance)
+{
+  const auto slots = static_cast<std::size_t>(problem.slots());
+  const double per_length = problem.timestep / scales.length;
+  const std::vector<double> &guess = targets.change_by_guess();
+  at_start_.resize(slots);
+  since_guess_.resize(slots);
+  for (std::size_t i = 0; i < slots; ++i) {
+    const double *const v = &change[3 * i], *const g = &guess[3 * i];
+    set_lanes(at_start_[i], per_length * v[0], per_length * v[1], per_length * v[2]);
+    set_lanes(since_guess_[i], per_length * (v[0] - g[0]), per_length * (v[1] - g[1]),
+              per_length * (v[2] - g[2]));
+  }
+  mobile_.resize(slots);
+  for (std::size_t i = 0; i < slots; ++i) mobile_[i] = problem.is_mobile(static_cast<int>(i));
+  most_ = static_cast<Real>(tolerance / scales.length);
+  kept_.assign(slots, Vector{});
+  kept_before_ = kept_;
+  set(kept_);
+}
+
+template <typename Real> void PackedTargets<Real>::set(const std::vector<Vector> &velocity)
+{
+  changed_.resize(velocity.size());
+  for (std::size_t i = 0; i < changed_.size(); ++i)
+    changed_[i] = !mobile_[i] ? std::numeric_limits<Real>::max()
+                              : std::max(length<Real>(at_start_[i].lanes + velocity[i].lanes),
+                                         length<Real>(since_guess_[i].lanes + velocity[i].lanes));
+}
+
+template <typename Real>
+Real PackedTargets<Real>::target(std::size_t first, std::size_t second, Real least, Real part) const
+{ return std::min(most_, free_target(first, second, least, part)); }
+
+template <typename Real>
+Real PackedTargets<Real>::free_target(std::size_t first, std::size_t second, Real least,
+                                      Real part) const
+{ return std::max(least, part * std::min(changed_[first], changed_[second])); }
+
+template <typename Real> void PackedTargets<Real>::keep(const std::vector<Vector> &velocity)
+{
+  kept_before_.swap(kept_);
+  kept_ = velocity;
+}
+
+template <typename Real> void PackedTargets<Real>::compare(const std::vector<Vector> &velocity)
+{
+  moved_.resize(velocity.size());
+  for (std::size_t i = 0; i < moved_.size(); ++i) {
+    const Real blur =
+        BLURRED * std::numeric_limits<Real>::epsilon() * length<Real>(velocity[i].lanes);
+    moved_[i] = std::max(Real(0), length<Real>(velocity[i].lanes - kept_before_[i].lanes) - blur);
+  }
+}
+
+template <typename Real>
+Real PackedTargets<Real>::moved(std::size_t first, std::size_t second) const
+{
+  const Real one = moved_[first], other = moved_[second];
+  const Real both = !mobile_[first] ? other : !mobile_[second] ? one : std::min(one, other);
+  return std::max(both, static_cast<Real>(ALONE) * std::max(one, other));
+}
+
+template class PackedTargets<float>;
+template class PackedTargets<double>;
+
+}    // namespace inelastic

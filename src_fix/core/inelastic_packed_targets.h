@@ -1,0 +1,68 @@
+// The targets of packed constraints (inelastic_contact_targets.h), and how far velocities are from
+// those they end with: what all iterations on packed arrays have in common.
+//
+// Velocities are changes of velocity by the impulses since the start of a search, one vector per
+// slot (inelastic_unknowns.h), lengths are in the units of Scales, and constraints are told by
+// their two slots.
+
+#pragma once
+
+#include "inelastic_contact_problem.h"
+#include "inelastic_contact_targets.h"
+#include "inelastic_packed_kernels.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace inelastic {
+
+// The units of packed numbers. Both are powers of two, so that a scene in other units takes the
+// same steps bit by bit.
+struct Scales {
+  double length;     // [length]
+  double impulse;    // [mass length / time]
+};
+
+template <typename Real> class PackedTargets {
+ public:
+  using Vector = packed::Vector<Real>;
+
+  // Begins a search. `change` are the changes of velocity by the impulses at its start
+  // (GapOperator::change), and the targets were judged with them. No target is above the tolerance
+  // [length].
+  void begin(const ContactProblem &problem, const Scales &scales, const ContactTargets &targets,
+             const std::vector<double> &change, double tolerance);
+
+  // Takes the velocities of which targets are a part.
+  void set(const std::vector<Vector> &velocity);
+
+  // Returns the target of a constraint between two slots. `least` and `part` are those of
+  // ContactTargets, in packed units.
+  Real target(std::size_t first, std::size_t second, Real least, Real part) const;
+  // Returns the same without the bound by the tolerance.
+  Real free_target(std::size_t first, std::size_t second, Real least, Real part) const;
+
+  // Keeps velocities; the last two that were kept can be compared with.
+  void keep(const std::vector<Vector> &velocity);
+
+  // Compares velocities with those that were kept last but one; before two were kept with those at
+  // the start of the search.
+  void compare(const std::vector<Vector> &velocity);
+
+  // Returns by how much the sides of a constraint have moved since, by the last comparison. A
+  // change that may be round-off does not count.
+  Real moved(std::size_t first, std::size_t second) const;
+
+ private:
+  // Per slot: the change of velocity by the impulses at the start of the search, in all and since
+  // the first guess of the solve
+  std::vector<Vector> at_start_, since_guess_;
+  std::vector<char> mobile_;
+  // Per slot that can move: the change of velocity of which targets are a part
+  std::vector<Real> changed_;
+  std::vector<Vector> kept_, kept_before_;
+  std::vector<Real> moved_;
+  Real most_ = 0;
+};
+
+}    // namespace inelastic

@@ -1,0 +1,100 @@
+// The passes of coloured sweeps (inelastic_coloured_sweeps.h) over packed constraints, in single
+// precision.
+//
+// A group holds eight constraints of which no two share anything that impulses move, so that one
+// instruction works on all of them. In impulses scaled by the root of the diagonal, x = lambda
+// sqrt(D), A has a unit diagonal; rows and gaps are divided by that root, and a visit to constraint
+// c makes
+//
+//   x_c <- max(l_c, x_c - w_c),   w_c = gap_c + C_c x_c + row_c . u
+//
+// and adds the change to u, the states of what moves: of a scene of particles their velocities, of
+// one with bodies velocities and spins in scaled units, in which A = rows . rows^T.
+
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace inelastic::swept {
+
+typedef float Four __attribute__((vector_size(16)));
+typedef float Eight __attribute__((vector_size(32)));
+
+constexpr int WIDTH = 8;    // constraints in a group
+
+// What the constraints of a group have in common, whatever moves: one lane a constraint. All
+// impulses are changes since the start of the search.
+struct alignas(32) Lanes {
+  std::uint32_t first[WIDTH], second[WIDTH];    // places of the two states, in bytes
+  Eight gap;       // at the end of the step with the impulses at the start
+  Eight give;      // the compliance over D
+  Eight least;     // the least change of the impulse
+  Eight now;       // x, the change of the impulse
+  Eight before;    // x before the last sweep
+  Eight inverse_target;
+};
+
+// Constraints of particles that turn with nothing. A state is a velocity, and a fourth number.
+struct ParticleGroup : Lanes {
+  struct alignas(16) State {
+    Four lanes;
+  };
+  Eight row[4];    // constraint k is in row[k % 4], the lower half for k < 4: x y z and 0
+  Eight first_mobility, second_mobility;    // inverse masses
+};
+
+// Constraints of bodies and particles. A state is sqrt(M) v, 0, the spin in units of the root of
+// the inverse inertia, and 0.
+struct BodyGroup : Lanes {
+  struct alignas(32) State {
+    Eight lanes;
+  };
+  Eight first_row[WIDTH], second_row[WIDTH];    // by the constraint
+};
+
+// A sweep returns these over its constraints.
+struct Swept {
+  double uphill = 0.0;    // > 0 where the dual function rises along the last change
+  double change = 0.0;    // the largest change of an impulse that a visit made, in scaled units
+  // The same, beyond what may be round-off, as a part of the target: a hint at the residual.
+  double of_target = 0.0;
+  double farthest = 0.0;    // the largest change of an impulse since the start of the search
+};
+
+// Visits all constraints, each from its impulse led on by `along` times its last change. The states
+// must have been led on alike. Changes below `blur`, in scaled units, may be round-off.
+Swept sweep(std::vector<ParticleGroup> &groups, ParticleGroup::State *states, float along,
+            float blur);
+Swept sweep(std::vector<BodyGroup> &groups, BodyGroup::State *states, float along, float blur);
+
+// Returns, between two sweeps, the largest residual, beyond the blur, as a part of its target.
+double find_unsolved(const std::vector<ParticleGroup> &groups, const ParticleGroup::State *states,
+                     float blur);
+double find_unsolved(const std::vector<BodyGroup> &groups, const BodyGroup::State *states,
+                     float blur);
+
+// The gaps w of a group, in scaled units.
+struct alignas(32) Gaps {
+  Eight lanes;
+};
+
+// Writes those of all groups.
+void find_gaps(const std::vector<ParticleGroup> &groups, const ParticleGroup::State *states,
+               Gaps *gap);
+void find_gaps(const std::vector<BodyGroup> &groups, const BodyGroup::State *states, Gaps *gap);
+
+// Adds to the states what all impulses make of them, those now or before the last sweep.
+enum class When { NOW, BEFORE };
+void add_impulses(const std::vector<ParticleGroup> &groups, When when,
+                  ParticleGroup::State *states);
+void add_impulses(const std::vector<BodyGroup> &groups, When when, BodyGroup::State *states);
+
+// Leads the states on by `along` times their last change, and keeps them as they were in `before`.
+void lead_on(std::vector<ParticleGroup::State> &states, std::vector<ParticleGroup::State> &before,
+             float along);
+void lead_on(std::vector<BodyGroup::State> &states, std::vector<BodyGroup::State> &before,
+             float along);
+
+}    // namespace inelastic::swept
