@@ -20,6 +20,11 @@ class Host {
   // Returns whether any rank has ghosts. If none has, choose_ghosts need not be called.
   virtual bool has_ghosts() const = 0;
 
+  // Ranks that share particles may take turns in working on them: turns() is 1 or 2, the same on
+  // all ranks, and turn() that of this rank, from 0 on. Most neighbours should have different ones.
+  virtual int turns() const = 0;
+  virtual int turn() const = 0;
+
   // Chooses the ghosts for sum_over_chosen_ghosts. `chosen` has one entry per slot; the entries of
   // owned particles are not read, and those of walls have no meaning.
   virtual void choose_ghosts(const std::vector<char> &chosen) = 0;
@@ -51,6 +56,8 @@ class SerialHost final : public Host {
   void sum_over_ghosts(double *) override {}
   void sum_over_ranks(double *, int) override {}
   bool has_ghosts() const override { return false; }
+  int turns() const override { return 1; }
+  int turn() const override { return 0; }
   void choose_ghosts(const std::vector<char> &) override {}
   void sum_over_chosen_ghosts(double *) override {}
   void sum_over_chosen_ghosts(float *) override {}

@@ -72,19 +72,26 @@ bool PackedSweeps<Group>::prepare(const ContactProblem &problem,
   for (std::size_t c = 0; c < gap.size(); ++c)
     (of_impulses_[c].is_loaded(start_[c]) || !(gap[c] > idle_gap) ? near : far).push_back(c);
   has_ghosts_ = host.has_ghosts();
-  if (has_ghosts_) find_shared(problem, near, diagonal, host);
+  turns_ = has_ghosts_ ? host.turns() : 1;
+  turn_ = has_ghosts_ ? host.turn() : 0;
+  if (has_ghosts_) find_shared(problem, near, gap.size(), host);
 
-  working_.clear();
-  idle_.clear();
-  std::vector<int> first, second;
-  for (const std::size_t c : near) {
-    first.push_back(mover_[contacts.first[c]]);
-    second.push_back(mover_[contacts.second[c]]);
+  for (Packed *const some : {&at_cuts_, &inside_, &idle_}) some->clear();
+  std::size_t lanes = 0;
+  for (const bool at_cuts : {true, false}) {
+    std::vector<std::size_t> chosen, places;
+    std::vector<int> first, second;
+    for (const std::size_t c : near)
+      if (is_at_cut(contacts.first[c], contacts.second[c]) == at_cuts) {
+        chosen.push_back(c);
+        first.push_back(mover_[contacts.first[c]]);
+        second.push_back(mover_[contacts.second[c]]);
+      }
+    Packed &packed = at_cuts ? at_cuts_ : inside_;
+    lanes += colour(first, second, packed, places);
+    for (std::size_t k = 0; k < chosen.size(); ++k)
+      write(problem, chosen[k], diagonal, gap, scales, targets, packed, places[k]);
   }
-  std::vector<std::size_t> places;
-  const std::size_t lanes = colour(first, second, working_, places);
-  for (std::size_t k = 0; k < near.size(); ++k)
-    write(problem, near[k], diagonal, gap, scales, targets, working_, places[k]);
   add_groups(idle_, (far.size() + WIDTH - 1) / WIDTH);
   for (std::size_t k = 0; k < far.size(); ++k)
     write(problem, far[k], diagonal, gap, scales, targets, idle_, k);
@@ -92,11 +99,10 @@ bool PackedSweeps<Group>::prepare(const ContactProblem &problem,
   states_.assign(static_cast<std::size_t>(movers_) + 1, State{});
   before_ = states_;
   sum_.assign(problem.slots(), Vector{});
-  own_ = sum_;
   list_shared();
   targets_.begin(problem, scales, targets, change, tolerance);
   set_targets();
-  return lanes <= MOST_LANES * near.size() + COLOURS * WIDTH;
+  return lanes <= MOST_LANES * near.size() + 2 * COLOURS * WIDTH;
 }
 
 // Numbers what moves: slots, or bodies and the particles that are in none. One mover more stands
@@ -145,56 +151,75 @@ double PackedSweeps<Group>::mobility_of(const ContactProblem &problem, std::size
                                         int slot) const
 { return problem.timestep * problem.mobility(slot, &problem.contacts.normal[3 * c]); }
 
-// Finds the movers that other ranks have constraints of, and what from_other_ranks needs of them:
-// of particles sums of n n^T over these constraints, of bodies sums of the roots of mobilities.
-// Collective.
+// Finds the movers that other ranks have constraints of, and what from_other_ranks needs of those
+// that have the same turn: of particles sums of n n^T over these constraints, of bodies sums of the
+// roots of mobilities. Collective.
 template <typename Group>
 void PackedSweeps<Group>::find_shared(const ContactProblem &problem,
                                       const std::vector<std::size_t> &working,
-                                      const std::vector<double> &diagonal, Host &host)
+                                      std::size_t constraints, Host &host)
 {
   const ContactSet &contacts = problem.contacts;
   const std::size_t slots = mover_.size();
-  constexpr std::size_t NUMBERS = HAS_BODIES<Group> ? 2 : 7;
-  // The first number counts constraints, the others are of the working ones.
-  std::vector<double> mine(NUMBERS * slots, 0.0);
-  for (std::size_t c = 0; c < diagonal.size(); ++c)
-    for (const int slot : {contacts.first[c], contacts.second[c]}) mine[NUMBERS * slot] += 1.0;
+  std::vector<double> count(slots, 0.0), sums(NUMBERS * slots, 0.0);
+  for (std::size_t c = 0; c < constraints; ++c)
+    for (const int slot : {contacts.first[c], contacts.second[c]}) count[slot] += 1.0;
   for (const std::size_t c : working) {
     const double *const n = &contacts.normal[3 * c];
     for (const int slot : {contacts.first[c], contacts.second[c]}) {
-      double *const sums = &mine[NUMBERS * slot + 1];
+      double *const of_slot = &sums[NUMBERS * slot];
       if constexpr (HAS_BODIES<Group>) {
-        sums[0] += std::sqrt(mobility_of(problem, c, slot));
+        of_slot[0] += std::sqrt(mobility_of(problem, c, slot));
       } else {
         const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
-        for (int k = 0; k < 6; ++k) sums[k] += n[row[k]] * n[column[k]];
+        for (int k = 0; k < 6; ++k) of_slot[k] += n[row[k]] * n[column[k]];
       }
     }
   }
-  std::vector<double> all = mine;
-  std::vector<double> three(3 * slots);
-  for (std::size_t from = 0; from < NUMBERS; from += 3) {
-    const std::size_t count = std::min<std::size_t>(3, NUMBERS - from);
-    for (std::size_t i = 0; i < slots; ++i)
-      for (std::size_t k = 0; k < 3; ++k)
-        three[3 * i + k] = k < count ? mine[NUMBERS * i + from + k] : 0.0;
-    host.sum_over_ghosts(three.data());
-    for (std::size_t i = 0; i < slots; ++i)
-      for (std::size_t k = 0; k < count; ++k) all[NUMBERS * i + from + k] = three[3 * i + k];
+  const std::vector<double> all_count = of_all_ranks(count, 1, host);
+  const std::vector<double> none(sums.size(), 0.0);
+  std::vector<double> all_sums;
+  for (int turn = 0; turn < turns_; ++turn) {
+    const std::vector<double> of_turn = of_all_ranks(turn == turn_ ? sums : none, NUMBERS, host);
+    if (turn == turn_) all_sums = of_turn;
   }
   shared_.assign(movers_, 0);
-  of_others_.assign((NUMBERS - 1) * static_cast<std::size_t>(movers_), 0.0f);
+  of_others_.assign(NUMBERS * static_cast<std::size_t>(movers_), 0.0f);
   for (std::size_t i = 0; i < slots; ++i) {
     const std::size_t m = mover_[i];
     if (problem.is_wall(static_cast<int>(i)) || !moves_[m]) continue;
-    const double *const own = &mine[NUMBERS * i], *const total = &all[NUMBERS * i];
-    if (total[0] > own[0] + 0.5) shared_[m] = 1;
-    for (std::size_t k = 1; k < NUMBERS; ++k)
-      of_others_[(NUMBERS - 1) * m + k - 1] +=
-          static_cast<float>((is_copy_[i] ? 0.0 : total[k]) - own[k]);
+    if (all_count[i] > count[i] + 0.5) shared_[m] = 1;
+    for (std::size_t k = 0; k < NUMBERS; ++k)
+      of_others_[NUMBERS * m + k] += static_cast<float>(
+          (is_copy_[i] ? 0.0 : all_sums[NUMBERS * i + k]) - sums[NUMBERS * i + k]);
   }
 }
+
+// Returns sums over all ranks of `numbers` numbers per slot. Collective.
+template <typename Group>
+std::vector<double> PackedSweeps<Group>::of_all_ranks(const std::vector<double> &mine,
+                                                      std::size_t numbers, Host &host)
+{
+  const std::size_t slots = mine.size() / numbers;
+  std::vector<double> all = mine, three(3 * slots);
+  for (std::size_t from = 0; from < numbers; from += 3) {
+    const std::size_t count = std::min<std::size_t>(3, numbers - from);
+    for (std::size_t i = 0; i < slots; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        three[3 * i + k] = k < count ? mine[numbers * i + from + k] : 0.0;
+    host.sum_over_ghosts(three.data());
+    for (std::size_t i = 0; i < slots; ++i)
+      for (std::size_t k = 0; k < count; ++k) all[numbers * i + from + k] = three[3 * i + k];
+  }
+  return all;
+}
+
+// Tells whether other ranks have constraints of either side, too.
+template <typename Group> bool PackedSweeps<Group>::is_at_cut(int first, int second) const
+{ return has_ghosts_ && (is_shared(first) || is_shared(second)); }
+
+template <typename Group> bool PackedSweeps<Group>::is_shared(int slot) const
+{ return moves_[mover_[slot]] && shared_[mover_[slot]]; }
 
 // Returns the bound of the sum of |A_cd| over the constraints d of other ranks [time / mass].
 template <typename Group>
@@ -203,7 +228,7 @@ double PackedSweeps<Group>::from_other_ranks(const ContactProblem &problem, std:
   double sum = 0.0;
   for (const int slot : {problem.contacts.first[c], problem.contacts.second[c]}) {
     const std::size_t m = mover_[slot];
-    if (!moves_[m] || !shared_[m]) continue;
+    if (!is_shared(slot)) continue;
     const double mobility = mobility_of(problem, c, slot);
     if constexpr (HAS_BODIES<Group>) {
       sum += std::sqrt(mobility) * std::max(0.0f, of_others_[m]);
@@ -389,39 +414,55 @@ void PackedSweeps<Group>::copy(const Packed &from, std::size_t source, Packed &t
 template <typename Group>
 swept::Swept PackedSweeps<Group>::sweep(double along, double blur, Host &host)
 {
-  const auto by = static_cast<float>(along);
+  const auto by = static_cast<float>(along), blurred = static_cast<float>(blur);
   swept::lead_on(states_, before_, by);
-  if (has_ghosts_)
-    for (std::size_t k = 0; k < shared_lanes_.size(); ++k) {
-      const Group &group = working_.groups[shared_lanes_[k] / WIDTH];
-      const auto lane = shared_lanes_[k] % WIDTH;
-      led_[k] = group.now[lane] + by * (group.now[lane] - group.before[lane]);
-    }
-  const swept::Swept swept =
-      swept::sweep(working_.groups, states_.data(), by, static_cast<float>(blur));
-  if (has_ghosts_) {
-    for (std::size_t k = 0; k < shared_lanes_.size(); ++k)
-      led_[k] = working_.groups[shared_lanes_[k] / WIDTH].now[shared_lanes_[k] % WIDTH] - led_[k];
-    exchange(led_, states_, host);
+  for (std::size_t k = 0; k < changes_.size(); ++k) {
+    const Group &group = at_cuts_.groups[k / WIDTH];
+    const auto lane = k % WIDTH;
+    changes_[k] = group.now[lane] + by * (group.now[lane] - group.before[lane]);
   }
+  swept::Swept swept;
+  const auto visit = [&](Packed &some, std::size_t from, std::size_t to) {
+    swept::sweep(some.groups.data() + from, to - from, states_.data(), by, blurred, swept);
+  };
+  const std::size_t at_cuts = at_cuts_.groups.size(), inside = inside_.groups.size();
+  // What ranks do before the first exchange should take all of them as long.
+  const std::size_t begun = turn_ > 0 ? std::min(at_cuts, inside) : 0;
+  visit(inside_, 0, begun);
+  if (turn_ == 0) visit(at_cuts_, 0, at_cuts);
+  if (turns_ > 1) exchange_after(turn_ == 0, host);
+  visit(inside_, begun, inside);
+  if (turn_ > 0) visit(at_cuts_, 0, at_cuts);
+  if (has_ghosts_) exchange_after(turn_ == turns_ - 1, host);
   return swept;
 }
 
-// Lists the working constraints of movers that other ranks have constraints of.
+// Exchanges what the constraints at cuts have changed in this turn; those of this rank only if they
+// were `visited` in it. Collective.
+template <typename Group> void PackedSweeps<Group>::exchange_after(bool visited, Host &host)
+{
+  for (std::size_t k = 0; visited && k < changes_.size(); ++k)
+    changes_[k] = at_cuts_.groups[k / WIDTH].now[k % WIDTH] - changes_[k];
+  exchange(visited, states_, host);
+}
+
+// Lists the slots that an exchange writes.
 template <typename Group> void PackedSweeps<Group>::list_shared()
 {
-  shared_lanes_.clear();
+  shared_slots_.clear();
+  changes_.clear();
   if (!has_ghosts_) return;
-  const auto is_shared = [this](int slot) {
-    return moves_[mover_[slot]] && shared_[mover_[slot]];
-  };
-  for (std::size_t place = 0; place < working_.lanes(); ++place) {
-    if (working_.is_empty(place)) continue;
-    const Rest &rest = working_.rest[place / WIDTH];
-    const auto lane = place % WIDTH;
-    if (is_shared(rest.first[lane]) || is_shared(rest.second[lane])) shared_lanes_.push_back(place);
+  std::vector<char> written(mover_.size());
+  for (std::size_t i = 0; i < mover_.size(); ++i) written[i] = is_shared(static_cast<int>(i));
+  for (std::size_t place = 0; place < at_cuts_.lanes(); ++place) {
+    const Rest &rest = at_cuts_.rest[place / WIDTH];
+    if (!at_cuts_.is_empty(place))
+      written[rest.first[place % WIDTH]] = written[rest.second[place % WIDTH]] = 1;
   }
-  led_.resize(shared_lanes_.size());
+  for (std::size_t i = 0; i < mover_.size(); ++i)
+    if (written[i]) shared_slots_.push_back(static_cast<int>(i));
+  changes_.resize(at_cuts_.lanes());
+  own_.resize(shared_slots_.size());
 }
 
 // Adds a change of the impulse of a constraint, in scaled units, to the sums of its slots, in
@@ -451,11 +492,11 @@ void PackedSweeps<Group>::add_impulses_to(std::vector<Vector> &sums, const Group
 // those of this rank, own_.
 template <typename Group> void PackedSweeps<Group>::give_to_states(std::vector<State> &states) const
 {
-  for (std::size_t i = 0; i < mover_.size(); ++i) {
-    const std::size_t m = mover_[i];
-    if (!moves_[m] || !shared_[m]) continue;
+  for (std::size_t k = 0; k < shared_slots_.size(); ++k) {
+    const std::size_t i = shared_slots_[k], m = mover_[i];
+    if (!is_shared(static_cast<int>(i))) continue;
     const typename Vector::Lanes push =
-        (is_copy_[i] ? typename Vector::Lanes{} : sum_[i].lanes) - own_[i].lanes;
+        (is_copy_[i] ? typename Vector::Lanes{} : sum_[i].lanes) - own_[k].lanes;
     if constexpr (HAS_BODIES<Group>) {
       const float slide = std::sqrt(mobility_[m]);
       swept::Eight &state = states[m].lanes;
@@ -473,18 +514,16 @@ template <typename Group> void PackedSweeps<Group>::give_to_states(std::vector<S
 }
 
 // Adds to the states what other ranks make of them by changes of the impulses of their constraints;
-// `change` are those of this rank's, one for each of shared_lanes_.
+// changes_ are those of this rank's, if it has any to tell. Collective.
 template <typename Group>
-void PackedSweeps<Group>::exchange(const std::vector<float> &change, std::vector<State> &states,
-                                   Host &host)
+void PackedSweeps<Group>::exchange(bool tells, std::vector<State> &states, Host &host)
 {
-  std::fill(sum_.begin(), sum_.end(), Vector{});
-  for (std::size_t k = 0; k < shared_lanes_.size(); ++k) {
-    const std::size_t g = shared_lanes_[k] / WIDTH;
-    const int lane = static_cast<int>(shared_lanes_[k] % WIDTH);
-    add_impulses_to(sum_, working_.groups[g], working_.rest[g], lane, change[k]);
-  }
-  own_ = sum_;
+  for (const int slot : shared_slots_) sum_[slot] = Vector{};
+  for (std::size_t k = 0; tells && k < changes_.size(); ++k)
+    if (changes_[k] != 0.0f)
+      add_impulses_to(sum_, at_cuts_.groups[k / WIDTH], at_cuts_.rest[k / WIDTH],
+                      static_cast<int>(k % WIDTH), changes_[k]);
+  for (std::size_t k = 0; k < shared_slots_.size(); ++k) own_[k] = sum_[shared_slots_[k]];
   host.sum_over_chosen_ghosts(reinterpret_cast<float *>(sum_.data()));
   give_to_states(states);
 }
@@ -495,14 +534,15 @@ template <typename Group> void PackedSweeps<Group>::refresh(Host &host)
     const bool now = when == swept::When::NOW;
     std::vector<State> &states = now ? states_ : before_;
     std::fill(states.begin(), states.end(), State{});
-    swept::add_impulses(working_.groups, when, states.data());
+    swept::add_impulses(at_cuts_.groups, when, states.data());
+    swept::add_impulses(inside_.groups, when, states.data());
     if (!has_ghosts_) continue;
-    for (std::size_t k = 0; k < shared_lanes_.size(); ++k) {
-      const Group &group = working_.groups[shared_lanes_[k] / WIDTH];
+    for (std::size_t k = 0; k < changes_.size(); ++k) {
+      const Group &group = at_cuts_.groups[k / WIDTH];
       const swept::Eight &impulse = now ? group.now : group.before;
-      led_[k] = impulse[shared_lanes_[k] % WIDTH];
+      changes_[k] = impulse[k % WIDTH];
     }
-    exchange(led_, states, host);
+    exchange(true, states, host);
   }
 }
 
@@ -548,7 +588,7 @@ template <typename Group> bool PackedSweeps<Group>::sets_targets(long sweep)
 template <typename Group> void PackedSweeps<Group>::set_targets()
 {
   targets_.set(velocities());
-  for (Packed *const some : {&working_, &idle_})
+  for (Packed *const some : {&at_cuts_, &inside_, &idle_})
     for (std::size_t g = 0; g < some->groups.size(); ++g) {
       const Rest &rest = some->rest[g];
       for (int lane = 0; lane < WIDTH; ++lane)
@@ -566,17 +606,18 @@ template <typename Group> double PackedSweeps<Group>::moved_since_kept(double ac
 {
   targets_.compare(velocities());
   float most = 0.0f;
-  for (std::size_t g = 0; g < working_.groups.size(); ++g) {
-    const Group &group = working_.groups[g];
-    const Rest &rest = working_.rest[g];
-    for (int lane = 0; lane < WIDTH; ++lane) {
-      if (!(group.now[lane] > group.least[lane])) continue;
-      const int i = rest.first[lane], j = rest.second[lane];
-      most = std::max(most,
-                      targets_.moved(i, j) /
-                          targets_.free_target(i, j, rest.least_target[lane], rest.part[lane]));
+  for (const Packed *const some : {&at_cuts_, &inside_})
+    for (std::size_t g = 0; g < some->groups.size(); ++g) {
+      const Group &group = some->groups[g];
+      const Rest &rest = some->rest[g];
+      for (int lane = 0; lane < WIDTH; ++lane) {
+        if (!(group.now[lane] > group.least[lane])) continue;
+        const int i = rest.first[lane], j = rest.second[lane];
+        most = std::max(most,
+                        targets_.moved(i, j) /
+                            targets_.free_target(i, j, rest.least_target[lane], rest.part[lane]));
+      }
     }
-  }
   return accuracy * static_cast<double>(most);
 }
 
@@ -614,14 +655,21 @@ void PackedSweeps<Group>::join(const std::vector<double> &gap, const Scales &sca
 template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::size_t> &near)
 {
   if (near.empty()) return;
-  std::vector<int> first, second;
-  for (const std::size_t place : near) {
-    first.push_back(mover_[idle_.rest[place / WIDTH].first[place % WIDTH]]);
-    second.push_back(mover_[idle_.rest[place / WIDTH].second[place % WIDTH]]);
+  for (const bool at_cuts : {true, false}) {
+    std::vector<std::size_t> chosen, places;
+    std::vector<int> first, second;
+    for (const std::size_t place : near) {
+      const Rest &rest = idle_.rest[place / WIDTH];
+      const int one = rest.first[place % WIDTH], other = rest.second[place % WIDTH];
+      if (is_at_cut(one, other) != at_cuts) continue;
+      chosen.push_back(place);
+      first.push_back(mover_[one]);
+      second.push_back(mover_[other]);
+    }
+    Packed &packed = at_cuts ? at_cuts_ : inside_;
+    colour(first, second, packed, places);
+    for (std::size_t k = 0; k < chosen.size(); ++k) copy(idle_, chosen[k], packed, places[k]);
   }
-  std::vector<std::size_t> places;
-  colour(first, second, working_, places);
-  for (std::size_t k = 0; k < near.size(); ++k) copy(idle_, near[k], working_, places[k]);
   std::size_t kept = near.front();
   auto next = near.begin();
   for (std::size_t place = kept; place < idle_.lanes(); ++place) {
@@ -637,47 +685,63 @@ template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::
   list_shared();
 }
 
-// Sets the gap above which a constraint without an impulse is idle: by the present residual, or
-// `least_idle_gap` where that is more. Makes working constraints idle that have no impulse and are
-// far from closed; the others move up within their colour.
-template <typename Group> void PackedSweeps<Group>::set_idle(double least_idle_gap)
+// Returns the largest residual of working constraints, as a length in packed units, and lists those
+// that have no impulse, with their gaps.
+template <typename Group>
+float PackedSweeps<Group>::look_at(const Packed &packed, std::vector<Unloaded> &unloaded)
 {
-  looked_.resize(working_.groups.size());
-  swept::find_gaps(working_.groups, states_.data(), looked_.data());
+  looked_.resize(packed.groups.size());
+  swept::find_gaps(packed.groups, states_.data(), looked_.data());
   float residual = 0.0f;
-  std::vector<std::size_t> without;    // an impulse
-  std::size_t constraints = 0;
-  for (std::size_t place = 0; place < working_.lanes(); ++place) {
-    if (working_.is_empty(place)) continue;
-    ++constraints;
-    const Group &group = working_.groups[place / WIDTH];
+  for (std::size_t place = 0; place < packed.lanes(); ++place) {
+    if (packed.is_empty(place)) continue;
+    const Group &group = packed.groups[place / WIDTH];
     const auto lane = place % WIDTH;
-    const float gap = looked_gap(working_, place);
+    const float gap = looked_gap(packed, place);
     const bool is_loaded = group.now[lane] > group.least[lane];
     residual = std::max(residual, is_loaded ? std::abs(gap) : -gap);
     if (!is_loaded && group.now[lane] == 0.0f && group.before[lane] == 0.0f &&
-        !of_impulses_[working_.rest[place / WIDTH].source[lane]].may_pull())
-      without.push_back(place);
+        !of_impulses_[packed.rest[place / WIDTH].source[lane]].may_pull())
+      unloaded.push_back({place, gap});
   }
+  return residual;
+}
+
+// Sets the gap above which a constraint without an impulse is idle: by the present residual, or
+// `least_idle_gap` where that is more. Makes working constraints idle that have no impulse and are
+// far from closed.
+template <typename Group> void PackedSweeps<Group>::set_idle(double least_idle_gap)
+{
+  std::vector<Unloaded> at_cuts, inside;
+  const float residual = std::max(look_at(at_cuts_, at_cuts), look_at(inside_, inside));
   idle_gap_ = std::max(static_cast<float>(least_idle_gap), IDLE_GAP * residual);
+  make_idle(at_cuts, at_cuts_);
+  make_idle(inside, inside_);
+  list_shared();
+}
+
+// Constraints that stay working move up within their colour.
+template <typename Group>
+void PackedSweeps<Group>::make_idle(const std::vector<Unloaded> &unloaded, Packed &packed)
+{
   std::vector<std::size_t> far;
-  for (const std::size_t place : without)
-    if (looked_gap(working_, place) > idle_gap_) far.push_back(place);
-  if (far.size() <= constraints / FEW) return;
+  for (const Unloaded &one : unloaded)
+    if (one.gap > idle_gap_) far.push_back(one.place);
+  if (far.size() <= packed.lanes() / FEW) return;
   std::size_t idle = idle_.lanes();
   while (idle > 0 && idle_.is_empty(idle - 1)) --idle;
   add_groups(idle_, (idle + far.size() + WIDTH - 1) / WIDTH - idle_.groups.size());
-  for (const std::size_t place : far) copy(working_, place, idle_, idle++);
+  for (const std::size_t place : far) copy(packed, place, idle_, idle++);
   Packed kept;
   auto next = far.begin();
   std::size_t begin = 0;
   std::vector<std::size_t> of_colour;
-  for (const std::size_t end : working_.colour_end) {
+  for (const std::size_t end : packed.colour_end) {
     of_colour.clear();
     for (std::size_t place = begin * WIDTH; place < end * WIDTH; ++place) {
       if (next != far.end() && *next == place)
         ++next;
-      else if (!working_.is_empty(place))
+      else if (!packed.is_empty(place))
         of_colour.push_back(place);
     }
     begin = end;
@@ -685,26 +749,26 @@ template <typename Group> void PackedSweeps<Group>::set_idle(double least_idle_g
     std::size_t to = kept.lanes();
     add_groups(kept, (of_colour.size() + WIDTH - 1) / WIDTH);
     kept.colour_end.push_back(kept.groups.size());
-    for (const std::size_t place : of_colour) copy(working_, place, kept, to++);
+    for (const std::size_t place : of_colour) copy(packed, place, kept, to++);
   }
-  working_ = std::move(kept);
-  list_shared();
+  packed = std::move(kept);
 }
 
 template <typename Group>
 void PackedSweeps<Group>::impulses(const Scales &scales, std::vector<double> &impulse) const
 {
   for (std::size_t c = 0; c < impulse.size(); ++c) impulse[c] = of_impulses_[c].idle();
-  for (std::size_t g = 0; g < working_.groups.size(); ++g) {
-    const Group &group = working_.groups[g];
-    const Rest &rest = working_.rest[g];
-    for (int lane = 0; lane < WIDTH; ++lane) {
-      if (rest.source[lane] == NONE || !(group.now[lane] > group.least[lane])) continue;
-      const std::size_t c = rest.source[lane];
-      impulse[c] = of_impulses_[c].project(
-          start_[c] + scales.impulse * static_cast<double>(group.now[lane] / rest.root[lane]));
+  for (const Packed *const some : {&at_cuts_, &inside_})
+    for (std::size_t g = 0; g < some->groups.size(); ++g) {
+      const Group &group = some->groups[g];
+      const Rest &rest = some->rest[g];
+      for (int lane = 0; lane < WIDTH; ++lane) {
+        if (rest.source[lane] == NONE || !(group.now[lane] > group.least[lane])) continue;
+        const std::size_t c = rest.source[lane];
+        impulse[c] = of_impulses_[c].project(
+            start_[c] + scales.impulse * static_cast<double>(group.now[lane] / rest.root[lane]));
+      }
     }
-  }
 }
 
 template class PackedSweeps<swept::ParticleGroup>;

@@ -9,12 +9,13 @@
 // The unknown is the change of the impulses since the start of the search, as in
 // inelastic_packed_iterations.h; so are working and idle constraints.
 //
-// Each rank sweeps over its own constraints. What they do to movers that other ranks have
-// constraints of, too, is exchanged after the sweep. Two ranks that push one mover at the same time
-// push too far: so constraints of such movers have a larger diagonal, by the sum of the
-// off-diagonal entries with the constraints of other ranks (the l1 smoother of Baker, Falgout,
-// Kolev and Yang, SIAM J. Sci. Comput. 33 (2011) 2864), or a bound of it. A periodic image that a
-// rank has of its own particle counts as one of another rank.
+// Each rank sweeps over its own constraints. Of some movers other ranks have constraints, too: a
+// rank sweeps its constraints of those first or last, by its turn (Host::turn), and what they do is
+// exchanged after each turn. Ranks of one turn that push the same mover push too far together. So
+// such constraints have a larger diagonal, by the sum of the off-diagonal entries with those of
+// other ranks of this turn (the l1 smoother of Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput.
+// 33 (2011) 2864), or a bound of it. A periodic image that a rank has of its own particle counts as
+// one of another rank.
 
 #pragma once
 
@@ -24,7 +25,9 @@
 #include "inelastic_packed_targets.h"
 #include "inelastic_sweep_kernels.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 namespace inelastic {
@@ -46,7 +49,11 @@ template <typename Group> class PackedSweeps {
 
   // Returns the largest residual of this rank's working constraints as a part of its target.
   double unsolved(double blur) const
-  { return swept::find_unsolved(working_.groups, states_.data(), static_cast<float>(blur)); }
+  {
+    const auto by = static_cast<float>(blur);
+    return std::max(swept::find_unsolved(at_cuts_.groups, states_.data(), by),
+                    swept::find_unsolved(inside_.groups, states_.data(), by));
+  }
 
   // Computes the states from the impulses: sums of many changes drift in single precision.
   // Collective.
@@ -94,16 +101,23 @@ template <typename Group> class PackedSweeps {
     { return rest[lane / WIDTH].source[lane % WIDTH] == NONE; }
   };
 
-  // One lane of a group, with all that belongs to it.
-  struct Place {
-    std::size_t group;
-    int lane;
+  // A constraint without an impulse, by its place, and its gap.
+  struct Unloaded {
+    std::size_t place;
+    float gap;
   };
+
+  // How many numbers from_other_ranks needs of each mover.
+  static constexpr std::size_t NUMBERS = std::is_same_v<Group, swept::BodyGroup> ? 1 : 6;
 
   void find_movers(const ContactProblem &problem);
   void find_bodies(const RigidBodies &bodies);
   void find_shared(const ContactProblem &problem, const std::vector<std::size_t> &working,
-                   const std::vector<double> &diagonal, Host &host);
+                   std::size_t constraints, Host &host);
+  static std::vector<double> of_all_ranks(const std::vector<double> &mine, std::size_t numbers,
+                                          Host &host);
+  bool is_at_cut(int first, int second) const;
+  bool is_shared(int slot) const;
   double from_other_ranks(const ContactProblem &problem, std::size_t c) const;
   double mobility_of(const ContactProblem &problem, std::size_t c, int slot) const;
   void add_groups(Packed &packed, std::size_t count) const;
@@ -117,20 +131,25 @@ template <typename Group> class PackedSweeps {
   static void copy(const Packed &from, std::size_t source, Packed &to, std::size_t place);
   void clear_lane(Packed &packed, std::size_t place) const;
   void wake(const std::vector<std::size_t> &near);
+  float look_at(const Packed &packed, std::vector<Unloaded> &unloaded);
   void set_idle(double least_idle_gap);
+  void make_idle(const std::vector<Unloaded> &unloaded, Packed &packed);
   float looked_gap(const Packed &packed, std::size_t place) const;
   void list_shared();
   void add_impulses_to(std::vector<Vector> &sums, const Group &group, const Rest &rest, int lane,
                        float change) const;
   void give_to_states(std::vector<State> &states) const;
-  void exchange(const std::vector<float> &change, std::vector<State> &states, Host &host);
+  void exchange_after(bool visited, Host &host);
+  void exchange(bool tells, std::vector<State> &states, Host &host);
   const std::vector<Vector> &velocities();
 
-  Packed working_, idle_;
+  // Working constraints: those of movers that other ranks have constraints of, too, and all others.
+  Packed at_cuts_, inside_;
+  Packed idle_;
   std::vector<State> states_, before_;
-  std::vector<Vector> velocity_, sum_, own_;    // per slot
-  std::vector<int> mover_;                      // per slot
-  std::vector<char> moves_;                     // per mover: whether impulses move it
+  std::vector<Vector> velocity_, sum_;    // per slot
+  std::vector<int> mover_;                // per slot
+  std::vector<char> moves_;               // per mover: whether impulses move it
   int movers_ = 0;
   std::vector<float> mobility_;    // per mover: the inverse mass, in packed units
   // Per mover 9: F of F F^T = I^-1 by columns, in packed units; per member of a body its arm.
@@ -139,13 +158,14 @@ template <typename Group> class PackedSweeps {
   std::vector<char> is_copy_;     // per slot
   double mobility_unit_ = 0.0;
 
-  // Of movers that other ranks, or images, have constraints of, too.
   bool has_ghosts_ = false;
-  std::vector<char> shared_;                     // per mover
-  std::vector<float> of_others_;                 // per mover: what from_other_ranks needs
-  std::vector<std::size_t> shared_lanes_;        // working constraints of such movers
-  std::vector<float> led_;                       // their impulses before a sweep visits them
-  std::vector<double> start_;                    // impulses, in the order of the problem
+  int turns_ = 1, turn_ = 0;
+  std::vector<char> shared_;         // per mover: whether other ranks, or images, have constraints
+  std::vector<float> of_others_;     // per mover: what from_other_ranks needs
+  std::vector<float> changes_;       // of impulses at cuts in a sweep; before it, impulses led on
+  std::vector<int> shared_slots_;    // what an exchange writes
+  std::vector<Vector> own_;          // the sums of this rank, one for each of these
+  std::vector<double> start_;        // impulses, in the order of the problem
   std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;
   std::vector<swept::Gaps> looked_;

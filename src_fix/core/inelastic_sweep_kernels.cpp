@@ -143,11 +143,12 @@ namespace {
   }
 
   template <typename Group>
-  INELASTIC_INLINE Swept sweep_all(std::vector<Group> &groups, typename Group::State *states,
-                                   float along, float blur)
+  INELASTIC_INLINE void sweep_all(Group *groups, std::size_t count, typename Group::State *states,
+                                  float along, float blur, Swept &swept)
   {
     Eight uphill = {}, most = {}, of_target = {}, farthest = {};
-    for (Group &group : groups) {
+    for (std::size_t g = 0; g < count; ++g) {
+      Group &group = groups[g];
       Loaded<Group> loaded;
       Eight opened;
       opening(group, states, loaded, opened);
@@ -167,14 +168,15 @@ namespace {
       group.now = next;
       push(group, change, loaded, states);
     }
-    Swept all;
+    const auto raise = [](double &maximum, float value) {
+      maximum = std::max(maximum, static_cast<double>(value));
+    };
     for (int k = 0; k < WIDTH; ++k) {
-      all.uphill += static_cast<double>(uphill[k]);
-      all.change = std::max(all.change, static_cast<double>(most[k]));
-      all.of_target = std::max(all.of_target, static_cast<double>(of_target[k]));
-      all.farthest = std::max(all.farthest, static_cast<double>(farthest[k]));
+      swept.uphill += static_cast<double>(uphill[k]);
+      raise(swept.change, most[k]);
+      raise(swept.of_target, of_target[k]);
+      raise(swept.farthest, farthest[k]);
     }
-    return all;
   }
 
   template <typename Group>
@@ -233,12 +235,12 @@ namespace {
 
 }    // namespace
 
-INELASTIC_CLONES Swept sweep(std::vector<ParticleGroup> &groups, ParticleGroup::State *states,
-                             float along, float blur)
-{ return sweep_all(groups, states, along, blur); }
-INELASTIC_CLONES Swept sweep(std::vector<BodyGroup> &groups, BodyGroup::State *states, float along,
-                             float blur)
-{ return sweep_all(groups, states, along, blur); }
+INELASTIC_CLONES void sweep(ParticleGroup *groups, std::size_t count, ParticleGroup::State *states,
+                            float along, float blur, Swept &swept)
+{ sweep_all(groups, count, states, along, blur, swept); }
+INELASTIC_CLONES void sweep(BodyGroup *groups, std::size_t count, BodyGroup::State *states,
+                            float along, float blur, Swept &swept)
+{ sweep_all(groups, count, states, along, blur, swept); }
 
 INELASTIC_CLONES double find_unsolved(const std::vector<ParticleGroup> &groups,
                                       const ParticleGroup::State *states, float blur)

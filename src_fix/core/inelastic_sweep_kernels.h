@@ -63,11 +63,13 @@ struct Swept {
   double farthest = 0.0;    // the largest change of an impulse since the start of the search
 };
 
-// Visits all constraints, each from its impulse led on by `along` times its last change. The states
-// must have been led on alike. Changes below `blur`, in scaled units, may be round-off.
-Swept sweep(std::vector<ParticleGroup> &groups, ParticleGroup::State *states, float along,
-            float blur);
-Swept sweep(std::vector<BodyGroup> &groups, BodyGroup::State *states, float along, float blur);
+// Visits the constraints of `count` groups, each from its impulse led on by `along` times its last
+// change, and adds to `swept`. The states must have been led on alike. Changes below `blur`, in
+// scaled units, may be round-off.
+void sweep(ParticleGroup *groups, std::size_t count, ParticleGroup::State *states, float along,
+           float blur, Swept &swept);
+void sweep(BodyGroup *groups, std::size_t count, BodyGroup::State *states, float along, float blur,
+           Swept &swept);
 
 // Returns, between two sweeps, the largest residual, beyond the blur, as a part of its target.
 double find_unsolved(const std::vector<ParticleGroup> &groups, const ParticleGroup::State *states,

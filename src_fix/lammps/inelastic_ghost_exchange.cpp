@@ -53,6 +53,18 @@ GhostExchange::~GhostExchange()
 bool GhostExchange::has_ghosts() const
 { return comm->nprocs > 1 || atom->nghost > 0; }
 
+int GhostExchange::turns() const
+{ return comm->nprocs > 1 ? 2 : 1; }
+
+// In a grid of ranks those that share a face have different turns, but across a periodic face with
+// an odd number of ranks between.
+int GhostExchange::turn() const
+{
+  const bool in_grid = comm->layout != Comm::LAYOUT_TILED;
+  const int place = in_grid ? comm->myloc[0] + comm->myloc[1] + comm->myloc[2] : comm->me;
+  return comm->nprocs > 1 ? place % 2 : 0;
+}
+
 void GhostExchange::sum_over_ghosts(double *per_particle)
 {
   exchanged_ = per_particle;

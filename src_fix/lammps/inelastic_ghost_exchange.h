@@ -46,6 +46,8 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   void share_with_ghosts(double *per_particle) override;
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override;
   bool has_ghosts() const override;
+  int turns() const override;
+  int turn() const override;
 
   // Gives an owned atom and all its ghosts the least of their values, 3 numbers per particle.
   // Collective.

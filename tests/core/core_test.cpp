@@ -1051,6 +1051,8 @@ class RankHost final : public Host {
   void sum_over_ghosts(double *per_particle) override { sum(per_particle, 3, nullptr); }
 
   bool has_ghosts() const override { return true; }
+  int turns() const override { return 2; }
+  int turn() const override { return static_cast<int>(rank_ % 2); }
   void choose_ghosts(const std::vector<char> &chosen) override
   {
     chosen_ = chosen;
