@@ -102,6 +102,15 @@ namespace {
     long begun_, next_refresh_, next_look_;
   };
 
+  // Returns the largest residual, over all ranks, as a part of its target. Collective.
+  template <typename Group>
+  double find_unsolved(const PackedSweeps<Group> &sweeps, double blur, Host &host)
+  {
+    double unsolved = sweeps.unsolved(blur);
+    host.reduce(nullptr, 0, &unsolved, 1);
+    return unsolved;
+  }
+
 }    // namespace
 
 template <typename Group>
@@ -137,16 +146,18 @@ ColouredSweeps::End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, ContactPr
     blur = BLUR * maxima[2];
 
     if (looks.is_time(result.iterations, of_target)) {
-      double unsolved = sweeps.unsolved(blur);
-      host.reduce(nullptr, 0, &unsolved, 1);
+      double unsolved = find_unsolved(sweeps, blur, host);
       looks.see(result.iterations, of_target, unsolved);
-      if (unsolved <= 1.0 && settling.has_settled(limits.accuracy, host)) {
+      const bool near = unsolved <= 1.0;
+      const bool settled = near && settling.has_settled(limits.accuracy, host);
+      if (settled) unsolved = find_unsolved(sweeps, blur, host);    // the targets are new
+      if (settled && unsolved <= 1.0) {
         sweeps.impulses(scales, impulse);
         if (!judge(problem, limits, host, result)) return End::BLURRED;
         result.status = Status::CONVERGED;
         return End::SOLVED;
       }
-      if (unsolved <= 1.0) looks.wait(result.iterations + std::max(3L, result.iterations / 10));
+      if (near && !settled) looks.wait(result.iterations + std::max(3L, result.iterations / 10));
     }
     if ((result.iterations - begun) % CHECK_EVERY == 0) {
       sweeps.impulses(scales, impulse);

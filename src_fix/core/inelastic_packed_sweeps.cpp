@@ -576,13 +576,11 @@ const std::vector<typename PackedSweeps<Group>::Vector> &PackedSweeps<Group>::ve
 
 template <typename Group> bool PackedSweeps<Group>::sets_targets(long sweep)
 {
-  // True for the numbers at which an eighth more than a power of two, or of that, is reached.
-  constexpr int IN_EIGHTHS = 3;
   if (sweep < 2) return false;
-  int below = 0;
+  int below = 0;    // 2^below is the largest power of two that is not more
   while ((sweep >> (below + 1)) > 0) ++below;
-  const long every = below > IN_EIGHTHS ? 1L << (below - IN_EIGHTHS) : 2;
-  return sweep % every == 0;
+  const long quarter = below > 2 ? 1L << (below - 2) : 2;
+  return sweep % quarter == 0;
 }
 
 template <typename Group> void PackedSweeps<Group>::set_targets()

@@ -59,7 +59,7 @@ template <typename Group> class PackedSweeps {
   // Collective.
   void refresh(Host &host);
 
-  // As in PackedIterations. Sweeps set the targets when there were an eighth more of them.
+  // As in PackedIterations. Targets are set four times until there are twice as many sweeps.
   static bool sets_targets(long sweep);
   void set_targets();
   void keep_velocities();

@@ -937,6 +937,8 @@ class Ranks {
   {
   }
 
+  int turns = 2;    // of Host::turns
+
   struct Arrays {
     double *per_particle = nullptr;
     double *sums = nullptr, *maxima = nullptr;
@@ -1051,8 +1053,8 @@ class RankHost final : public Host {
   void sum_over_ghosts(double *per_particle) override { sum(per_particle, 3, nullptr); }
 
   bool has_ghosts() const override { return true; }
-  int turns() const override { return 2; }
-  int turn() const override { return static_cast<int>(rank_ % 2); }
+  int turns() const override { return ranks_.turns; }
+  int turn() const override { return static_cast<int>(rank_) % ranks_.turns; }
   void choose_ghosts(const std::vector<char> &chosen) override
   {
     chosen_ = chosen;
@@ -1315,7 +1317,7 @@ void check_calls(long calls, const ProjectionResult &result, long per_round)
 }
 
 // Bodies lie across the ranks, and each rank has some of their particles twice.
-void test_bodies_on_two_ranks(double tolerance)
+void test_bodies_on_two_ranks(double tolerance, int turns)
 {
   const double bound = 100.0 * tolerance / TIMESTEP;    // as in test_two_ranks
   const ContactProblem whole = make_crystal_of_bodies();
@@ -1338,6 +1340,7 @@ void test_bodies_on_two_ranks(double tolerance)
         Division division = divide(whole, owner);
         complete(whole.bodies, division.shares);
         Ranks ranks(division.shares, whole.particles);
+        ranks.turns = turns;
         const auto outcomes =
             solve_on_ranks(whole, ranks, division.contacts, name, tolerance, hide_contacts);
         check_agreement(outcomes, ranks, solve_on_one_rank(whole, name, tolerance), bound);
@@ -1348,7 +1351,7 @@ void test_bodies_on_two_ranks(double tolerance)
       }
 }
 
-void test_two_ranks(double tolerance)
+void test_two_ranks(double tolerance, int turns)
 {
   // Rounding in another order moves the last iteration by no more than the tolerance; along a few
   // contacts that is less than 100 times the tolerance over the step.
@@ -1373,6 +1376,7 @@ void test_two_ranks(double tolerance)
       for (const bool hide_contacts : {false, true}) {
         const Division division = divide(whole, owner);
         Ranks ranks(division.shares, whole.particles);
+        ranks.turns = turns;
         const auto outcomes =
             solve_on_ranks(whole, ranks, division.contacts, name, tolerance, hide_contacts);
         check_agreement(outcomes, ranks, solve_on_one_rank(whole, name, tolerance), bound);
@@ -1571,8 +1575,10 @@ int main()
   test_iterations_of_all_rounds_are_limited();
   test_concave_wall_is_linearised_again();
   for (const double tolerance : {TOLERANCE, SINGLE_TOLERANCE}) {
-    test_two_ranks(tolerance);
-    test_bodies_on_two_ranks(tolerance);
+    for (const int turns : {1, 2}) {
+      test_two_ranks(tolerance, turns);
+      test_bodies_on_two_ranks(tolerance, turns);
+    }
   }
   test_two_ranks_with_nothing();
   test_lid_over_two_ranks();
