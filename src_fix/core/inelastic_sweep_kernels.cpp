@@ -6,9 +6,21 @@
 
 namespace inelastic::swept {
 
+// Every pass is written for vectors of eight numbers, and of four: processors without registers for
+// eight take three times as long for eight as for two times four.
+
 namespace {
 
 #define INELASTIC_INLINE inline __attribute__((always_inline))
+
+  struct Wide {
+    using Numbers = Eight;
+    static constexpr int COUNT = 8;
+  };
+  struct Narrow {
+    using Numbers = Four;
+    static constexpr int COUNT = 4;
+  };
 
   template <typename State> INELASTIC_INLINE auto &at(State *states, std::uint32_t offset)
   { return reinterpret_cast<State *>(reinterpret_cast<char *>(states) + offset)->lanes; }
@@ -19,10 +31,17 @@ namespace {
     return reinterpret_cast<const State *>(reinterpret_cast<const char *>(states) + offset)->lanes;
   }
 
+  // Gives the numbers of a vector from a place on: all of them, or a half.
+  template <typename Size> INELASTIC_INLINE typename Size::Numbers &part(Eight &whole, int from)
+  { return reinterpret_cast<typename Size::Numbers *>(&whole)[from / Size::COUNT]; }
+  template <typename Size>
+  INELASTIC_INLINE const typename Size::Numbers &part(const Eight &whole, int from)
+  { return reinterpret_cast<const typename Size::Numbers *>(&whole)[from / Size::COUNT]; }
+
   // Writes the lanes of two vectors, one after the other, that are named. (Compilers without this
   // function, such as GCC 11, make more instructions of it.)
-  template <int... PLACES, typename Vector>
-  INELASTIC_INLINE void pick(const Vector &a, const Vector &b, Eight &picked)
+  template <int... PLACES, typename Vector, typename V>
+  INELASTIC_INLINE void pick(const Vector &a, const Vector &b, V &picked)
   {
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
@@ -33,8 +52,7 @@ namespace {
     picked = __builtin_shufflevector(a, b, PLACES...);
 #else
     constexpr int WIDTH_OF_EACH = sizeof(Vector) / sizeof(float);
-    picked =
-        Eight{(PLACES < WIDTH_OF_EACH ? a[PLACES % WIDTH_OF_EACH] : b[PLACES % WIDTH_OF_EACH])...};
+    picked = V{(PLACES < WIDTH_OF_EACH ? a[PLACES % WIDTH_OF_EACH] : b[PLACES % WIDTH_OF_EACH])...};
 #endif
   }
 
@@ -51,9 +69,18 @@ namespace {
     sums = even + odd;
   }
 
+  template <int A, int B, int C, int D>
+  INELASTIC_INLINE void add_picked(const Four &a, const Four &b, Four &sums)
+  {
+    Four even, odd;
+    pick<A, B, C, D>(a, b, even);
+    pick<A + 2, B + 2, C + 2, D + 2>(a, b, odd);
+    sums = even + odd;
+  }
+
   // Writes the sums over the four numbers of each half of four vectors: those of the lower halves
   // first.
-  INELASTIC_INLINE void add_up_halves(const Eight *t, Eight &sums)
+  INELASTIC_INLINE void add_up(const Eight *t, Eight &sums)
   {
     Eight ab, cd;
     add_picked<0, 8, 1, 9, 4, 12, 5, 13>(t[0], t[1], ab);
@@ -61,15 +88,23 @@ namespace {
     add_picked<0, 1, 8, 9, 4, 5, 12, 13>(ab, cd, sums);
   }
 
-  // The states of a group's constraints: kept, where registers have room for them.
-  template <typename Group> struct Loaded;
-  template <> struct Loaded<ParticleGroup> {
+  // Writes the sums over the numbers of each of four vectors.
+  INELASTIC_INLINE void add_up(const Four *t, Four &sums)
+  {
+    Four ab, cd;
+    add_picked<0, 4, 1, 5>(t[0], t[1], ab);
+    add_picked<0, 4, 1, 5>(t[2], t[3], cd);
+    add_picked<0, 1, 4, 5>(ab, cd, sums);
+  }
+
+  // The states of some constraints of a group: kept, where registers have room for them.
+  template <typename Group, typename Size> struct Loaded {};
+  template <> struct Loaded<ParticleGroup, Wide> {
     Eight first[4], second[4];
   };
-  template <> struct Loaded<BodyGroup> {};
 
   INELASTIC_INLINE void load(const ParticleGroup &group, const ParticleGroup::State *states,
-                             Loaded<ParticleGroup> &loaded)
+                             Loaded<ParticleGroup, Wide> &loaded)
   {
     for (int k = 0; k < 4; ++k) {
       join(at(states, group.first[k]), at(states, group.first[k + 4]), loaded.first[k]);
@@ -77,36 +112,67 @@ namespace {
     }
   }
 
-  INELASTIC_INLINE void load(const BodyGroup &, const BodyGroup::State *, Loaded<BodyGroup> &) {}
+  template <typename Group, typename Size>
+  INELASTIC_INLINE void load(const Group &, const typename Group::State *, Loaded<Group, Size> &)
+  {
+  }
 
-  INELASTIC_INLINE void opening(const ParticleGroup &group, const ParticleGroup::State *states,
-                                Loaded<ParticleGroup> &loaded, Eight &sums)
+  // opening() writes row . u of the constraints of a group from a place on.
+  INELASTIC_INLINE void opening(const ParticleGroup &group, int, const ParticleGroup::State *states,
+                                Loaded<ParticleGroup, Wide> &loaded, Eight &sums)
   {
     Eight terms[4];
     load(group, states, loaded);
     for (int k = 0; k < 4; ++k) terms[k] = group.row[k] * (loaded.first[k] - loaded.second[k]);
-    add_up_halves(terms, sums);
+    add_up(terms, sums);
   }
 
-  INELASTIC_INLINE void opening(const BodyGroup &group, const BodyGroup::State *states,
-                                Loaded<BodyGroup> &, Eight &sums)
+  INELASTIC_INLINE void opening(const ParticleGroup &group, int from,
+                                const ParticleGroup::State *states, Loaded<ParticleGroup, Narrow> &,
+                                Four &sums)
+  {
+    Four terms[4];
+    for (int k = 0; k < 4; ++k)
+      terms[k] = part<Narrow>(group.row[k], from) *
+          (at(states, group.first[from + k]) - at(states, group.second[from + k]));
+    add_up(terms, sums);
+  }
+
+  INELASTIC_INLINE void opening(const BodyGroup &group, int, const BodyGroup::State *states,
+                                Loaded<BodyGroup, Wide> &, Eight &sums)
   {
     Eight terms[WIDTH], low, high;
     for (int k = 0; k < WIDTH; ++k)
       terms[k] = group.first_row[k] * at(states, group.first[k]) +
           group.second_row[k] * at(states, group.second[k]);
-    add_up_halves(terms, low);
-    add_up_halves(terms + 4, high);
+    add_up(terms, low);
+    add_up(terms + 4, high);
     Eight slides, spins;
     pick<0, 1, 2, 3, 8, 9, 10, 11>(low, high, slides);
     pick<4, 5, 6, 7, 12, 13, 14, 15>(low, high, spins);
     sums = slides + spins;
   }
 
+  INELASTIC_INLINE void opening(const BodyGroup &group, int from, const BodyGroup::State *states,
+                                Loaded<BodyGroup, Narrow> &, Four &sums)
+  {
+    Four terms[4];
+    for (int k = 0; k < 4; ++k) {
+      const Eight &first = at(states, group.first[from + k]);
+      const Eight &second = at(states, group.second[from + k]);
+      const Eight &first_row = group.first_row[from + k], &second_row = group.second_row[from + k];
+      terms[k] = part<Narrow>(first_row, 0) * part<Narrow>(first, 0) +
+          part<Narrow>(first_row, 4) * part<Narrow>(first, 4) +
+          part<Narrow>(second_row, 0) * part<Narrow>(second, 0) +
+          part<Narrow>(second_row, 4) * part<Narrow>(second, 4);
+    }
+    add_up(terms, sums);
+  }
+
   // Adds the changes of two impulses, of constraints K and K + 4, to their states.
   template <int K>
   INELASTIC_INLINE void push_two(const ParticleGroup &group, const Eight &of_first,
-                                 const Eight &of_second, const Loaded<ParticleGroup> &loaded,
+                                 const Eight &of_second, const Loaded<ParticleGroup, Wide> &loaded,
                                  ParticleGroup::State *states)
   {
     constexpr int J = K + 4;
@@ -121,9 +187,11 @@ namespace {
     at(states, group.second[J]) = Four{second[4], second[5], second[6], second[7]};
   }
 
-  // Adds changes of the impulses to the states.
-  INELASTIC_INLINE void push(const ParticleGroup &group, const Eight &change,
-                             const Loaded<ParticleGroup> &loaded, ParticleGroup::State *states)
+  // push() adds changes of the impulses of the constraints of a group from a place on to the
+  // states.
+  INELASTIC_INLINE void push(const ParticleGroup &group, int, const Eight &change,
+                             const Loaded<ParticleGroup, Wide> &loaded,
+                             ParticleGroup::State *states)
   {
     const Eight of_first = change * group.first_mobility;
     const Eight of_second = change * group.second_mobility;
@@ -133,93 +201,126 @@ namespace {
     push_two<3>(group, of_first, of_second, loaded, states);
   }
 
-  INELASTIC_INLINE void push(const BodyGroup &group, const Eight &change, const Loaded<BodyGroup> &,
-                             BodyGroup::State *states)
+  INELASTIC_INLINE void push(const ParticleGroup &group, int from, const Four &change,
+                             const Loaded<ParticleGroup, Narrow> &, ParticleGroup::State *states)
   {
-    for (int k = 0; k < WIDTH; ++k) {
-      at(states, group.first[k]) += group.first_row[k] * change[k];
-      at(states, group.second[k]) += group.second_row[k] * change[k];
+    const Four of_first = change * part<Narrow>(group.first_mobility, from);
+    const Four of_second = change * part<Narrow>(group.second_mobility, from);
+    for (int k = 0; k < 4; ++k) {
+      const Four &row = part<Narrow>(group.row[k], from);
+      at(states, group.first[from + k]) += row * of_first[k];
+      at(states, group.second[from + k]) -= row * of_second[k];
     }
   }
 
-  template <typename Group>
-  INELASTIC_INLINE void sweep_all(Group *groups, std::size_t count, typename Group::State *states,
-                                  float along, float blur, Swept &swept)
+  template <typename Size>
+  INELASTIC_INLINE void push(const BodyGroup &group, int from, const typename Size::Numbers &change,
+                             const Loaded<BodyGroup, Size> &, BodyGroup::State *states)
   {
-    Eight uphill = {}, most = {}, of_target = {}, farthest = {};
-    for (std::size_t g = 0; g < count; ++g) {
-      Group &group = groups[g];
-      Loaded<Group> loaded;
-      Eight opened;
-      opening(group, states, loaded, opened);
-      const Eight now = group.now;
-      const Eight led = now + along * (now - group.before);
-      const Eight free = led - (group.gap + group.give * led + opened);
-      const Eight next = free > group.least ? free : group.least;
-      const Eight change = next - led;
-      uphill -= change * (next - now);
-      const Eight size = change > 0 ? change : -change;
-      most = size > most ? size : most;
-      const Eight part = (size - blur) * group.inverse_target;
-      of_target = part > of_target ? part : of_target;
-      const Eight far = next > 0 ? next : -next;
-      farthest = far > farthest ? far : farthest;
-      group.before = now;
-      group.now = next;
-      push(group, change, loaded, states);
-    }
-    const auto raise = [](double &maximum, float value) {
-      maximum = std::max(maximum, static_cast<double>(value));
-    };
-    for (int k = 0; k < WIDTH; ++k) {
-      swept.uphill += static_cast<double>(uphill[k]);
-      raise(swept.change, most[k]);
-      raise(swept.of_target, of_target[k]);
-      raise(swept.farthest, farthest[k]);
+    constexpr int COUNT = Size::COUNT;
+    for (int k = 0; k < COUNT; ++k) {
+      const int c = from + k;
+      for (int half = 0; half < WIDTH; half += COUNT)
+        part<Size>(at(states, group.first[c]), half) +=
+            part<Size>(group.first_row[c], half) * change[k];
+      for (int half = 0; half < WIDTH; half += COUNT)
+        part<Size>(at(states, group.second[c]), half) +=
+            part<Size>(group.second_row[c], half) * change[k];
     }
   }
 
-  template <typename Group>
-  INELASTIC_INLINE double unsolved_of_all(const std::vector<Group> &groups,
-                                          const typename Group::State *states, float blur)
+  template <typename Size> INELASTIC_INLINE double largest_of(const typename Size::Numbers &values)
   {
-    Eight unsolved = {};
-    for (const Group &group : groups) {
-      Loaded<Group> loaded;
-      Eight opened;
-      opening(group, states, loaded, opened);
-      const Eight gap = group.gap + group.give * group.now + opened;
-      const Eight under_force = group.now > group.least ? gap : -gap;
-      const Eight left = under_force > -gap ? under_force : -gap;
-      const Eight part = (left - blur) * group.inverse_target;
-      unsolved = part > unsolved ? part : unsolved;
-    }
     double most = 0.0;
-    for (int k = 0; k < WIDTH; ++k) most = std::max(most, static_cast<double>(unsolved[k]));
+    for (int k = 0; k < Size::COUNT; ++k) most = std::max(most, static_cast<double>(values[k]));
     return most;
   }
 
-  template <typename Group>
+  template <typename Size, typename Group>
+  INELASTIC_INLINE void sweep_all(Group *groups, std::size_t count, typename Group::State *states,
+                                  float along, float blur, Swept &swept)
+  {
+    using V = typename Size::Numbers;
+    V uphill = {}, most = {}, of_target = {}, farthest = {};
+    for (std::size_t g = 0; g < count; ++g) {
+      Group &group = groups[g];
+      for (int from = 0; from < WIDTH; from += Size::COUNT) {
+        Loaded<Group, Size> loaded;
+        V opened;
+        opening(group, from, states, loaded, opened);
+        const V now = part<Size>(group.now, from);
+        const V led = now + along * (now - part<Size>(group.before, from));
+        const V free =
+            led - (part<Size>(group.gap, from) + part<Size>(group.give, from) * led + opened);
+        const V &least = part<Size>(group.least, from);
+        const V next = free > least ? free : least;
+        const V change = next - led;
+        uphill -= change * (next - now);
+        const V size = change > 0 ? change : -change;
+        most = size > most ? size : most;
+        const V ratio = (size - blur) * part<Size>(group.inverse_target, from);
+        of_target = ratio > of_target ? ratio : of_target;
+        const V far = next > 0 ? next : -next;
+        farthest = far > farthest ? far : farthest;
+        part<Size>(group.before, from) = now;
+        part<Size>(group.now, from) = next;
+        push(group, from, change, loaded, states);
+      }
+    }
+    for (int k = 0; k < Size::COUNT; ++k) swept.uphill += static_cast<double>(uphill[k]);
+    swept.change = std::max(swept.change, largest_of<Size>(most));
+    swept.of_target = std::max(swept.of_target, largest_of<Size>(of_target));
+    swept.farthest = std::max(swept.farthest, largest_of<Size>(farthest));
+  }
+
+  template <typename Size, typename Group>
+  INELASTIC_INLINE double unsolved_of_all(const std::vector<Group> &groups,
+                                          const typename Group::State *states, float blur)
+  {
+    using V = typename Size::Numbers;
+    V unsolved = {};
+    for (const Group &group : groups)
+      for (int from = 0; from < WIDTH; from += Size::COUNT) {
+        Loaded<Group, Size> loaded;
+        V opened;
+        opening(group, from, states, loaded, opened);
+        const V &now = part<Size>(group.now, from);
+        const V gap = part<Size>(group.gap, from) + part<Size>(group.give, from) * now + opened;
+        const V under_force = now > part<Size>(group.least, from) ? gap : -gap;
+        const V left = under_force > -gap ? under_force : -gap;
+        const V ratio = (left - blur) * part<Size>(group.inverse_target, from);
+        unsolved = ratio > unsolved ? ratio : unsolved;
+      }
+    return largest_of<Size>(unsolved);
+  }
+
+  template <typename Size, typename Group>
   INELASTIC_INLINE void gaps_of_all(const std::vector<Group> &groups,
                                     const typename Group::State *states, Gaps *gap)
   {
     for (const Group &group : groups) {
-      Loaded<Group> loaded;
-      Eight opened;
-      opening(group, states, loaded, opened);
-      (gap++)->lanes = group.gap + group.give * group.now + opened;
+      for (int from = 0; from < WIDTH; from += Size::COUNT) {
+        Loaded<Group, Size> loaded;
+        typename Size::Numbers opened;
+        opening(group, from, states, loaded, opened);
+        part<Size>(gap->lanes, from) = part<Size>(group.gap, from) +
+            part<Size>(group.give, from) * part<Size>(group.now, from) + opened;
+      }
+      ++gap;
     }
   }
 
-  template <typename Group>
+  template <typename Size, typename Group>
   INELASTIC_INLINE void add_all(const std::vector<Group> &groups, When when,
                                 typename Group::State *states)
   {
-    for (const Group &group : groups) {
-      Loaded<Group> loaded;
-      load(group, states, loaded);
-      push(group, when == When::NOW ? group.now : group.before, loaded, states);
-    }
+    for (const Group &group : groups)
+      for (int from = 0; from < WIDTH; from += Size::COUNT) {
+        Loaded<Group, Size> loaded;
+        load(group, states, loaded);
+        push(group, from, part<Size>(when == When::NOW ? group.now : group.before, from), loaded,
+             states);
+      }
   }
 
   template <typename State>
@@ -233,35 +334,60 @@ namespace {
     }
   }
 
+  // Tells whether the clones below that have registers for eight numbers are the ones that run.
+  bool is_wide()
+  {
+#ifdef INELASTIC_HAS_CLONES
+    static const bool wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    return wide;
+#elif defined(__AVX2__)
+    return true;
+#else
+    return false;
+#endif
+  }
+
+  // The passes over groups of each kind, by vectors of eight and of four numbers.
+#define INELASTIC_PASSES(GROUP)                                                                 \
+  INELASTIC_CLONES void wide_sweep(GROUP *groups, std::size_t count, GROUP::State *states,      \
+                                   float along, float blur, Swept &swept)                       \
+  { sweep_all<Wide>(groups, count, states, along, blur, swept); }                               \
+  INELASTIC_CLONES double wide_unsolved(const std::vector<GROUP> &groups,                       \
+                                        const GROUP::State *states, float blur)                 \
+  { return unsolved_of_all<Wide>(groups, states, blur); }                                       \
+  INELASTIC_CLONES void wide_gaps(const std::vector<GROUP> &groups, const GROUP::State *states, \
+                                  Gaps *gap)                                                    \
+  { gaps_of_all<Wide>(groups, states, gap); }                                                   \
+  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,                   \
+                                 GROUP::State *states)                                          \
+  { add_all<Wide>(groups, when, states); }
+
+  INELASTIC_PASSES(ParticleGroup)
+  INELASTIC_PASSES(BodyGroup)
+
 }    // namespace
 
-INELASTIC_CLONES void sweep(ParticleGroup *groups, std::size_t count, ParticleGroup::State *states,
-                            float along, float blur, Swept &swept)
-{ sweep_all(groups, count, states, along, blur, swept); }
-INELASTIC_CLONES void sweep(BodyGroup *groups, std::size_t count, BodyGroup::State *states,
-                            float along, float blur, Swept &swept)
-{ sweep_all(groups, count, states, along, blur, swept); }
+#define INELASTIC_CHOICES(GROUP)                                                                 \
+  void sweep(GROUP *groups, std::size_t count, GROUP::State *states, float along, float blur,    \
+             Swept &swept)                                                                       \
+  {                                                                                              \
+    if (is_wide())                                                                               \
+      wide_sweep(groups, count, states, along, blur, swept);                                     \
+    else                                                                                         \
+      sweep_all<Narrow>(groups, count, states, along, blur, swept);                              \
+  }                                                                                              \
+  double find_unsolved(const std::vector<GROUP> &groups, const GROUP::State *states, float blur) \
+  {                                                                                              \
+    return is_wide() ? wide_unsolved(groups, states, blur)                                       \
+                     : unsolved_of_all<Narrow>(groups, states, blur);                            \
+  }                                                                                              \
+  void find_gaps(const std::vector<GROUP> &groups, const GROUP::State *states, Gaps *gap)        \
+  { is_wide() ? wide_gaps(groups, states, gap) : gaps_of_all<Narrow>(groups, states, gap); }     \
+  void add_impulses(const std::vector<GROUP> &groups, When when, GROUP::State *states)           \
+  { is_wide() ? wide_add(groups, when, states) : add_all<Narrow>(groups, when, states); }
 
-INELASTIC_CLONES double find_unsolved(const std::vector<ParticleGroup> &groups,
-                                      const ParticleGroup::State *states, float blur)
-{ return unsolved_of_all(groups, states, blur); }
-INELASTIC_CLONES double find_unsolved(const std::vector<BodyGroup> &groups,
-                                      const BodyGroup::State *states, float blur)
-{ return unsolved_of_all(groups, states, blur); }
-
-INELASTIC_CLONES void find_gaps(const std::vector<ParticleGroup> &groups,
-                                const ParticleGroup::State *states, Gaps *gap)
-{ gaps_of_all(groups, states, gap); }
-INELASTIC_CLONES void find_gaps(const std::vector<BodyGroup> &groups,
-                                const BodyGroup::State *states, Gaps *gap)
-{ gaps_of_all(groups, states, gap); }
-
-INELASTIC_CLONES void add_impulses(const std::vector<ParticleGroup> &groups, When when,
-                                   ParticleGroup::State *states)
-{ add_all(groups, when, states); }
-INELASTIC_CLONES void add_impulses(const std::vector<BodyGroup> &groups, When when,
-                                   BodyGroup::State *states)
-{ add_all(groups, when, states); }
+INELASTIC_CHOICES(ParticleGroup)
+INELASTIC_CHOICES(BodyGroup)
 
 INELASTIC_CLONES void lead_on(std::vector<ParticleGroup::State> &states,
                               std::vector<ParticleGroup::State> &before, float along)

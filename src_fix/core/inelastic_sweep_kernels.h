@@ -19,8 +19,9 @@
 
 namespace inelastic::swept {
 
-typedef float Four __attribute__((vector_size(16)));
-typedef float Eight __attribute__((vector_size(32)));
+// Halves of a vector are read as vectors, too.
+typedef float Four __attribute__((vector_size(16), may_alias));
+typedef float Eight __attribute__((vector_size(32), may_alias));
 
 constexpr int WIDTH = 8;    // constraints in a group
 

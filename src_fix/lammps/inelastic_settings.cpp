@@ -43,6 +43,7 @@ class Reader {
   void read_rigid(const char *fix_id);
   void read_law(const std::string &name);
   void read_solver(const char *name);
+  void choose_solver();
   void read_max_iterations(const char *value);
   void read_frozen(const char *group_id);
   void read_record(const char *file);
@@ -51,7 +52,7 @@ class Reader {
   Error *error_;
   int narg_;
   char **arg_;
-  int at_ = 4;
+  int at_ = 4, at_law_ = 4;
   std::set<std::string> given_;    // keywords
   Settings &settings_;
 };
@@ -90,6 +91,7 @@ void Reader::read_keywords()
     else
       settings_.shorten = utils::logical(FLERR, value, false, lmp_) == 1;
   }
+  if (settings_.law) choose_solver();
 }
 
 // Regions add up, and read_law() knows better what to say of two laws.
@@ -121,7 +123,7 @@ void Reader::read_rigid(const char *fix_id)
 
 void Reader::read_law(const std::string &name)
 {
-  const int at_name = at_ - 1;
+  const int at_name = at_law_ = at_ - 1;
   if (!settings_.law_words.empty())
     error_at(error_, FLERR, at_name,
              "Fix inelastic: two laws, {} and {}: all contacts have one law", settings_.law_words,
@@ -150,8 +152,30 @@ void Reader::read_law(const std::string &name)
 void Reader::read_solver(const char *name)
 {
   if (!inelastic::make_solver(name))
-    error_at(error_, FLERR, at_ - 1, "Fix inelastic solver must be sweeps, apgd or uzawa, not {}", name);
+    error_at(error_, FLERR, at_ - 1, "Fix inelastic solver must be sweeps, apgd or uzawa, not {}",
+             name);
   settings_.solver = name;
+}
+
+// A law may rule solvers out.
+void Reader::choose_solver()
+{
+  const std::vector<std::string> serve = settings_.law->solvers();
+  std::string names;
+  for (const std::string &name : serve) {
+    if (!inelastic::make_solver(name))
+      error_at(error_, FLERR, at_law_,
+               "Fix inelastic: law {} asks for the solver {}, which is none", settings_.law_words,
+               name);
+    names += (names.empty() ? "" : " or ") + name;
+  }
+  if (serve.empty())
+    error_at(error_, FLERR, at_law_, "Fix inelastic: law {} names no solver that serves it",
+             settings_.law_words);
+  if (given_.count("solver") == 0) settings_.solver = serve.front();
+  if (std::find(serve.begin(), serve.end(), settings_.solver) == serve.end())
+    error_at(error_, FLERR, at_law_, "Fix inelastic: law {} needs solver {}, not {}",
+             settings_.law_words, names, settings_.solver);
 }
 
 void Reader::read_max_iterations(const char *value)

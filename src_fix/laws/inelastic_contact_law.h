@@ -75,6 +75,11 @@ class ContactLaw {
   virtual bool remember(const Impulse & /*impulse*/, double * /*remembered*/) const
   { return false; }
 
+  // Returns the solvers that find the impulses of this law, by their names in `solver NAME` of the
+  // fix. Without that keyword the first one is taken. All of today's solvers serve where impulses
+  // are in half lines; a law may rule out those that are not stable with what it asks for.
+  virtual std::vector<std::string> solvers() const { return {"sweeps", "apgd", "uzawa"}; }
+
   // Changes what is remembered to what it is with the sides exchanged and n the other way: each of
   // two particles keeps a copy as it is seen from it, and either of them may be side 1 in the next
   // step. Numbers along n stay. A vector across n, such as a tangential impulse, changes its sign.

@@ -258,6 +258,38 @@ def test_answers_that_no_law_may_give(
     assert said in line
 
 
+def ruling_out(solvers: str) -> str:
+    """Return the source of the law `forgetful` that names the solvers that serve it."""
+    told = f"  std::vector<std::string> solvers() const override {{ return {{{solvers}}}; }}\n\n"
+    return FORGETFUL.replace("  int remembers()", told + "  int remembers()")
+
+
+@pytest.mark.parametrize(
+    ("solvers", "option", "said"),
+    [
+        ('"apgd"', " solver sweeps", "law forgetful needs solver apgd, not sweeps"),
+        ('"apgd", "uzawa"', " solver sweeps", "needs solver apgd or uzawa, not sweeps"),
+        ('"newton"', "", "law forgetful asks for the solver newton, which is none"),
+        ("", "", "law forgetful names no solver that serves it"),
+    ],
+)
+def test_solvers_that_do_not_serve_a_law(
+    solvers: str, option: str, said: str, tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    build(ruling_out(solvers), tmp_path)
+    assert said in refused(deck(tmp_path, f"forgetful{option}", 1.0) + "run 20\n")
+
+
+def test_the_first_solver_that_serves_a_law_is_taken(tmp_path: Path, lmp: Runner) -> None:
+    """To the last bit: it makes what it makes where it is named."""
+    frames = []
+    build(ruling_out('"uzawa", "apgd"'), tmp_path)
+    for option in ("", " solver uzawa", " solver apgd"):
+        lmp(deck(tmp_path, f"forgetful{option}", 1.0) + DUMP_PARTICLES + "run 20\n")
+        frames.append((tmp_path / "particles.dump").read_text())
+    assert frames[0] == frames[1]
+
+
 # Two spheres that fall upon one another and slide, and one that slides on a floor, which comes up
 # and moves away sideways: place, velocity, radius, type, acceleration.
 BIG, SMALL, ON_FLOOR = range(3)
