@@ -2,9 +2,9 @@
 
 Starts of spheres and of dimers settle (inputs/settling.in) and their contact problems at three
 moments are kept: the impact, when most of the particles fall onto those that lie; the settling; and
-the rest. Each is solved to several tolerances by the accelerated gradient and by the paper's Uzawa,
-both from zero impulses, and once by the accelerated gradient from the impulses of the step before,
-as it does in a run.
+the rest. Each is solved to several tolerances by `sweeps`, the default of the fix, and by `apgd`,
+from the impulses of the step before and from zero, and by the paper's Uzawa from zero; and once by
+the first two as in a run, from the impulses of the step before and with the accuracy of the fix.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import statistics
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from tests.helpers.pouring import NO_STEPS, run_deck, shipped_deck
 
 TOLERANCES = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7)  # [radii]
 UZAWA_TOLERANCES = (5e-3, 5e-4)  # it takes about ten times as long for each digit
+ACCURACY = 1e-3  # the default of the fix
 MOST_ITERATIONS = 1_000_000
 
 
@@ -87,81 +89,94 @@ def record(scene: Scene, folder: Path) -> dict[str, core.Record]:
 
 @dataclass(frozen=True)
 class Solved:
-    """Iterations and seconds to a tolerance; None where it was not reached."""
+    """Iterations and seconds, the median of three, of a solution."""
 
     iterations: int
     seconds: float
 
+    def words(self, name: str) -> str:
+        """Return both, with a name before them."""
+        return f"{name} {self.iterations:6d} in {1e3 * self.seconds:8.1f} ms"
 
-def _solve(
-    problem: core.Problem, tolerance: float, solver: core.Solver = "sweeps"
-) -> Solved | None:
-    limits = core.Limits(tolerance, max_iterations=MOST_ITERATIONS)
+
+# How many times as long as `sweeps` others take, one number a problem, by start and solver.
+Ratios = dict[str, list[float]]
+
+
+def _solve(problem: core.Problem, limits: core.Limits, solver: core.Solver) -> Solved | None:
+    """Return what a solution took; None if it was not reached."""
     result, seconds = timed(problem, limits, solver)
+    if solver == "uzawa":
+        # Its step size is not counted as a part of it.
+        start = time.perf_counter()
+        core.largest_eigenvalue(problem)
+        seconds -= time.perf_counter() - start
     return Solved(result.iterations, seconds) if result.converged else None
 
 
-def _power_iteration(problem: core.Problem) -> float:
-    """Seconds that Uzawa's step size takes, which is not counted as part of it."""
-    start = time.perf_counter()
-    core.largest_eigenvalue(problem)
-    return time.perf_counter() - start
+def _compare(
+    words: str, sweeps: Solved | None, others: Mapping[str, Solved | None]
+) -> dict[str, float]:
+    """Print a line; return how many times as long as `sweeps` the others take, by their names."""
+    said = ["sweeps not reached" if sweeps is None else sweeps.words("sweeps")]
+    ratios = {}
+    for name, other in others.items():
+        if other is None:
+            said.append(f"{name} not reached")
+        elif sweeps is None:
+            said.append(other.words(name))
+        else:
+            ratios[name] = other.seconds / sweeps.seconds
+            said.append(f"{other.words(name)}: {ratios[name]:.2f} times as long")
+    print(f"    {words}: {', '.join(said)}", flush=True)
+    return ratios
 
 
-def compare(scene: Scene, problems: dict[str, core.Record]) -> tuple[list[float], list[float]]:
-    """Print a line for each problem and tolerance.
-
-    Returns
-    -------
-    How many times as long as the accelerated gradient Uzawa takes at the tolerance of the run, one
-    number a problem: with the accelerated gradient from the last step's impulses, and from zero.
-    """
-    warm_ratios, cold_ratios = [], []
+def compare(scene: Scene, problems: Mapping[str, core.Record]) -> Ratios:
+    """Print lines for each problem; return the ratios at the tolerance of the run."""
+    found: Ratios = {}
     for moment, recorded in problems.items():
-        problem, zero = recorded.problem, from_zero(recorded.problem)
+        warm, zero = recorded.problem, from_zero(recorded.problem)
         radius = float(recorded.arrays["radius"].min())
         contacts = int((recorded.arrays["impulse"] > 0).sum())
         print(
-            f"  {scene.name}, {moment}: {problem.gap.size:,} constraints, {contacts:,} contacts",
+            f"  {scene.name}, {moment}: {warm.gap.size:,} constraints, {contacts:,} contacts",
             flush=True,
         )
-        step_size = _power_iteration(problem)
         for tolerance in TOLERANCES:
-            cold = _solve(zero, tolerance * radius)
-            warm = _solve(problem, tolerance * radius)
-            uzawa = None
+            limits = core.Limits(tolerance * radius, max_iterations=MOST_ITERATIONS)
+            uzawa: dict[str, Solved | None] = {}
             if tolerance in UZAWA_TOLERANCES:
-                uzawa = _solve(problem, tolerance * radius, "uzawa")
-            words = [
-                f"{name} {solved.iterations:6d} in {1e3 * solved.seconds:8.1f} ms"
-                for name, solved in (("warm", warm), ("from zero", cold))
-                if solved is not None
-            ]
-            if uzawa is not None and cold is not None and warm is not None:
-                seconds = uzawa.seconds - step_size
-                words.append(
-                    f"Uzawa {uzawa.iterations:6d} in {1e3 * seconds:8.1f} ms: "
-                    f"{seconds / warm.seconds:.1f} and {seconds / cold.seconds:.1f} times as long"
+                # It starts from zero in any case.
+                uzawa["uzawa"] = _solve(zero, limits, "uzawa")
+            for start, problem in (("from the last step's impulses", warm), ("from zero", zero)):
+                ratios = _compare(
+                    f"{tolerance:g} r, {start}",
+                    _solve(problem, limits, "sweeps"),
+                    {"apgd": _solve(problem, limits, "apgd"), **uzawa},
                 )
                 if tolerance == TOLERANCE:
-                    warm_ratios.append(seconds / warm.seconds)
-                    cold_ratios.append(seconds / cold.seconds)
-            print(f"    {tolerance:g} r: {', '.join(words)}", flush=True)
-    return warm_ratios, cold_ratios
+                    for name, ratio in ratios.items():
+                        found.setdefault(f"{start} {name}", []).append(ratio)
+        limits = core.Limits(TOLERANCE * radius, ACCURACY, MOST_ITERATIONS)
+        apgd = _solve(warm, limits, "apgd")
+        ratios = _compare("as in a run", _solve(warm, limits, "sweeps"), {"apgd": apgd})
+        for name, ratio in ratios.items():
+            found.setdefault(f"as in a run {name}", []).append(ratio)
+    return found
 
 
 def measure(particles: int, diameter: float) -> None:
-    """Print iterations and times on recorded problems, and the ratios to Uzawa."""
-    warm, cold = [], []
+    """Print iterations and times on recorded problems, and the ratios to `sweeps`."""
+    found: Ratios = {}
     for scene in scenes(particles, diameter):
         with tempfile.TemporaryDirectory(prefix="inelastic-") as name:
-            ratios = compare(scene, record(scene, Path(name)))
-        warm += ratios[0]
-        cold += ratios[1]
-    print(
-        f"{len(warm)} problems at {TOLERANCE:g} r: Uzawa takes {statistics.median(warm):.0f} times "
-        f"as long ({min(warm):.0f} to {max(warm):.0f}) as the accelerated gradient from the last "
-        f"step's impulses, {statistics.median(cold):.0f} times ({min(cold):.0f} to "
-        f"{max(cold):.0f}) from zero",
-        flush=True,
-    )
+            for words, ratios in compare(scene, record(scene, Path(name))).items():
+                found.setdefault(words, []).extend(ratios)
+    for words, ratios in found.items():
+        print(
+            f"{len(ratios)} problems at {TOLERANCE:g} r: {words} takes "
+            f"{statistics.median(ratios):.2f} times as long ({min(ratios):.2f} to "
+            f"{max(ratios):.2f}) as sweeps",
+            flush=True,
+        )

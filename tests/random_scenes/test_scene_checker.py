@@ -25,7 +25,7 @@ RADIUS, EPS = 0.06, 3e-5
 BOX = ((0.0, 0.5), (0.0, 2.0), (0.0, 0.5))
 FACTS = {
     "words": [], "acceleration_of_force": 1.0, "pressure_of_energy": 1.0, "walls": 6,
-    "periodic": [False] * 3, "inertia": None, "solver": "apgd", "warn": False, "shorten": False,
+    "periodic": [False] * 3, "inertia": None, "solver": "sweeps", "warn": False, "shorten": False,
     "bad_start": False, "closing": False, "smallest": RADIUS, "largest": RADIUS, "spread": 1.0,
     "shapes": [{"kind": "block", "faces": BOX, "inside": True, "number": 1}],
 }  # fmt: skip

@@ -28,7 +28,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> list[StoredStudy]:
     for name in STUDIES:
         study = read_study(STUDIES_FOLDER / f"{name}.toml")
         adopt_results(study, folder, KEPT, of_any_code=True)
-        found.append(gather_results(study, folder))
+        found.append(gather_results(study, folder, of_any_code=True))
     return found
 
 

@@ -25,7 +25,7 @@ from lammps_inelastic.workflow.provenance.same_runs import FILE, SameRuns, same_
 from lammps_inelastic.workflow.report.sections.provenance import codes_line
 from lammps_inelastic.workflow.results.store import Result, read_result, write_result
 from lammps_inelastic.workflow.running.folder import Folder
-from lammps_inelastic.workflow.running.gather import adopt_results
+from lammps_inelastic.workflow.running.gather import adopt_results, gather_results
 from lammps_inelastic.workflow.study import read_study
 from tests.helpers.study_run import run_few
 
@@ -164,6 +164,29 @@ def test_stored_results_of_other_code_are_not_taken(
     write_result(second, Result(result.values, {}, result.record, "{}"))
     folder = Folder(tmp_path / "third")
     assert adopt_results(study, folder, tmp_path / "kept", of_any_code=True) == 1
+
+
+def test_stored_results_of_a_deck_with_another_default_are_taken_if_asked(
+    few: Path, tmp_path: Path
+) -> None:
+    """What neither the study nor the run has set may have changed; what one of them set may not."""
+    kept = tmp_path / "kept"
+    shutil.copytree(few / "out" / "results" / "few", kept / "few")
+    first, second = sorted((kept / "few").glob("*.h5"))
+    for path, is_set in ((first, False), (second, True)):
+        stages = json.loads(json.dumps(read_result(path).record["stages"]))
+        stages[0]["variables"]["solver"] = "another"
+        if is_set:
+            stages[0]["values"]["solver"] = "another"
+        made_by(path, stages=stages)
+    study = read_study(few / "few.toml")
+    assert adopt_results(study, Folder(tmp_path / "todays"), kept) == 0
+    folder = Folder(tmp_path / "any")
+    assert adopt_results(study, folder, kept, of_any_code=True) == 1
+    assert len(gather_results(study, folder, of_any_code=True).results) == 1
+    assert gather_results(study, folder).results == []
+    # It is there already.
+    assert adopt_results(study, folder, kept, of_any_code=True) == 0
 
 
 def test_stored_results_of_a_fix_with_the_same_runs_are_taken(few: Path, tmp_path: Path) -> None:

@@ -197,7 +197,7 @@ def whole_paper() -> list[StoredStudy]:
     more_seeds += [measured(phi=0.5, tolerance=0.005, seed=seed) for seed in range(1, 7)]
     counting = [
         measured(z=z, tolerance=0.005, seed=seed, solver=solver, dt_resting=step, dt_measuring=step)
-        for solver, step, z in (("apgd", 0.01, 6.2), ("apgd", 0.02, 6.4), ("uzawa", 0.01, 6.3))
+        for solver, step, z in (("sweeps", 0.01, 6.2), ("sweeps", 0.02, 6.4), ("uzawa", 0.01, 6.3))
         for seed in (1, 2, 3)
     ]
     table_2 = [measured(seed=seed) for seed in (1, 2)]
@@ -723,9 +723,9 @@ def test_why_contacts_at_a_loose_tolerance_differ() -> None:
     table = sections["counting"].blocks[0]
     assert isinstance(table, Table)
     assert [[cell.text for cell in row][:5] for row in table.rows] == [
-        ["0.01", "0.02", "0.1", "0.00001", "apgd"],
-        ["0.01", "0.01", "0.01", "0.005", "apgd"],
-        ["0.01", "0.02", "0.1", "0.005", "apgd"],
+        ["0.01", "0.02", "0.1", "0.00001", "sweeps"],
+        ["0.01", "0.01", "0.01", "0.005", "sweeps"],
+        ["0.01", "0.02", "0.1", "0.005", "sweeps"],
     ]
 
 
@@ -984,10 +984,12 @@ def test_other_decks_under_the_names_of_the_paper(value: str | None) -> None:
     assert not re.search(r"\bnan\b", page.text, re.IGNORECASE)
 
 
-def test_solvers_are_not_mixed() -> None:
+@pytest.mark.parametrize("ours", ["sweeps", "apgd"])
+def test_solvers_are_not_mixed(ours: str) -> None:
+    """Ours is the default of today's decks, or that of the earlier ones that made the results."""
     runs = [
         measured(z=z, tolerance=0.005, solver=solver, seed=seed)
-        for solver, z in (("apgd", 5.8), ("uzawa", 6.2))
+        for solver, z in ((ours, 5.8), ("uzawa", 6.2))
         for seed in (1, 2)
     ]
     section = sections_of(study("table-1", runs))["table-1"]

@@ -439,7 +439,8 @@ def test_the_number_of_contacts_shows_no_trend_with_the_time_step() -> None:
     number = re.compile(r"([\d.]+) ± [\d.]+ \(([\d.]+)\)")
     found: dict[str, list[tuple[float, float]]] = {}
     for row in cells:
-        if len(row) == 6 and row[0] == "apgd" and (z := number.fullmatch(row[5])) is not None:
+        # Of our own solver: apgd, or sweeps in a table of today's.
+        if len(row) == 6 and row[0] != "uzawa" and (z := number.fullmatch(row[5])) is not None:
             found.setdefault(row[2], []).append((float(z[1]), float(z[2])))
     assert len(found) == 3
     for at_steps in found.values():

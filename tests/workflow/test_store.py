@@ -197,7 +197,7 @@ def test_results_are_gathered_by_one_at_a_time(
                 return True
         return False
 
-    def gather(study: Study, _: Folder) -> StoredStudy:
+    def gather(study: Study, *_: object) -> StoredStudy:
         held.append(is_held())
         return StoredStudy(study.name, study.title, study.text, [])
 

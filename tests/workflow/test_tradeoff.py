@@ -201,7 +201,8 @@ def configuration(
     ranks: int = 1,
 ) -> Configuration:
     hard = contacts == "hard"
-    return Configuration(contacts, tolerance, "apgd" if hard else None, dt if hard else None, ranks)
+    solver = "sweeps" if hard else None
+    return Configuration(contacts, tolerance, solver, dt if hard else None, ranks)
 
 
 def made_up(
@@ -350,7 +351,10 @@ def test_the_reference_is_the_tightest_with_the_shortest_step() -> None:
         (["--tolerances", "nan"], "--tolerances: nan is not allowed: it must be a number from 1e"),
         (["--soft-tolerances", "0.05,no"], "--soft-tolerances: no is not allowed: it must be a nu"),
         (["--dts", "-1"], "--dts: -1 is not allowed: it must be a number from 1e-6 t"),
-        (["--solvers", "apgd,sor"], "--solvers: sor is not allowed: it must be apgd or uzawa"),
+        (
+            ["--solvers", "sweeps,sor"],
+            "--solvers: sor is not allowed: it must be sweeps, apgd or uzawa",
+        ),
         (["--ranks", "1,9999"], "--ranks: 9999 is not allowed: it must be a whole number from 1 t"),
         (["--seeds", "1.5"], "--seeds: 1.5 is not allowed: it must be a whole number from 1 to 1"),
         (["--time", "0"], "--time: 0 is not allowed: it must be a number above 0"),
@@ -433,7 +437,7 @@ def test_what_a_comparison_writes(finished: tuple[list[str], Path]) -> None:
         ("soft", "0.005", "2"),
     ]
     page = (out / "tradeoff.md").read_text()
-    assert page.count("| hard | apgd |") == 2
+    assert page.count("| hard | sweeps |") == 2
     assert "Soft spheres" in page
 
 
@@ -485,7 +489,9 @@ def test_recorded_states_show_the_accuracy(finished: tuple[list[str], Path]) -> 
             for name in ("velocity_error", "force_error"):
                 assert 0 <= float(last[name]) <= max(1e-2 * float(first[name]), least), chosen
             assert float(last["missed"]) + float(last["false"]) <= 0.01
-    assert "| apgd from the last forces | 0.0005 |" in (out / "tradeoff.md").read_text()
+    page = (out / "tradeoff.md").read_text()
+    for solver in ("sweeps", "apgd"):
+        assert f"| {solver} from the last forces | 0.0005 |" in page
 
 
 @pytest.mark.slow

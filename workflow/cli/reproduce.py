@@ -80,7 +80,9 @@ def run(options: argparse.Namespace) -> int:
             failed += len(run_and_gather(study, study.cases, folder, running).failed)
     store = folder.root / STORE
     with folder.gathering():
-        write_studies(store, [gather_results(study, folder) for study in studies])
+        write_studies(
+            store, [gather_results(study, folder, options.stored_only) for study in studies]
+        )
     print(f"results: {store}")
     # Drawing takes a while to import, for which the other subcommands need not wait.
     from ..report.report_files import write_report

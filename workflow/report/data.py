@@ -6,7 +6,7 @@ import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from .curves import FloatArray
 
 # This deck pours free spheres: its particles are spheres.
 SPHERES = "spheres"
+# Decks of version 0.1 had no choice of a solver, and took this one.
+SOLVER_BEFORE = "apgd"
 # Each row of the paper's Table 1 is the mean of so many runs.
 RUNS_OF_TABLE_1 = 9
 
@@ -42,6 +44,19 @@ class Data:
     def paper_solver(self) -> str:
         """The paper's solver, as our decks name it."""
         return str(self.paper["protocol"]["solver"])
+
+    @cached_property
+    def our_solver(self) -> str:
+        """Our own solver: the default of today's decks, or else that of those that made results."""
+        usual = str(deck_defaults(SPHERES)["solver"])
+        known = {
+            str(result.variables["solver"])
+            for study in self.studies.values()
+            for result in study.results
+            if "solver" in result.variables
+        }
+        earlier = sorted(known - {usual, self.paper_solver})
+        return earlier[0] if earlier and usual not in known else usual
 
     def results(self, *names: str) -> list[Result]:
         """Return the results of the first of these studies that has any."""
@@ -89,13 +104,15 @@ def _completed(result: Result) -> Result:
     """Return a result that has all variables of today's decks, so that it groups with newer ones.
 
     A deck had no such choice before it had the variable: it did what the default does, but for the
-    phase of rest, which version 0.1 had not, and the longer step of the last phase, which came
-    later.
+    solver, of which the default was another one, the phase of rest, which version 0.1 had not, and
+    the longer step of the last phase, which came later.
     """
     stages = []
     for stage in result.record["stages"]:
         known = stage["variables"]
         defaults = dict(deck_defaults(stage["deck"]))
+        if "solver" in defaults:
+            defaults["solver"] = SOLVER_BEFORE
         if "dt_resting" in defaults:
             dt = known.get("dt", defaults["dt"])
             if "steps_resting" not in known:

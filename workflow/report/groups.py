@@ -121,14 +121,9 @@ def count_of(results: Sequence[Result]) -> int:
     return int(results[0].setting("particles", results[0].number("particles")))
 
 
-def our_solver() -> str:
-    """Return our own solver: the one that our decks take where nothing else is said."""
-    return str(deck_defaults(SPHERES)["solver"])
-
-
 def solver_of(result: Result) -> str:
-    """Return the solver of a run; a deck that does not say it uses our own."""
-    return str(result.variables.get("solver", our_solver()))
+    """Return the solver of a run; a deck that does not say it uses the default of ours."""
+    return str(result.variables.get("solver", deck_defaults(SPHERES)["solver"]))
 
 
 def seed_label(result: Result) -> str:

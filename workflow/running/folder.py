@@ -110,14 +110,14 @@ class Folder:
             return "failed"
         return "cut off" if self.part(case).is_dir() else "missing"
 
-    def found(self, study: Study, case: Case) -> Found:
-        """Look what stands in the place of a result."""
+    def found(self, study: Study, case: Case, of_any_code: bool = False) -> Found:
+        """Look what stands in the place of a result; the parameters are those of `answers`."""
         path = self.result(study, case)
         try:
             outputs, record = origin_of(path)
         except WorkflowError as error:
             return Found(damage=str(error)) if os.path.lexists(path) else NOTHING
-        return Found(measured=answers(study, case, outputs, record))
+        return Found(measured=answers(study, case, outputs, record, of_any_code))
 
     def is_measured(self, study: Study, case: Case) -> bool:
         """Say whether there is a result, of what the study asks for now."""
@@ -263,15 +263,18 @@ class Folder:
         return " ".join(str(said).split()) or UNKNOWN
 
 
-def answers(study: Study, case: Case, outputs: str, record: Mapping[str, Any]) -> bool:
+def answers(
+    study: Study, case: Case, outputs: str, record: Mapping[str, Any], of_any_code: bool = False
+) -> bool:
     """Say whether a result is what a study asks for now.
 
     Parameters
     ----------
     study, case : the case, and the study that asks for its result
     outputs, record : of the result, as in `Result`
+    of_any_code : whether it may be of decks with other defaults
     """
-    return outputs == study.outputs.measured and case.is_of(record)
+    return outputs == study.outputs.measured and case.is_of(record, of_any_code)
 
 
 def place_of(folder: Path, case: Case, ending: str = "") -> Path:

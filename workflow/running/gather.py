@@ -17,10 +17,11 @@ from ..study import Study
 from .folder import Folder, answers, place_of
 
 
-def gather_results(study: Study, folder: Folder) -> StoredStudy:
+def gather_results(study: Study, folder: Folder, of_any_code: bool = False) -> StoredStudy:
     """Return the results that there are of a study, in the order of its cases.
 
-    A damaged result is left out, and named on stderr.
+    A damaged result is left out, and named on stderr. Results of decks with other defaults are
+    there if they may be `of_any_code`.
     """
     results = []
     for case in study.cases:
@@ -32,7 +33,7 @@ def gather_results(study: Study, folder: Folder) -> StoredStudy:
         except WorkflowError as damage:
             print(f"inelastic: left out: {damage}", file=sys.stderr)
             continue
-        if answers(study, case, result.outputs, result.record):
+        if answers(study, case, result.outputs, result.record, of_any_code):
             results.append(result)
             if said := other_run(folder.case(case), result.record):
                 print(f"WARNING: {path} is {said}; delete it to measure that", file=sys.stderr)
@@ -66,7 +67,7 @@ def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool 
     for case in study.cases:
         kept = place_of(source / study.name, case, ".h5")
         target = folder.result(study, case)
-        found = folder.found(study, case)
+        found = folder.found(study, case, of_any_code)
         if found.measured or not kept.is_file():
             continue
         try:
@@ -74,7 +75,7 @@ def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool 
         except WorkflowError as error:
             print(f"not taken: {error}")
             continue
-        fits = answers(study, case, outputs, record)
+        fits = answers(study, case, outputs, record, of_any_code)
         if not fits or (not of_any_code and differs(case, record, same)):
             other += 1
             continue

@@ -126,22 +126,28 @@ class Case:
         """A hash of what the decks do: another one means that a result is of another deck."""
         return "+".join(stage.deck.fingerprint for stage in self.stages)
 
-    def is_of(self, record: Any) -> bool:
+    def is_of(self, record: Any, of_any_code: bool = False) -> bool:
         """Say whether a run was made with the values of this case, as far as it had the variables.
 
         Parameters
         ----------
         record : record of the run, from `provenance.run_record`; anything else is of no case
+        of_any_code : whether a variable that neither of them sets may have had another default
         """
         try:
-            made = [dict(stage["variables"]) for stage in record["stages"]]
-        except (KeyError, TypeError, ValueError):
+            made = [
+                (dict(stage["variables"]), set(stage.get("values", stage["variables"])))
+                for stage in record["stages"]
+            ]
+        except (AttributeError, KeyError, TypeError, ValueError):
             return False
         if len(made) != len(self.stages):
             return False
         return all(
-            name not in before or before[name] == value
-            for before, stage in zip(made, self.stages, strict=True)
+            name not in before
+            or before[name] == value
+            or (of_any_code and name not in values and name not in stage.values)
+            for (before, values), stage in zip(made, self.stages, strict=True)
             for name, value in stage.variables.items()
         )
 

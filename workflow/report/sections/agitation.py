@@ -11,7 +11,7 @@ from ...results.store import Result
 from ..blocks import Block, Content, Statement, Text
 from ..columns import RUNS, Column, table
 from ..data import SPHERES, Data, deck_defaults
-from ..groups import count_of, grouped, is_agitated, our_solver, solver_of
+from ..groups import count_of, grouped, is_agitated, solver_of
 from ..quantities import AGITATED_COORDINATION_NUMBER, COORDINATION_NUMBER
 from ..statistics import SIGNIFICANT, Sample, Stated, adjusted, difference, sample
 from ..text import as_count, as_mean, as_sample, as_short
@@ -124,7 +124,7 @@ def _statements(rows: Sequence[_Row], data: Data) -> list[Statement]:
     known = [
         row
         for row in rows
-        if row.kind.solver == our_solver() and row.kind.tolerance == data.usual_tolerance
+        if row.kind.solver == data.our_solver and row.kind.tolerance == data.usual_tolerance
     ]
     fewest = [row for row in known if row.kind.particles == min(r.kind.particles for r in known)]
     weakest_first = sorted(fewest, key=lambda row: row.kind.strength)

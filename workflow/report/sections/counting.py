@@ -16,7 +16,6 @@ from ..groups import (
     grouped,
     is_agitated,
     matching,
-    our_solver,
     solver_of,
 )
 from ..quantities import COORDINATION_NUMBER, MEAN_RESOLUTION, PACKING_FRACTION, compared
@@ -126,7 +125,7 @@ def counted_at_its_own(data: Data) -> dict[float, list[Result]]:
         result.case: result
         for study in ("table-1", "counting")
         for result in data.results(study)
-        if is_agitated(result) and solver_of(result) == our_solver()
+        if is_agitated(result) and solver_of(result) == data.our_solver
     }
     usual = tuple(deck_defaults(SPHERES)[name] for name in STEPS)
     own = [

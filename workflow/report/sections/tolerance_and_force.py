@@ -19,7 +19,6 @@ from ..groups import (
     grouped,
     is_agitated,
     matching,
-    our_solver,
     solver_of,
     unlike,
 )
@@ -95,7 +94,7 @@ def tolerance_and_force(data: Data) -> Content:
     tables: list[Table] = []
     if results:
         rows = [*of_paper, *_other_rows(results, of_paper)]
-        tables.append(_table(results, rows, data.paper_solver))
+        tables.append(_table(data, results, rows))
     if more:
         tables.append(
             table(
@@ -107,7 +106,7 @@ def tolerance_and_force(data: Data) -> Content:
         )
     run = [row for row in (*of_paper, *more) if row.group]
     return Content(
-        [*_figure(more or of_paper), *tables],
+        [*_figure(data, more or of_paper), *tables],
         [one for row in run for one in (row.phi, row.z)],
         [
             *_statements_on_force(more),
@@ -117,9 +116,9 @@ def tolerance_and_force(data: Data) -> Content:
     )
 
 
-def _figure(rows: Sequence[_Row]) -> list[Figure]:
+def _figure(data: Data, rows: Sequence[_Row]) -> list[Figure]:
     """Return both numbers of our solver against the tolerance beside the paper's."""
-    known = [row for row in rows if row.group and row.solver == our_solver()]
+    known = [row for row in rows if row.group and row.solver == data.our_solver]
     forces = {"yes": "random force", "no": "no random force"}
     kinds = [([r for r in known if r.force == force], words) for force, words in forces.items()]
     if not known:
@@ -217,7 +216,7 @@ def _of_pairs(one: Sequence[Result], other: Sequence[Result], quantity: Quantity
 def _statements_on_tolerance(data: Data, rows: Sequence[_Row]) -> list[Statement]:
     """Compare the rows of our solver with random force, one tolerance with another."""
     known = sorted(
-        (row for row in rows if row.group and row.force == "yes" and row.solver == our_solver()),
+        (row for row in rows if row.group and row.force == "yes" and row.solver == data.our_solver),
         key=lambda row: row.tolerance,
     )
     if len(known) < 3:
@@ -267,7 +266,7 @@ def _statement_on_contacts(data: Data, tolerances: Sequence[float]) -> list[Stat
     ]
 
 
-def _table(results: Sequence[Result], rows: Sequence[_Row], paper_solver: str) -> Table:
+def _table(data: Data, results: Sequence[Result], rows: Sequence[_Row]) -> Table:
     count = count_of(results)
     return table(
         "1,000 spheres, d = 0.11; mean ± standard deviation (standard error of our mean)"
@@ -278,7 +277,7 @@ def _table(results: Sequence[Result], rows: Sequence[_Row], paper_solver: str) -
         (
             "SE: standard errors, sqrt(ours² + the paper's²); the paper's is its standard "
             f"deviation over the root of {RUNS_OF_TABLE_1} runs. Marked: p below {SIGNIFICANT}.",
-            f"Solver: {paper_solver} is the paper's, {our_solver()} ours. Within a loose ε "
+            f"Solver: {data.paper_solver} is the paper's, {data.our_solver} ours. Within a loose ε "
             "they may leave different contacts.",
             "ε / (g h²), with ε that of the count, says how well a contact is told from a "
             "gap: in a step a free sphere falls g h². It should be at most 0.01; above it, "
@@ -293,7 +292,7 @@ def _rows_of_paper(data: Data, results: Sequence[Result]) -> list[_Row]:
         _row(data, stated, solver, group)
         for stated in data.paper["table1"]
         for solver, group in (
-            grouped(_like(results, stated), solver_of) or {our_solver(): []}
+            grouped(_like(results, stated), solver_of) or {data.our_solver: []}
         ).items()
     ]
 
@@ -322,7 +321,7 @@ def _rows_of_more_seeds(data: Data) -> list[_Row]:
     """Compare rows of the paper's Table 1 with more runs of our own than it has."""
     results = data.results("more-seeds")
     return [
-        _row(data, stated, our_solver(), group, more_seeds=True)
+        _row(data, stated, data.our_solver, group, more_seeds=True)
         for stated in data.paper["table1"]
         if (group := _like(results, stated))
     ]
@@ -358,7 +357,7 @@ def _row(
     """Compare packing fraction and coordination number with a row of the paper's Table 1."""
     place = f"ε = {as_short(stated['eps_over_r'])} r"
     words = f"{place}, {'with' if stated['random_force'] else 'no'} random force"
-    if solver != our_solver():
+    if solver != data.our_solver:
         words += f", {solver}"
     if more_seeds:
         words += f", {len(group)} seeds"
