@@ -9,11 +9,10 @@ import numpy as np
 
 NUMBERS = 20_000_000  # 160 MB an array: more than any cache gives a core
 REPEATS = 7
-# What an iteration reads and writes for a constraint, in single precision, beside the particles:
-# two indices, normal and gap, diagonal, compliance, the least change, the inverse of the target,
-# and twice (read and written) the change before projection, the change before, and the gap before.
-# (Two more numbers, from which the target is set, are read in few iterations only.)
-BYTES_A_CONSTRAINT = 8 + 16 + 4 + 4 + 4 + 4 + 3 * 8
+# What a sweep reads and writes for a constraint of spheres, in single precision, beside the
+# particles (inelastic_sweep_kernels.h): two places, row, two mobilities, gap, compliance, the least
+# change, the inverse of the target, and twice (read and written) the change now and before.
+BYTES_A_CONSTRAINT = 8 + 16 + 8 + 4 + 4 + 4 + 4 + 2 * 8
 
 
 def bandwidth() -> float:
@@ -32,7 +31,7 @@ def measure() -> None:
     """Print the bandwidth, and how fast it lets a constraint be."""
     speed = bandwidth()
     print(
-        f"memory: {speed / 1e9:.1f} GB/s for one core; an iteration moves {BYTES_A_CONSTRAINT} "
+        f"memory: {speed / 1e9:.1f} GB/s for one core; a sweep moves {BYTES_A_CONSTRAINT} "
         f"bytes a constraint, which takes {1e9 * BYTES_A_CONSTRAINT / speed:.2f} ns from memory",
         flush=True,
     )
