@@ -131,8 +131,8 @@ def test_grains_that_attract_one_another_slide(
     name: str, weights: float, speed: float, ranks: int, tmp_path: Path, lmp: Runner
 ) -> None:
     """On a floor, at a velocity in g h along the line of their centres and across it."""
-    # The attraction lifts what lies higher than the other by as much of its strength: by a tolerance
-    # no more than a tenth of a weight.
+    # The attraction lifts what lies higher by as much of its strength: by a tenth of a weight at
+    # most if it lies a tolerance higher.
     settings = {"tolerance": min(EPS, 0.1 / weights)}
     velocity = speed * KICK * np.array([0.6, 0, 0.8])
     at = [0, RADIUS, 0]
