@@ -243,6 +243,7 @@ def settling_bed(
     side: float = 7.0,
     loaded_after: int = 0,
     accuracy: float = 1e-3,
+    seed: int = 1,
 ) -> str:
     """Return a deck in which a bed settles, up to the end of a run after which it rests.
 
@@ -253,10 +254,10 @@ def settling_bed(
     bodies = None
     if kind == "spheres":
         inside = tuple((low + RADIUS, high - RADIUS) for low, high in box)
-        points = random_points(number, inside, 2 * RADIUS, seed=1)
+        points = random_points(number, inside, 2 * RADIUS, seed=seed)
     else:
         inside = tuple((low + 2 * RADIUS, high - 2 * RADIUS) for low, high in box)
-        placed = random_bodies([dimer(1.5)] * (number // 2), RADIUS, inside, seed=1)
+        placed = random_bodies([dimer(1.5)] * (number // 2), RADIUS, inside, seed=seed)
         points, bodies = placed.positions, placed.molecules
     deck = spheres_of(
         points,

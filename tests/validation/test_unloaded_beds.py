@@ -6,6 +6,8 @@ moves, then or when it is set back.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,16 +33,43 @@ pytestmark = pytest.mark.validation
 
 # The step of the loads, of which a bed rests for some hundred before.
 STEP, RESTED = 0.001, 300
+FREE = f"unfix drag\ntimestep {STEP}\nthermo 1\n"
 
 
 def loaded_and_unloaded(
-    kind: str, folder: Path, factor: float, accuracy: float, way: str
+    kind: str, folder: Path, factor: float, accuracy: float, way: str, seed: int = 1
 ) -> dict[str, FloatArray]:
     """A bed that rests on for some steps, without the drag, before its gravity is multiplied."""
     changes = f"1+{factor - 1:.17g}*(v_s>=0)*{UNLOADING[way]}"
-    deck = settling_bed(kind, folder, changes, loaded_after=RESTED, accuracy=accuracy)
-    loaded = f"unfix drag\ntimestep {STEP}\nthermo 1\nrun {RESTED + PRESSED + 300}\n"
+    deck = settling_bed(kind, folder, changes, loaded_after=RESTED, accuracy=accuracy, seed=seed)
+    loaded = f"{FREE}run {RESTED + PRESSED + 300}\n"
     return run_lmp(folder, deck + loaded, timeout=900).thermo
+
+
+# Returns the seed of a bed of a kind, settled with an accuracy.
+SeedOf = Callable[[str, float], int]
+
+
+@pytest.fixture(scope="module")
+def at_rest(tmp_path_factory: pytest.TempPathFactory) -> SeedOf:
+    """Return the first seed of which all grains are at rest.
+
+    In about half of the beds some grain that nothing holds slides on, at 1e-3 g h, on a slope of
+    1e-4 (docs/measured/rest.md): it would fall under a greater gravity.
+    """
+
+    @functools.cache
+    def seed_of(kind: str, accuracy: float) -> int:
+        for seed in range(1, 9):
+            folder = tmp_path_factory.mktemp("rested")
+            deck = settling_bed(kind, folder, accuracy=accuracy, seed=seed)
+            thermo = run_lmp(folder, f"{deck}{FREE}run {RESTED}\n", timeout=900).thermo
+            # A grain that is held stands still; round-off of what is told of it.
+            if thermo["c_fastest"][-1] <= 1e-9 * GRAVITY * STEP:
+                return seed
+        pytest.fail("no bed is at rest")
+
+    return seed_of
 
 
 @pytest.mark.parametrize("way", UNLOADING)
@@ -57,15 +86,17 @@ def loaded_and_unloaded(
     ],
 )
 def test_gravity_that_is_multiplied(
-    kind: str, factor: float, accuracy: float, way: str, tmp_path: Path
+    kind: str, factor: float, accuracy: float, way: str, tmp_path: Path, at_rest: SeedOf
 ) -> None:
-    thermo = loaded_and_unloaded(kind, tmp_path, factor, accuracy, way)
+    seed = at_rest(kind, accuracy)
+    thermo = loaded_and_unloaded(kind, tmp_path, factor, accuracy, way, seed)
     speed = thermo["c_fastest"] / (GRAVITY * STEP)
     print(
-        f"{kind}: {speed[RESTED - 1]:.4f} g h before, {speed[RESTED:].max():.4f} g h from then on"
+        f"{kind}, seed {seed}: {speed[RESTED - 1]:.4f} g h before, "
+        f"{speed[RESTED:].max():.4f} g h from then on"
     )
-    # It was at rest: what is asked of it later holds before.
-    assert speed[RESTED - 1] <= 0.1
+    # It was at rest, to round-off of what is told of it.
+    assert speed[RESTED - 1] <= 1e-9
     assert_nothing_leaps(thermo["v_load"], speed, factor, RESTED + PRESSED)
 
 
