@@ -6,10 +6,17 @@ See tests/validation/test_unloaded_beds.py for beds.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.helpers.exact_scenes import UNLOADING, Column, assert_nothing_leaps, settling_bed
+from tests.helpers.exact_scenes import (
+    UNLOADING,
+    Column,
+    assert_nothing_leaps,
+    seed_at_rest,
+    settling_bed,
+)
 from tests.helpers.lammps_run import run_lmp
 from tests.helpers.scenes import GRAVITY
 
@@ -37,7 +44,9 @@ def test_a_bed_at_rest_rests_on(kind: str, ranks: int, tmp_path: Path) -> None:
     """
     step, rested = 0.001, 50
     changes = f"1+39*(v_s>=0)*(v_s<{rested})"
-    deck = settling_bed(kind, tmp_path, changes, number=100, side=4.0, loaded_after=rested)
+    size: dict[str, Any] = {"number": 100, "side": 4.0}
+    seed = seed_at_rest(kind, tmp_path, step, rested, ranks, **size)
+    deck = settling_bed(kind, tmp_path, changes, loaded_after=rested, seed=seed, **size)
     deck += f"unfix drag\ntimestep {step}\nthermo 1\nrun {3 * rested}\n"
     thermo = run_lmp(tmp_path, deck, ranks).thermo
     assert (thermo["f_contact[13]"] == 1.0)[-rested:].all()

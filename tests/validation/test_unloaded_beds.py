@@ -23,6 +23,7 @@ from tests.helpers.exact_scenes import (
     assert_nothing_leaps,
     bed_box,
     path,
+    seed_at_rest,
     settling_bed,
     spheres_of,
 )
@@ -52,22 +53,12 @@ SeedOf = Callable[[str, float], int]
 
 @pytest.fixture(scope="module")
 def at_rest(tmp_path_factory: pytest.TempPathFactory) -> SeedOf:
-    """Return the first seed of which all grains are at rest.
-
-    In about half of the beds some grain that nothing holds slides on, at 1e-3 g h, on a slope of
-    1e-4 (docs/measured/rest.md): it would fall under a greater gravity.
-    """
+    """Return the first seed of which all grains are at rest; each is looked for once."""
 
     @functools.cache
     def seed_of(kind: str, accuracy: float) -> int:
-        for seed in range(1, 9):
-            folder = tmp_path_factory.mktemp("rested")
-            deck = settling_bed(kind, folder, accuracy=accuracy, seed=seed)
-            thermo = run_lmp(folder, f"{deck}{FREE}run {RESTED}\n", timeout=900).thermo
-            # A grain that is held stands still; round-off of what is told of it.
-            if thermo["c_fastest"][-1] <= 1e-9 * GRAVITY * STEP:
-                return seed
-        pytest.fail("no bed is at rest")
+        folder = tmp_path_factory.mktemp("rested")
+        return seed_at_rest(kind, folder, STEP, RESTED, accuracy=accuracy)
 
     return seed_of
 
@@ -83,6 +74,7 @@ def at_rest(tmp_path_factory: pytest.TempPathFactory) -> SeedOf:
         # Forces on held grains balance to 5 accuracies, of which a million times the gravity makes
         # a fall of twenty tolerances in a step with the default one.
         ("dimers", 1e6, 1e-5),
+        ("spheres", 1e6, 1e-5),
     ],
 )
 def test_gravity_that_is_multiplied(
