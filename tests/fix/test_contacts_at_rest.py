@@ -5,7 +5,6 @@ See "What each tolerance bounds" and "What is at rest" in docs/method.
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -147,10 +146,9 @@ def test_a_bed_is_quiet_and_cheap(ranks: int, tmp_path: Path, lmp: Runner) -> No
     mean = np.sqrt(2 * result.runs[-1]["KinEng"].mean() / (300 * float(mass(RADIUS))))
     # The bound of the validation of beds at rest
     assert mean <= 0.02 * GRAVITY * STEP
-    counts = re.findall(r"Fix inelastic: (\d+) projections, (\d+) iterations", result.screen)
-    projections, iterations = map(int, counts[-1])
-    # A bed at rest takes none; one that is not found at rest some hundred.
-    assert iterations <= 30 * projections
+    # Held grains take no iteration; one that slides on takes some in each step, 39 on one of the
+    # processors tried. As in that validation, a tenth of what the fall takes.
+    assert np.median(result.runs[-1]["f_contact[1]"]) <= 100
     frames = read_dump(tmp_path / "particles.dump")
     for frame in frames:
         depth = deepest_pair(frame.positions, frame["radius"])
