@@ -402,9 +402,10 @@ inelastic::ProjectionResult FixInelastic::solve()
       const bool no_room = result.status == inelastic::Status::INFEASIBLE;
       if (no_room) unsolved_.note_no_room();
       // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
-      // shorter one.
+      // shorter one. So may others in fewer iterations; with warn few may have been wanted.
       if (length_.may_shorten_unsolved() &&
-          (no_room || constraints_.relinearised() || unsolved_.law_parts())) {
+          (no_room || !settings_.warn_only || constraints_.relinearised() ||
+           unsolved_.law_parts())) {
         length_.shorten(0.5, unsolved_.named());
         continue;
       }
