@@ -296,6 +296,27 @@ def test_too_few_iterations(ranks: int, tmp_path: Path, refused: Refused, lmp: R
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
+def test_a_step_of_too_many_iterations_is_shortened(
+    ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
+) -> None:
+    """Where the deck allows it: in a shorter step spheres pass fewer others.
+
+    With warn a few iterations may be what is wanted, and then no step is shortened.
+    """
+    options = "region container maxiter 10"
+    text = deck(tmp_path, options=f"{options} shorten yes")
+    result = lmp(text + "run 100\n", ranks=ranks)
+    assert not result.warnings
+    assert result.thermo["f_contact[1]"].max() <= 10
+    assert max(result.thermo["f_contact[2]"].max(), result.thermo["f_contact[4]"].max()) <= EPS
+    assert int(re.findall(r"(\d+) shortened steps", result.screen)[-1]) > 5
+    assert "10 iterations" in refused(deck(tmp_path, options=options) + "run 100\n", ranks=ranks)
+    result = lmp(deck(tmp_path, options=f"{options} warn shorten yes") + "run 100\n", ranks=ranks)
+    assert any("10 iterations left" in warning for warning in result.warnings)
+    assert result.screen.count(" 0 shortened steps") == 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("solver", ["sweeps", "apgd", "uzawa"])
 def test_a_container_that_closes(
     solver: str, ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
