@@ -63,7 +63,12 @@ def main() -> int:
         help="of: machine settling recorded growth ranks parts million earlier page",
     )
     parser.add_argument(
-        "--commit", help="with which the decks are compared, as `git` names it (part earlier)"
+        "--commit",
+        action="append",
+        help="with which the decks are compared, as git names it; may be repeated (part earlier)",
+    )
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=[1, 2, 3], help="of these decks (part earlier)"
     )
     options = parser.parse_args()
     size = QUICK if options.quick else FULL
@@ -78,7 +83,9 @@ def main() -> int:
         "ranks": lambda: ranks.measure(size.ranks),
         "parts": lambda: scenes_without.measure(each=not options.quick),
         "million": lambda: million.measure(out / "million"),
-        "earlier": lambda: earlier.measure(options.commit, size.particles, size.diameter),
+        "earlier": lambda: earlier.measure(
+            options.commit, size.particles, size.diameter, options.seeds, out / "earlier"
+        ),
     }
     # It needs chromium and playwright, and is run if it is named.
     if "page" in options.parts:
