@@ -402,7 +402,8 @@ inelastic::ProjectionResult FixInelastic::solve()
       const bool no_room = result.status == inelastic::Status::INFEASIBLE;
       if (no_room) unsolved_.note_no_room();
       // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
-      // shorter one. So may others in fewer iterations; with warn few may have been wanted.
+      // shorter one. Any other step takes fewer iterations when it is shorter; with warn a run that
+      // has few of them goes on, as it is.
       if (length_.may_shorten_unsolved() &&
           (no_room || !settings_.warn_only || constraints_.relinearised() ||
            unsolved_.law_parts())) {
