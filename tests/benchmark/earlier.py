@@ -85,12 +85,17 @@ def _git(*arguments: str) -> bytes:
     return done.stdout
 
 
+def check_out(commit: str, folder: Path) -> None:
+    """Write the files of a commit into `folder`. Raises EarlierError if git does not know it."""
+    archive = _git("archive", commit, "--", *COMPARED)
+    folder.mkdir(exist_ok=True)
+    subprocess.run(["tar", "-x"], cwd=folder, input=archive, check=True)
+
+
 def prepare(commit: str, folder: Path) -> Code:
     """Check out a commit and build its plugin, in folders of its own in `folder`."""
     sources = folder / f"code-{commit}"
-    archive = _git("archive", commit, "--", *COMPARED)
-    sources.mkdir(exist_ok=True)
-    subprocess.run(["tar", "-x"], cwd=sources, input=archive, check=True)
+    check_out(commit, sources)
     plugin = building.plugin(sources, folder / f"build-{commit}")
     return Code(commit, plugin, sources / "inputs")
 
