@@ -23,6 +23,8 @@ SOURCES := $(shell find src_fix -type f -not -path '*/__pycache__/*') \
 export PATH := $(abspath $(BIN)):$(PATH)
 # Two processes; the tests of a file stay together, since they share the fixtures of its module.
 PYTEST := pytest -n 2 --dist loadfile
+# Some files take half of the time: their tests are shared out. What they print comes at the end.
+VALIDATION := pytest -n 2 --dist worksteal -vv -rP --durations=0
 
 .PHONY: run report test test-all style validate tables bench bench-quick docs programs setup wheel clean
 
@@ -46,7 +48,7 @@ test-all: test
 	$(PYTEST) -rs -m "slow and not validation"
 
 validate: setup
-	pytest -m validation -s --durations=0
+	$(VALIDATION) -m validation
 
 tables: setup
 	python -m tests.tables
