@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import traceback
 from collections import Counter
@@ -100,6 +101,10 @@ def judge(
         shutil.rmtree(folder)
     scene.write(folder)
     processes = ranks or scene.ranks
+    if processes != scene.ranks:
+        # A grid of ranks is for the number that was drawn.
+        deck = folder / "deck.in"
+        deck.write_text(re.sub(r"^processors .*\n", "", deck.read_text(), flags=re.MULTILINE))
     result = answer(folder, processes, programs.program, programs.environment, programs.timeout)
     longer = 4 * programs.timeout
     if result.status is None:

@@ -16,8 +16,14 @@ import pytest
 from tests.helpers.bodies import BENT, body_scene, dimer, random_bodies, rigid_velocities
 from tests.helpers.scenes import random_points, scene
 from tests.random_scenes.scene_checker import Report, check, read_thermo
-from tests.random_scenes.scene_generator import BODY_COLUMNS, CONTACTS, computes, redump
-from tests.random_scenes.scene_loop import installed
+from tests.random_scenes.scene_generator import (
+    BODY_COLUMNS,
+    CONTACTS,
+    computes,
+    random_scene,
+    redump,
+)
+from tests.random_scenes.scene_loop import installed, judge
 from tests.random_scenes.scene_run import REFUSALS, Answer, answer, finding
 from tests.random_scenes.scene_walls import views
 
@@ -424,3 +430,13 @@ def test_answers() -> None:
     assert said(1, unsolved + lost) == ""
     for _, condition in REFUSALS:
         assert condition(facts) in (True, False)
+
+
+def test_another_number_of_ranks_than_drawn(tmp_path: Path) -> None:
+    """A grid that was drawn for two ranks is no finding on one."""
+    drawn = random_scene(700027)
+    assert drawn.ranks == 2
+    assert "\nprocessors " in drawn.deck
+    verdict = judge(700027, tmp_path / "scene", installed(), ranks=1)
+    assert verdict is not None
+    assert (verdict.ranks, verdict.problems) == (1, [])
