@@ -81,7 +81,7 @@ def _seconds_of_children() -> float:
 def _git(*arguments: str) -> bytes:
     done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, check=False)
     if done.returncode != 0:
-        raise EarlierError(f"git {arguments[0]}: {done.stderr.decode().splitlines()[0]}")
+        raise EarlierError(f"git {arguments[0]}: {done.stderr.decode().partition("\n")[0]}")
     return done.stdout
 
 
