@@ -81,7 +81,8 @@ def _seconds_of_children() -> float:
 def _git(*arguments: str) -> bytes:
     done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, check=False)
     if done.returncode != 0:
-        raise EarlierError(f"git {arguments[0]}: {done.stderr.decode().partition("\n")[0]}")
+        said, _, _ = done.stderr.decode().partition("\n")
+        raise EarlierError(f"git {arguments[0]}: {said}")
     return done.stdout
 
 
