@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
-from scipy.special import spherical_jn
 
 from .bodies import dimer_spheres
 from .errors import InputError
@@ -61,7 +60,7 @@ def neck_volume(radius: float, distance: float) -> float:
     _check(radius, distance)
     angle = math.asin(min(distance / (4 * radius), 0.5))
     # This form of sin(b) - b cos(b) has no cancellation where the angle is small.
-    return float(4 * math.pi * radius**3 * angle**2 * spherical_jn(1, angle))
+    return float(4 * math.pi * radius**3 * angle**2 * scipy.special.spherical_jn(1, angle))
 
 
 def packing_fraction_with_necks(
@@ -151,7 +150,9 @@ class _Necks:
             return inside
         # The neck is widest where it meets the spheres, at z = D / 4, and its edge there is r
         # away from the middle.
-        found = KDTree(points).query_ball_point(self._middles, self._radii, return_sorted=False)
+        found = scipy.spatial.KDTree(points).query_ball_point(
+            self._middles, self._radii, return_sorted=False
+        )
         dimer = np.repeat(np.arange(len(found)), [len(near) for near in found])
         point = np.concatenate(found).astype(np.int64)
         arm = points[point] - self._middles[dimer]

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
 
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray, as_integers, as_walls
@@ -199,7 +199,7 @@ def pairs_among(centres: FloatArray, radii: FloatArray, gap: float) -> IntArray:
 
     A pair is a row of indices (i, j) with i < j; each is there once, in ascending order.
     """
-    tree = KDTree(centres)
+    tree = scipy.spatial.KDTree(centres)
     largest = float(radii.max())
     if largest <= SIMILAR_RADII * float(radii.min()):
         pairs = tree.query_pairs(2 * largest + gap, output_type="ndarray").astype(np.int64)

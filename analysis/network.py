@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import networkx
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,6 +15,7 @@ from .geometry import FloatArray, IntArray, as_floats, as_integers, as_positions
 from .spheres import Spheres
 
 if TYPE_CHECKING:
+    import networkx
     from matplotlib.axes import Axes
 
 PALETTE = "viridis"
@@ -124,6 +124,9 @@ def contact_graph(
     centres = spheres.centres
     strength = None if forces is None else _strengths(forces, len(sides))
     wanted = np.full(len(sides), True) if walls else sides[:, 1] >= 0
+    # networkx takes a fifth of a second to import, which most uses need not wait for.
+    import networkx
+
     graph: networkx.Graph = networkx.Graph()
     lines = None
     if points is not None and spheres.has_images:

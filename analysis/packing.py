@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
 
 from .areas import areas_in
 from .errors import InputError
@@ -288,7 +288,7 @@ class Cover:
     def __init__(self, centres: FloatArray, radii: FloatArray) -> None:
         self._largest = float(radii.max())
         lift = np.sqrt(self._largest**2 - radii**2)
-        self._tree = KDTree(np.column_stack([centres, lift]))
+        self._tree = scipy.spatial.KDTree(np.column_stack([centres, lift]))
 
     def holds(self, points: FloatArray) -> BoolArray:
         """Say which of the points, (k, 3), lie in a sphere."""

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from MDAnalysis.coordinates.LAMMPS import DumpReader
 
 from .bodies import Particles, group_spheres
 from .cell import Cell
@@ -35,6 +35,9 @@ from .dump_text import (
 from .errors import CutOffError, DumpError, InputError, shortened
 from .geometry import BoolArray, FloatArray, IntArray
 from .spheres import Spheres
+
+if TYPE_CHECKING:
+    from MDAnalysis.coordinates.LAMMPS import DumpReader
 
 # The first three of these columns that a dump has are read: positions in the box come before those
 # that left it through a periodic face, lengths before shares of the box, which have lost digits.
@@ -194,6 +197,9 @@ class ParticleDump:
 
     def _read(self, index: int) -> FloatArray | None:
         """Read one frame's columns through MDAnalysis; None if it cannot."""
+        # MDAnalysis takes half a second to import, which most commands need not wait for.
+        from MDAnalysis.coordinates.LAMMPS import DumpReader
+
         columns = self._layout.columns
         try:
             if self._reader is None:

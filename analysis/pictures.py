@@ -10,7 +10,6 @@ from itertools import combinations, product
 from os import PathLike
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image, ImageChops, ImageDraw, ImageFont
@@ -182,6 +181,9 @@ def _by_radius(radii: FloatArray) -> _Shading:
 
 
 def _palette(count: int) -> list[Colour]:
+    # matplotlib takes a fifth of a second to import, which most commands need not wait for.
+    import matplotlib
+
     colours = matplotlib.colormaps[PALETTE](np.linspace(0.0, 1.0, count))
     return [(float(red), float(green), float(blue)) for red, green, blue, _ in colours]
 

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import j0
 
 from .areas import areas_in
 from .errors import InputError
@@ -184,7 +184,9 @@ def mueller_packing_fraction(scaled_distances: ArrayLike, width: float | None = 
     a = 7.45 - (3.15 if width is not None and width < 13 else 11.25) * narrow
     b = 0.315 - 0.725 * narrow
     bulk = 0.365 + 0.22 * narrow
-    values: FloatArray = 1 - bulk - (1 - bulk) * j0(a * distance) * np.exp(-b * distance)
+    values: FloatArray = (
+        1 - bulk - (1 - bulk) * scipy.special.j0(a * distance) * np.exp(-b * distance)
+    )
     return values
 
 

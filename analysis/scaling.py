@@ -13,8 +13,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
 
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, as_count, as_floats
@@ -94,7 +94,7 @@ def power_law(values: ArrayLike, low: float, high: float) -> PowerLaw:
 
     if not excess(-STEEPEST) < 0 < excess(STEEPEST):
         raise InputError(f"the values between {low:g} and {high:g} follow no power law")
-    s = float(brentq(excess, -STEEPEST, STEEPEST, xtol=1e-12))
+    s = float(scipy.optimize.brentq(excess, -STEEPEST, STEEPEST, xtol=1e-12))
     step = 1e-4
     variance = (excess(s + step) - excess(s - step)) / (2 * step)
     # Between bounds that are almost the same all exponents are as likely.
@@ -229,5 +229,7 @@ def binned_exponent(middles: ArrayLike, density: ArrayLike, low: float, high: fl
         parts = np.diff(edges**s) / s
         return -float(shares @ np.log(parts / parts.sum()))
 
-    found = minimize_scalar(unlikeliness, bounds=(-STEEPEST, STEEPEST), method="bounded")
+    found = scipy.optimize.minimize_scalar(
+        unlikeliness, bounds=(-STEEPEST, STEEPEST), method="bounded"
+    )
     return float(found.x) - 1

@@ -14,8 +14,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
 
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray, as_box, as_count, inside_of
@@ -259,7 +259,7 @@ def _nearest_twelve(
             raise InputError(f"more than {NEIGHBOURS} particles are needed, not {len(centres)}")
         if enough:
             # freud's own search took eight times as long. The nearest one of each is itself.
-            distance, nearest = KDTree(centres).query(centres, k=NEIGHBOURS + 1)
+            distance, nearest = scipy.spatial.KDTree(centres).query(centres, k=NEIGHBOURS + 1)
             neighbours = nearest[:, 1:]
             bond = distance[chosen].max()
             next_bond = distance[neighbours[chosen]].max()

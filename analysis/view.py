@@ -16,7 +16,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -245,5 +244,8 @@ def _pairs(low: FloatArray, high: FloatArray) -> list[list[float]]:
 
 def _palette(name: str, start: float, end: float) -> str:
     """Return a part of a colour map as hexadecimal digits, six a colour."""
+    # matplotlib takes a fifth of a second to import, which most commands need not wait for.
+    import matplotlib
+
     colours = matplotlib.colormaps[name](np.linspace(start, end, COLOURS), bytes=True)
     return np.asarray(colours)[:, :3].astype(np.uint8).tobytes().hex()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -141,6 +143,24 @@ def test_both_ways_to_run_cases_share_one_module(arrows: dict[str, set[str]]) ->
     ways = "workflow.running.launch", "workflow.running.mpi_route"
     assert all("workflow.running.one_case" in arrows[way] for way in ways)
     assert not any(other in arrows[way] for way in ways for other in ways)
+
+
+def test_a_command_starts_without_what_only_some_need() -> None:
+    """Each of these takes a fifth of a second to import; SciPy loads its parts when used."""
+    heavy = (
+        "MDAnalysis",
+        "matplotlib",
+        "networkx",
+        "freud",
+        "scipy.spatial",
+        "scipy.stats",
+        "jinja2",
+    )
+    script = f"import sys, {PACKAGE}.workflow.main; print(*(set({heavy}) & set(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "\n"
 
 
 @pytest.mark.parametrize(

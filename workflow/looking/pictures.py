@@ -6,7 +6,6 @@ import io
 import tempfile
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
@@ -112,12 +111,14 @@ def _middle(frame: ParticleFrame) -> tuple[float, float]:
 
 
 def _draw_contact_network(path: Path, frame: ParticleFrame, contacts: ContactFrame) -> None:
-    graph = contact_graph(
-        contacts.ids, frame.ids, frame.spheres, contacts.forces, points=contacts.points
-    )
+    import matplotlib
+
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
+    graph = contact_graph(
+        contacts.ids, frame.ids, frame.spheres, contacts.forces, points=contacts.points
+    )
     figure, ax = pyplot.subplots(figsize=(NETWORK_INCHES, NETWORK_INCHES), layout="constrained")
     draw_network(ax, graph, lower_half=True, slab=_middle(frame))
     ax.set_xlabel("x [length]")

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.spatial.distance import pdist
 
 from lammps_inelastic.analysis import Spheres, dimer_volume, packing_fraction
 from lammps_inelastic.analysis.geometry import FloatArray
@@ -141,7 +141,7 @@ class Cluster:
             )
         if not (np.abs(points) < 1e3).all():
             raise PackingError("the centres of a cluster must be finite, and below 1000 diameters")
-        if pdist(points).min() < APART:
+        if scipy.spatial.distance.pdist(points).min() < APART:
             raise PackingError("two spheres of a cluster must not have the same centre")
         object.__setattr__(self, "centres", tuple(map(tuple, points.tolist())))
 
@@ -154,7 +154,7 @@ class Cluster:
     @cached_property
     def extent(self) -> float:
         """The largest distance between two centres, without its round-off, diameters."""
-        return round(float(pdist(self.points).max()), 12)
+        return round(float(scipy.spatial.distance.pdist(self.points).max()), 12)
 
     @property
     def room(self) -> float:

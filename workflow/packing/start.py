@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from lammps_inelastic.analysis.geometry import FloatArray
 
@@ -34,7 +34,7 @@ def write_start(
     """
     count, each = len(diameters), len(shape.points)
     centres = container.draw(shape.room * diameters / 2, random)
-    turns = Rotation.random(count, random)
+    turns = scipy.spatial.transform.Rotation.random(count, random)
     arms = np.stack([turns.apply(point) for point in shape.points], axis=1)
     positions = (centres[:, None] + arms * diameters[:, None, None]).reshape(-1, 3)
     size = np.repeat(diameters, each)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from ..results.store import Result
 
@@ -28,7 +28,7 @@ def margin_of(error: float, freedom: float) -> float:
     """Return half the width of the 95 % confidence interval, by Student's t; NaN if not known."""
     if math.isnan(error) or not freedom > 0:
         return math.nan
-    return error * float(student.ppf(1 - SIGNIFICANT / 2, freedom))
+    return error * float(scipy.stats.t.ppf(1 - SIGNIFICANT / 2, freedom))
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class Difference:
         """How often chance alone would make a difference at least as large; NaN if not known."""
         if math.isnan(self.in_errors):
             return math.nan
-        return 2 * float(student.sf(abs(self.in_errors), self.freedom))
+        return 2 * float(scipy.stats.t.sf(abs(self.in_errors), self.freedom))
 
     @property
     def is_significant(self) -> bool:

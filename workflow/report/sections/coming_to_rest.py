@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import mannwhitneyu
+import scipy
 
 from lammps_inelastic.analysis import AnalysisError, Plateau, plateau
 
@@ -287,7 +287,7 @@ def _statement_on_times(rows: Sequence[_ToPlateau]) -> list[Statement]:
     shaken = next((row for row in rows if row.force > 0), None)
     if without is None or shaken is None:
         return []
-    test = mannwhitneyu(shaken.seconds, without.seconds)
+    test = scipy.stats.mannwhitneyu(shaken.seconds, without.seconds)
     # Half of all pairs, one run of either, would be won by either if the force did nothing.
     faster = test.statistic < len(shaken.group) * len(without.group) / 2
     p = float(test.pvalue)
