@@ -384,7 +384,7 @@ def test_random_points(make: Make, name: str | None) -> None:
     assert found.value == inside.mean()
 
 
-@pytest.mark.parametrize("name", ["across", "large", "away"])
+@pytest.mark.parametrize("name", ["across", "away", pytest.param("large", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("cell", CELLS)
 def test_volumes_of_each_sphere_and_particle(cell: str, name: str) -> None:
     packing = in_space(cell, "dimers")

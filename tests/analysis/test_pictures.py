@@ -50,7 +50,10 @@ def bed() -> tuple[Any, Any, Any]:
     return random.random((300, 3)) * 0.9 + 0.05, np.full(300, 0.05), random.integers(0, 12, 300)
 
 
-@pytest.mark.parametrize("contacts", ["all", "few", "none", "many"])
+@pytest.mark.parametrize(
+    "contacts",
+    ["all", *(pytest.param(some, marks=pytest.mark.slow) for some in ("few", "none", "many"))],
+)
 def test_each_colour_of_the_legend_can_be_told_from_the_others(
     contacts: str, bed: tuple[Any, Any, Any], tmp_path: Path
 ) -> None:
@@ -62,6 +65,7 @@ def test_each_colour_of_the_legend_can_be_told_from_the_others(
     check_legend(path)
 
 
+@pytest.mark.slow
 def test_a_legend_that_is_read_where_four_pictures_stand_side_by_side(
     bed: tuple[Any, Any, Any], tmp_path: Path
 ) -> None:

@@ -27,8 +27,12 @@ SLOW = {
     "docs/start.md",
     "docs/how-to/cfd-bed.md",
     "docs/how-to/change-a-deck.md",
+    "docs/how-to/hard-to-soft.md",
     "docs/how-to/pebble-bed.md",
     "docs/how-to/periodic.md",
+    "docs/how-to/polydisperse.md",
+    "docs/how-to/stl-walls.md",
+    "docs/how-to/two-dimensions.md",
     *(
         f"docs/tutorials/{name}.md"
         for name in ("first-hour", "pack", "pictures", "python", "study")

@@ -24,10 +24,16 @@ KINDS: dict[str, dict[str, Any]] = {
 CASES = [(1e-3, 0.005), (1e-2, 0.005), (1e-6, 0.005), (1e-3, 0.001), (1e-3, 0.02), (1e-6, 0.02)]
 
 
-@pytest.mark.parametrize("n", [10, 100])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("load", [0.0, 5.0, 500.0])
-@pytest.mark.parametrize(("tolerance", "timestep"), CASES)
+@pytest.mark.parametrize(
+    ("n", "tolerance", "timestep"),
+    [
+        *((10, *case) for case in CASES),
+        (100, *CASES[0]),
+        *(pytest.param(100, *case, marks=pytest.mark.slow) for case in CASES[1:]),
+    ],
+)
 def test_a_column(
     n: int, kind: str, tolerance: float, timestep: float, load: float, tmp_path: Path
 ) -> None:

@@ -8,6 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.study_run import run_few
+
+
+@pytest.fixture(scope="session")
+def two_cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a study of two cases that has been run. It is for all files to read."""
+    return run_few(tmp_path_factory.mktemp("two_cases"), "[1, 2]")
+
 
 @pytest.fixture
 def write_study(tmp_path: Path) -> Callable[..., Path]:

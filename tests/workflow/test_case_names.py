@@ -28,7 +28,7 @@ from lammps_inelastic.workflow.running.folder import Folder, write_json
 from lammps_inelastic.workflow.shipped import STUDIES, STUDIES_FOLDER
 from lammps_inelastic.workflow.study import Case, Study, read_study
 from lammps_inelastic.workflow.study.case_name import name_in, name_of
-from tests.helpers.study_run import numbers_of, run_few, same
+from tests.helpers.study_run import numbers_of, same
 
 KEPT = Path(__file__).parents[2] / "results"
 # A name on an encrypted disk (eCryptfs).
@@ -63,9 +63,9 @@ def all_shipped() -> Iterator[Case]:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def done(two_cases: Path) -> Path:
     """Return the folder of a study of two cases that has been run."""
-    return run_few(tmp_path_factory.mktemp("done"), "[1, 2]")
+    return two_cases
 
 
 def as_version_02_left_it(study: Study, root: Path) -> None:
@@ -184,6 +184,7 @@ def test_stored_results_in_the_form_of_02(
         assert (out / "results" / "counting" / f"{one.case}.h5").is_file()
 
 
+@pytest.mark.slow
 def test_a_run_of_02_is_not_run_again(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = study / "few.toml", study / "out"
     before = numbers_of(out / "few.h5")

@@ -15,13 +15,13 @@ from lammps_inelastic.workflow.provenance.finished import FINISHED
 from lammps_inelastic.workflow.running.folder import FAILED, Folder
 from lammps_inelastic.workflow.study import read_study
 from tests.helpers.few_spheres import TINY
-from tests.helpers.study_run import inelastic, numbers_of, run_few, same, warning
+from tests.helpers.study_run import inelastic, numbers_of, same, warning
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def done(two_cases: Path) -> Path:
     """Return the folder of a study of two cases that has been run."""
-    return run_few(tmp_path_factory.mktemp("done"), "[1, 2]")
+    return two_cases
 
 
 def cut(path: Path) -> None:

@@ -168,6 +168,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         yield disk
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up(done: Path, small_disk: Path) -> None:
     """The real thing, where one may be mounted: every process is told in its own way."""
     study = done / "few.toml"

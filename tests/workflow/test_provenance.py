@@ -27,7 +27,6 @@ from lammps_inelastic.workflow.results.store import Result, read_result, write_r
 from lammps_inelastic.workflow.running.folder import Folder
 from lammps_inelastic.workflow.running.gather import adopt_results, gather_results
 from lammps_inelastic.workflow.study import read_study
-from tests.helpers.study_run import run_few
 
 
 def git(folder: Path, *arguments: str) -> str:
@@ -93,9 +92,9 @@ def test_an_installed_package_keeps_its_version(
 
 
 @pytest.fixture(scope="module")
-def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def few(two_cases: Path) -> Path:
     """Return the folder of a study of two cases."""
-    return run_few(tmp_path_factory.mktemp("few"), "[1, 2]")
+    return two_cases
 
 
 def results_of(few: Path) -> list[Path]:

@@ -386,6 +386,7 @@ def test_a_run_that_goes_on_can_be_looked_at(
     assert "frame of step 40" in refusal(capsys, *command, "--contact-gap", "0.01")
 
 
+@pytest.mark.slow
 def test_a_study_says_what_cannot_be_measured(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -163,7 +163,7 @@ def test_status_tells_whole_names(undisturbed: Path, capsys: pytest.CaptureFixtu
         pytest.param("part", marks=pytest.mark.slow),
         "dump",
         pytest.param("finished", marks=pytest.mark.slow),
-        "result",
+        pytest.param("result", marks=pytest.mark.slow),
     ],
 )
 def test_killed_and_run_again(

@@ -132,6 +132,7 @@ def test_contacts_while_agitated_depend_on_force_and_time_step() -> None:
     assert f"the difference is {alike} in these steps" in text
 
 
+@pytest.mark.slow
 def test_contacts_at_a_loose_tolerance_depend_on_the_count() -> None:
     found: dict[tuple[Any, ...], list[float]] = {}
     own: dict[float, list[float]] = {}
