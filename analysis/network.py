@@ -121,20 +121,12 @@ def contact_graph(
     Raises InputError as `contact_sides` does, and for forces of another shape or not finite.
     """
     sides = contact_sides(contact_ids, sphere_ids, spheres.particles, images=spheres.has_images)
-    centres = spheres.centres
     strength = None if forces is None else _strengths(forces, len(sides))
     wanted = np.full(len(sides), True) if walls else sides[:, 1] >= 0
-    # networkx takes a fifth of a second to import, which most uses need not wait for.
-    import networkx
-
-    graph: networkx.Graph = networkx.Graph()
     lines = None
     if points is not None and spheres.has_images:
-        graph = networkx.MultiGraph()
         lines = contact_lines(contact_ids, sphere_ids, spheres, points)
-    graph.add_nodes_from(
-        (index, {"position": (x, y, z)}) for index, (x, y, z) in enumerate(centres.tolist())
-    )
+    graph = _without_edges(spheres.centres, each_image=lines is not None)
     # An edge is named by its two particles and, where there are several, by the image.
     ends = np.sort(sides[wanted], axis=1)
     names = ends if lines is None else np.column_stack([ends, _upwards(sides, lines)[wanted]])
@@ -148,6 +140,18 @@ def contact_graph(
     graph.add_edges_from(
         (one, other, dict(zip(data, own, strict=True)))
         for (one, other), own in zip(edges[:, :2].tolist(), values, strict=True)
+    )
+    return graph
+
+
+def _without_edges(centres: FloatArray, *, each_image: bool) -> networkx.Graph:
+    """Return a graph of particles that may have an edge for each image of another."""
+    # networkx takes a fifth of a second to import, which most uses need not wait for.
+    import networkx
+
+    graph: networkx.Graph = networkx.MultiGraph() if each_image else networkx.Graph()
+    graph.add_nodes_from(
+        (index, {"position": (x, y, z)}) for index, (x, y, z) in enumerate(centres.tolist())
     )
     return graph
 
