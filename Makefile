@@ -1,5 +1,5 @@
 # make run       set up, pour 1,000 spheres, print what came out
-# make test      set up, check style and types, run the tests (six minutes on two cores)
+# make test      set up, check style and types, run the tests (eight minutes on two cores)
 # make test-all  the same, then the slow tests (ten minutes more)
 # make report    set up, write the report of the paper's studies from the results kept here
 # make validate  set up, check the physics (two hours on two cores)
