@@ -2,8 +2,9 @@
 // between ranks and global reductions.
 //
 // A rank holds the particles that it owns and, behind them, ghosts: particles that other ranks own,
-// and periodic images of its own. Every function is collective: all ranks call it together. A host
-// with one rank and without periodic images has nothing to do (SerialHost).
+// and periodic images of its own. Every function but `tell` and `hear` is collective: all ranks
+// call it together. A host with one rank and without periodic images has nothing to do
+// (SerialHost).
 
 #pragma once
 
@@ -39,6 +40,20 @@ class Host {
   virtual void sum_over_chosen_ghosts(double *per_particle) = 0;
   virtual void sum_over_chosen_ghosts(float *per_particle) = 0;
 
+  // Chooses the particles of which ranks tell one another. `chosen` has one entry per slot; those
+  // of walls have no meaning. With `images` a rank that has several slots of a particle tells
+  // itself of each of them, too. Collective; the two functions below are not.
+  virtual void choose_told(const std::vector<char> &chosen, bool images) = 0;
+
+  // Tells all others who have chosen a particle a vector of it, for each slot: 4 numbers per
+  // particle, of which the fourth has no meaning. Does not wait for them.
+  virtual void tell(const float *per_particle) = 0;
+
+  // Adds to each chosen slot what the ranks of a turn have told of that particle, once each; what
+  // a slot has told itself is not added. Waits for what has not been told yet: each rank tells as
+  // often as all others hear its turn.
+  virtual void hear(int turn, float *per_particle) = 0;
+
   // Gives every ghost the value of its owner, 3 numbers per particle. Programs that set up a
   // problem need it: the ghosts must have predicted velocities too.
   virtual void share_with_ghosts(double *per_particle) = 0;
@@ -61,6 +76,9 @@ class SerialHost final : public Host {
   void choose_ghosts(const std::vector<char> &) override {}
   void sum_over_chosen_ghosts(double *) override {}
   void sum_over_chosen_ghosts(float *) override {}
+  void choose_told(const std::vector<char> &, bool) override {}
+  void tell(const float *) override {}
+  void hear(int, float *) override {}
   void share_with_ghosts(double *) override {}
   void reduce(double *, int, double *, int) override {}
 };

@@ -21,6 +21,13 @@ namespace {
   constexpr std::size_t FEW = 10;
   constexpr float IDLE_GAP = 5.0f;
 
+  // Vectors of 4 numbers, as the host takes them.
+  template <typename Vectors> float *numbers(Vectors &vectors)
+  {
+    static_assert(sizeof(vectors[0]) == 4 * sizeof(float));
+    return reinterpret_cast<float *>(vectors.data());
+  }
+
   template <typename Group> constexpr bool HAS_BODIES = std::is_same_v<Group, swept::BodyGroup>;
 
   // Writes L by columns, the lower triangle with L L^T = A, of an inverse inertia A (xx yy zz xy xz
@@ -98,8 +105,9 @@ bool PackedSweeps<Group>::prepare(const ContactProblem &problem,
 
   states_.assign(static_cast<std::size_t>(movers_) + 1, State{});
   before_ = states_;
-  sum_.assign(problem.slots(), Vector{});
-  list_shared();
+  told_.assign(problem.slots(), Vector{});
+  heard_ = told_;
+  list_shared(host);
   targets_.begin(problem, scales, targets, change, tolerance);
   set_targets();
   return lanes <= MOST_LANES * near.size() + 2 * COLOURS * WIDTH;
@@ -416,133 +424,152 @@ swept::Swept PackedSweeps<Group>::sweep(double along, double blur, Host &host)
 {
   const auto by = static_cast<float>(along), blurred = static_cast<float>(blur);
   swept::lead_on(states_, before_, by);
-  for (std::size_t k = 0; k < changes_.size(); ++k) {
-    const Group &group = at_cuts_.groups[k / WIDTH];
-    const auto lane = k % WIDTH;
-    changes_[k] = group.now[lane] + by * (group.now[lane] - group.before[lane]);
-  }
   swept::Swept swept;
   const auto visit = [&](Packed &some, std::size_t from, std::size_t to) {
     swept::sweep(some.groups.data() + from, to - from, states_.data(), by, blurred, swept);
   };
   const std::size_t at_cuts = at_cuts_.groups.size(), inside = inside_.groups.size();
-  // What ranks do before the first exchange should take all of them as long.
-  const std::size_t begun = turn_ > 0 ? std::min(at_cuts, inside) : 0;
+  // Ranks of the first turn begin with their constraints at cuts, those of the second visit theirs
+  // after half of the others: messages arrive before somebody waits for them.
+  const std::size_t begun = turn_ > 0 ? inside / 2 : 0;
   visit(inside_, 0, begun);
-  if (turn_ == 0) visit(at_cuts_, 0, at_cuts);
-  if (turns_ > 1) exchange_after(turn_ == 0, host);
+  if (turn_ > 0) hear(0, states_, host);
+  if (has_ghosts_) keep_before_visit(by);
+  visit(at_cuts_, 0, at_cuts);
+  if (has_ghosts_) tell_changes(host);
   visit(inside_, begun, inside);
-  if (turn_ > 0) visit(at_cuts_, 0, at_cuts);
-  if (has_ghosts_) exchange_after(turn_ == turns_ - 1, host);
+  if (turn_ == 0) hear(0, states_, host);
+  if (turns_ > 1) hear(1, states_, host);
   return swept;
 }
 
-// Exchanges what the constraints at cuts have changed in this turn; those of this rank only if they
-// were `visited` in it. Collective.
-template <typename Group> void PackedSweeps<Group>::exchange_after(bool visited, Host &host)
-{
-  for (std::size_t k = 0; visited && k < changes_.size(); ++k)
-    changes_[k] = at_cuts_.groups[k / WIDTH].now[k % WIDTH] - changes_[k];
-  exchange(visited, states_, host);
-}
-
-// Lists the slots that an exchange writes.
-template <typename Group> void PackedSweeps<Group>::list_shared()
+// Lists the slots of the movers that other ranks have constraints of, too.
+template <typename Group> void PackedSweeps<Group>::list_shared(Host &host)
 {
   shared_slots_.clear();
-  changes_.clear();
   if (!has_ghosts_) return;
-  std::vector<char> written(mover_.size());
-  for (std::size_t i = 0; i < mover_.size(); ++i) written[i] = is_shared(static_cast<int>(i));
-  for (std::size_t place = 0; place < at_cuts_.lanes(); ++place) {
-    const Rest &rest = at_cuts_.rest[place / WIDTH];
-    if (!at_cuts_.is_empty(place))
-      written[rest.first[place % WIDTH]] = written[rest.second[place % WIDTH]] = 1;
+  std::vector<char> chosen(mover_.size());
+  for (std::size_t i = 0; i < mover_.size(); ++i) {
+    chosen[i] = is_shared(static_cast<int>(i));
+    if (chosen[i]) shared_slots_.push_back(static_cast<int>(i));
   }
-  for (std::size_t i = 0; i < mover_.size(); ++i)
-    if (written[i]) shared_slots_.push_back(static_cast<int>(i));
-  changes_.resize(at_cuts_.lanes());
-  own_.resize(shared_slots_.size());
+  before_visit_.resize(shared_slots_.size());
+  // A body's images on this rank move with it; those of a particle are movers of their own.
+  host.choose_told(chosen, !HAS_BODIES<Group>);
 }
 
-// Adds a change of the impulse of a constraint, in scaled units, to the sums of its slots, in
-// packed units.
-template <typename Group>
-void PackedSweeps<Group>::add_impulses_to(std::vector<Vector> &sums, const Group &group,
-                                          const Rest &rest, int lane, float change) const
+// Keeps what a visit to the constraints at cuts changes: of particles the states that other ranks
+// share, of bodies the impulses, led on.
+template <typename Group> void PackedSweeps<Group>::keep_before_visit(float along)
 {
   if constexpr (HAS_BODIES<Group>) {
-    for (const bool is_first : {true, false}) {
-      const int slot = is_first ? rest.first[lane] : rest.second[lane];
-      if (!moves_[mover_[slot]]) continue;
-      const swept::Eight &row = is_first ? group.first_row[lane] : group.second_row[lane];
-      const float by = change / std::sqrt(mobility_[mover_[slot]]);
-      for (int d = 0; d < 3; ++d) sums[slot].lanes[d] += by * row[d];
+    changes_.resize(at_cuts_.lanes());
+    for (std::size_t k = 0; k < changes_.size(); ++k) {
+      const Group &group = at_cuts_.groups[k / WIDTH];
+      const auto lane = k % WIDTH;
+      changes_[k] = group.now[lane] + along * (group.now[lane] - group.before[lane]);
     }
   } else {
-    for (int d = 0; d < 3; ++d) {
-      const float push = change * group.row[lane % 4][4 * (lane / 4) + d];
-      sums[rest.first[lane]].lanes[d] += push;
-      sums[rest.second[lane]].lanes[d] -= push;
+    for (std::size_t k = 0; k < shared_slots_.size(); ++k)
+      before_visit_[k] = states_[shared_slots_[k]];
+  }
+}
+
+// Finds what the constraints at cuts have changed since keep_before_visit, and tells others.
+template <typename Group> void PackedSweeps<Group>::tell_changes(Host &host)
+{
+  if constexpr (HAS_BODIES<Group>) {
+    for (std::size_t k = 0; k < changes_.size(); ++k)
+      changes_[k] = at_cuts_.groups[k / WIDTH].now[k % WIDTH] - changes_[k];
+    sum_up_changes();
+  } else {
+    for (std::size_t k = 0; k < shared_slots_.size(); ++k) {
+      const int i = shared_slots_[k];
+      told_[i].lanes = states_[i].lanes - before_visit_[k].lanes;
+    }
+  }
+  host.tell(numbers(told_));
+}
+
+// Sums up the impulses of changes_, in scaled units, for each member of a shared body, in packed
+// units.
+template <typename Group> void PackedSweeps<Group>::sum_up_changes()
+{
+  if constexpr (HAS_BODIES<Group>) {
+    for (const int slot : shared_slots_) told_[slot] = Vector{};
+    for (std::size_t place = 0; place < changes_.size(); ++place) {
+      if (changes_[place] == 0.0f) continue;
+      const Group &group = at_cuts_.groups[place / WIDTH];
+      const Rest &rest = at_cuts_.rest[place / WIDTH];
+      const auto lane = place % WIDTH;
+      for (const bool is_first : {true, false}) {
+        const int slot = is_first ? rest.first[lane] : rest.second[lane];
+        if (!is_shared(slot)) continue;
+        const swept::Eight &row = is_first ? group.first_row[lane] : group.second_row[lane];
+        const float by = changes_[place] / std::sqrt(mobility_[mover_[slot]]);
+        for (int d = 0; d < 3; ++d) told_[slot].lanes[d] += by * row[d];
+      }
     }
   }
 }
 
-// Adds to the states of shared movers what the impulses of all ranks, sum_, make of them, less
-// those of this rank, own_.
-template <typename Group> void PackedSweeps<Group>::give_to_states(std::vector<State> &states) const
+// Adds to the states what the ranks of a turn have told.
+template <typename Group>
+void PackedSweeps<Group>::hear(int turn, std::vector<State> &states, Host &host)
 {
-  for (std::size_t k = 0; k < shared_slots_.size(); ++k) {
-    const std::size_t i = shared_slots_[k], m = mover_[i];
-    if (!is_shared(static_cast<int>(i))) continue;
-    const typename Vector::Lanes push =
-        (is_copy_[i] ? typename Vector::Lanes{} : sum_[i].lanes) - own_[k].lanes;
-    if constexpr (HAS_BODIES<Group>) {
+  if (!has_ghosts_) return;
+  if constexpr (HAS_BODIES<Group>) {
+    for (const int slot : shared_slots_) heard_[slot] = Vector{};
+    host.hear(turn, numbers(heard_));
+    push_bodies(states);
+  } else {
+    host.hear(turn, numbers(states));
+  }
+}
+
+// Adds to the states of shared movers what the impulses of heard_ make of them. Of a particle that
+// this rank has several times every slot hears the same: the first of them counts.
+template <typename Group> void PackedSweeps<Group>::push_bodies(std::vector<State> &states) const
+{
+  if constexpr (HAS_BODIES<Group>) {
+    for (const int i : shared_slots_) {
+      if (is_copy_[i]) continue;
+      const std::size_t m = mover_[i];
+      const typename Vector::Lanes push = heard_[i].lanes;
       const float slide = std::sqrt(mobility_[m]);
       swept::Eight &state = states[m].lanes;
       for (int d = 0; d < 3; ++d) state[d] += slide * push[d];
       if (9 * m >= spin_root_.size()) continue;
       const double s[3] = {push[0], push[1], push[2]};
       double moment[3];
-      cross(&arm_[3 * i], s, moment);
+      cross(&arm_[3 * static_cast<std::size_t>(i)], s, moment);
       for (int d = 0; d < 3; ++d)
         state[4 + d] += static_cast<float>(dot(&spin_root_[9 * m + 3 * d], moment));
-    } else {
-      states[m].lanes += mobility_[m] * push;
     }
   }
-}
-
-// Adds to the states what other ranks make of them by changes of the impulses of their constraints;
-// changes_ are those of this rank's, if it has any to tell. Collective.
-template <typename Group>
-void PackedSweeps<Group>::exchange(bool tells, std::vector<State> &states, Host &host)
-{
-  for (const int slot : shared_slots_) sum_[slot] = Vector{};
-  for (std::size_t k = 0; tells && k < changes_.size(); ++k)
-    if (changes_[k] != 0.0f)
-      add_impulses_to(sum_, at_cuts_.groups[k / WIDTH], at_cuts_.rest[k / WIDTH],
-                      static_cast<int>(k % WIDTH), changes_[k]);
-  for (std::size_t k = 0; k < shared_slots_.size(); ++k) own_[k] = sum_[shared_slots_[k]];
-  host.sum_over_chosen_ghosts(reinterpret_cast<float *>(sum_.data()));
-  give_to_states(states);
 }
 
 template <typename Group> void PackedSweeps<Group>::refresh(Host &host)
 {
   for (const swept::When when : {swept::When::NOW, swept::When::BEFORE}) {
-    const bool now = when == swept::When::NOW;
-    std::vector<State> &states = now ? states_ : before_;
+    std::vector<State> &states = when == swept::When::NOW ? states_ : before_;
     std::fill(states.begin(), states.end(), State{});
     swept::add_impulses(at_cuts_.groups, when, states.data());
     swept::add_impulses(inside_.groups, when, states.data());
     if (!has_ghosts_) continue;
-    for (std::size_t k = 0; k < changes_.size(); ++k) {
-      const Group &group = at_cuts_.groups[k / WIDTH];
-      const swept::Eight &impulse = now ? group.now : group.before;
-      changes_[k] = impulse[k % WIDTH];
+    if constexpr (HAS_BODIES<Group>) {
+      changes_.resize(at_cuts_.lanes());
+      for (std::size_t k = 0; k < changes_.size(); ++k) {
+        const Group &group = at_cuts_.groups[k / WIDTH];
+        const swept::Eight &impulse = when == swept::When::NOW ? group.now : group.before;
+        changes_[k] = impulse[k % WIDTH];
+      }
+      sum_up_changes();
+    } else {
+      for (const int slot : shared_slots_) told_[slot].lanes = states[slot].lanes;
     }
-    exchange(true, states, host);
+    host.tell(numbers(told_));
+    for (int turn = 0; turn < turns_; ++turn) hear(turn, states, host);
   }
 }
 
@@ -680,7 +707,6 @@ template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::
   idle_.groups.resize(groups);
   idle_.rest.resize(groups);
   for (std::size_t place = kept; place < idle_.lanes(); ++place) clear_lane(idle_, place);
-  list_shared();
 }
 
 // Returns the largest residual of working constraints, as a length in packed units, and lists those
@@ -715,7 +741,6 @@ template <typename Group> void PackedSweeps<Group>::set_idle(double least_idle_g
   idle_gap_ = std::max(static_cast<float>(least_idle_gap), IDLE_GAP * residual);
   make_idle(at_cuts, at_cuts_);
   make_idle(inside, inside_);
-  list_shared();
 }
 
 // Constraints that stay working move up within their colour.

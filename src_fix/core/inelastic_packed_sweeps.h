@@ -10,12 +10,13 @@
 // inelastic_packed_iterations.h; so are working and idle constraints.
 //
 // Each rank sweeps over its own constraints. Of some movers other ranks have constraints, too: a
-// rank sweeps its constraints of those first or last, by its turn (Host::turn), and what they do is
-// exchanged after each turn. Ranks of one turn that push the same mover push too far together. So
-// such constraints have a larger diagonal, by the sum of the off-diagonal entries with those of
-// other ranks of this turn (the l1 smoother of Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput.
-// 33 (2011) 2864), or a bound of it. A periodic image that a rank has of its own particle counts as
-// one of another rank.
+// rank visits its constraints of those first or in the middle of a sweep, by its turn (Host::turn),
+// and tells others what they do. Ranks of the second turn hear the first one's before they visit
+// theirs. Ranks of one turn that push the same mover push too far together. So such constraints
+// have a larger diagonal, by the sum of the off-diagonal entries with those of other ranks of this
+// turn (the l1 smoother of Baker, Falgout, Kolev and Yang, SIAM J. Sci. Comput. 33 (2011) 2864), or
+// a bound of it. A periodic image that a rank has of its own particle counts as one of another
+// rank.
 
 #pragma once
 
@@ -135,37 +136,37 @@ template <typename Group> class PackedSweeps {
   void set_idle(double least_idle_gap);
   void make_idle(const std::vector<Unloaded> &unloaded, Packed &packed);
   float looked_gap(const Packed &packed, std::size_t place) const;
-  void list_shared();
-  void add_impulses_to(std::vector<Vector> &sums, const Group &group, const Rest &rest, int lane,
-                       float change) const;
-  void give_to_states(std::vector<State> &states) const;
-  void exchange_after(bool visited, Host &host);
-  void exchange(bool tells, std::vector<State> &states, Host &host);
+  void list_shared(Host &host);
+  void keep_before_visit(float along);
+  void tell_changes(Host &host);
+  void sum_up_changes();
+  void hear(int turn, std::vector<State> &states, Host &host);
+  void push_bodies(std::vector<State> &states) const;
   const std::vector<Vector> &velocities();
 
   // Working constraints: those of movers that other ranks have constraints of, too, and all others.
   Packed at_cuts_, inside_;
   Packed idle_;
   std::vector<State> states_, before_;
-  std::vector<Vector> velocity_, sum_;    // per slot
-  std::vector<int> mover_;                // per slot
-  std::vector<char> moves_;               // per mover: whether impulses move it
+  std::vector<Vector> velocity_;    // per slot
+  std::vector<int> mover_;          // per slot
+  std::vector<char> moves_;         // per mover: whether impulses move it
   int movers_ = 0;
   std::vector<float> mobility_;    // per mover: the inverse mass, in packed units
   // Per mover 9: F of F F^T = I^-1 by columns, in packed units; per member of a body its arm.
   std::vector<double> spin_root_, arm_;
-  std::vector<int> originals_;    // slots of bodies whose impulses count, see RigidBodies
-  std::vector<char> is_copy_;     // per slot
+  std::vector<char> is_copy_;    // per slot
   double mobility_unit_ = 0.0;
 
   bool has_ghosts_ = false;
   int turns_ = 1, turn_ = 0;
   std::vector<char> shared_;         // per mover: whether other ranks, or images, have constraints
   std::vector<float> of_others_;     // per mover: what from_other_ranks needs
-  std::vector<float> changes_;       // of impulses at cuts in a sweep; before it, impulses led on
-  std::vector<int> shared_slots_;    // what an exchange writes
-  std::vector<Vector> own_;          // the sums of this rank, one for each of these
-  std::vector<double> start_;        // impulses, in the order of the problem
+  std::vector<int> shared_slots_;    // those of shared movers
+  std::vector<State> before_visit_;     // of particles: their states, as changes_ below
+  std::vector<float> changes_;          // of impulses at cuts in a visit; before it, impulses
+  std::vector<Vector> told_, heard_;    // per slot: what ranks tell of it; heard_: of bodies alone
+  std::vector<double> start_;           // impulses, in the order of the problem
   std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;
   std::vector<swept::Gaps> looked_;

@@ -37,7 +37,7 @@ void combine(void *in, void *inout, int *count, MPI_Datatype *)
 }    // namespace
 
 GhostExchange::GhostExchange(LAMMPS *lmp, Fix *fix, PhaseClock &clock) :
-    Pointers(lmp), fix_(fix), clock_(clock)
+    Pointers(lmp), fix_(fix), clock_(clock), told_particles_(world)
 {
   MPI_Op_create(&combine, 1, &reduction_);
   MPI_Type_contiguous(sizeof(Reduced) / sizeof(double), MPI_DOUBLE, &reduction_type_);
@@ -107,6 +107,30 @@ void GhostExchange::sum_over_chosen_ghosts(float *per_particle)
 {
   exchanged_single_ = per_particle;
   exchange(Exchange::CHOSEN_SINGLE, true, true);
+}
+
+void GhostExchange::choose_told(const std::vector<char> &chosen, bool images)
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
+  std::vector<double> owner(3 * static_cast<std::size_t>(atom->nlocal + atom->nghost));
+  for (int i = 0; i < atom->nlocal; ++i) {
+    owner[3 * i] = comm->me;
+    owner[3 * i + 1] = i;
+  }
+  share_with_ghosts(owner.data());
+  told_particles_.choose(chosen, owner, images, turn());
+}
+
+void GhostExchange::tell(const float *per_particle)
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
+  told_particles_.tell(per_particle);
+}
+
+void GhostExchange::hear(int turn, float *per_particle)
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
+  told_particles_.hear(turn, per_particle);
 }
 
 void GhostExchange::gather(FirstGuesses &guesses)

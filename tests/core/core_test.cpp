@@ -22,9 +22,11 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <deque>
 #include <functional>
 #include <iostream>
 #include <limits>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <sstream>
@@ -937,6 +939,8 @@ class Ranks {
   {
   }
 
+  static constexpr auto PATIENCE = std::chrono::seconds(20);
+
   int turns = 2;    // of Host::turns
 
   struct Arrays {
@@ -950,7 +954,6 @@ class Ranks {
   void call(const std::string &name, std::size_t rank, const Arrays &arrays,
             const std::function<void(Ranks &)> &exchange)
   {
-    constexpr auto PATIENCE = std::chrono::seconds(20);
     std::unique_lock<std::mutex> lock(mutex_);
     arrays_[rank] = arrays;
     if (waiting_ == 0)
@@ -1009,6 +1012,32 @@ class Ranks {
     }
   }
 
+  // What a rank has told, with the slots that it is of.
+  struct Told {
+    std::vector<char> chosen;
+    std::vector<float> values;
+  };
+
+  void tell(std::size_t rank, const Told &told)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (std::size_t to = 0; to < shares_.size(); ++to) told_[{rank, to}].push_back(told);
+    somebody_told_.notify_all();
+  }
+
+  Told hear(std::size_t from, std::size_t rank)
+  {
+    std::unique_lock<std::mutex> lock(mutex_);
+    std::deque<Told> &messages = told_[{from, rank}];
+    if (!somebody_told_.wait_for(lock, PATIENCE, [&] {
+          return !messages.empty();
+        }))
+      give_up("one rank waits for what another tells");
+    Told told = messages.front();
+    messages.pop_front();
+    return told;
+  }
+
   const std::vector<Share> &shares() const { return shares_; }
 
   std::vector<std::string> calls;    // each once, not once per rank
@@ -1041,7 +1070,8 @@ class Ranks {
   int particles_;
   std::vector<Arrays> arrays_;
   std::mutex mutex_;
-  std::condition_variable all_here_;
+  std::condition_variable all_here_, somebody_told_;
+  std::map<std::pair<std::size_t, std::size_t>, std::deque<Told>> told_;    // by from and to
   int waiting_ = 0;
   long exchanges_ = 0;
 };
@@ -1062,6 +1092,32 @@ class RankHost final : public Host {
   }
   void sum_over_chosen_ghosts(double *per_particle) override { sum(per_particle, 4, &chosen_); }
   void sum_over_chosen_ghosts(float *per_particle) override { sum(per_particle, 4, &chosen_); }
+
+  void choose_told(const std::vector<char> &chosen, bool images) override
+  {
+    told_ = chosen;
+    images_ = images;
+    ranks_.call("choose_told", rank_, {}, &Ranks::choose_ghosts);
+  }
+
+  void tell(const float *per_particle) override
+  { ranks_.tell(rank_, {told_, {per_particle, per_particle + 4 * told_.size()}}); }
+
+  void hear(int turn, float *per_particle) override
+  {
+    const std::vector<Share> &shares = ranks_.shares();
+    for (std::size_t from = 0; from < shares.size(); ++from) {
+      if (static_cast<int>(from) % ranks_.turns != turn) continue;
+      const Ranks::Told told = ranks_.hear(from, rank_);
+      if (from == rank_ && !images_) continue;
+      for (std::size_t i = 0; i < shares[rank_].particles.size(); ++i)
+        for (std::size_t k = 0; told_[i] && k < shares[from].particles.size(); ++k) {
+          if (!told.chosen[k] || shares[from].particles[k] != shares[rank_].particles[i]) continue;
+          if (from == rank_ && k == i) continue;
+          for (std::size_t d = 0; d < 3; ++d) per_particle[4 * i + d] += told.values[4 * k + d];
+        }
+    }
+  }
 
   void sum_over_ranks(double *of_walls, int count) override
   {
@@ -1102,7 +1158,8 @@ class RankHost final : public Host {
 
   Ranks &ranks_;
   std::size_t rank_;
-  std::vector<char> chosen_;
+  std::vector<char> chosen_, told_;
+  bool images_ = false;
 };
 
 // The bodies among a rank's particles. The first time that a particle is there counts as the
