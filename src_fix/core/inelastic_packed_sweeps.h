@@ -163,9 +163,11 @@ template <typename Group> class PackedSweeps {
   std::vector<char> shared_;         // per mover: whether other ranks, or images, have constraints
   std::vector<float> of_others_;     // per mover: what from_other_ranks needs
   std::vector<int> shared_slots_;    // those of shared movers
-  std::vector<State> before_visit_;     // of particles: their states, as changes_ below
-  std::vector<float> changes_;          // of impulses at cuts in a visit; before it, impulses
-  std::vector<Vector> told_, heard_;    // per slot: what ranks tell of it; heard_: of bodies alone
+  // While the constraints at cuts are visited: of particles the states of shared slots before, of
+  // bodies the impulses of these constraints before, and then their changes.
+  std::vector<State> before_visit_;
+  std::vector<float> changes_;
+  std::vector<Vector> told_, heard_;    // per slot, of what ranks tell; heard_ of bodies alone
   std::vector<double> start_;           // impulses, in the order of the problem
   std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;

@@ -5,14 +5,15 @@ own them, and what limits an iteration is counted: the constraints of the fulles
 spheres that touch one of another column. With the time of a constraint, measured on one rank, and
 the time of a message this gives the time of a sweep, an iteration of the default solver:
 
-    T(P) = t L + 4 s (a + 12 B n / b) + 2 a log2 P
+    T(P) = t L + s (a + 12 B n / b) + e a + 2 a log2 P
 
     t   time of a constraint (of the solver as a whole: particles are in it)
     L   constraints of the fullest column, for the contacts of the bed at rest
-    s   messages one after the other of an exchange: two for each direction that is cut. A sweep
-        has four exchanges: sums of ghosts to their owners and back, after each of two turns
+    s   columns beside one, two for each direction that is cut: in a sweep a rank sends a message to
+        each of them, and hears one. Here these cost as if it waited for them
     n   spheres of the fullest column that touch one of the next column in one direction, of three
         numbers in single precision each
+    e   columns that meet it along an edge, four where both directions are cut: few spheres
     a   time of a small message, b bytes a second; the last term is the reduction of the residuals
 
 Both are given for this machine (measured between two processes) and for a network that is assumed:
@@ -105,10 +106,11 @@ class Columns:
 
     def iteration(self, constraint: float, network: Network) -> float:
         """Return the time of an iteration by the formula above, seconds."""
-        swaps = 2 * sum(number > 1 for number in self.grid)
+        cuts = sum(number > 1 for number in self.grid)
         message = network.latency + BYTES * self.ghosts / network.bandwidth
         reduction = 2 * network.latency * math.log2(self.ranks)
-        return constraint * self.constraints + 4 * swaps * message + reduction
+        edges = 4 * network.latency if cuts == 2 else 0.0
+        return constraint * self.constraints + 2 * cuts * message + edges + reduction
 
 
 def cut(

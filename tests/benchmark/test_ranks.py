@@ -19,8 +19,8 @@ def test_a_bed_of_four_columns() -> None:
     assert columns.mean == pytest.approx(5 / 4)
     assert columns.ghosts == 1  # sphere 1, in both directions
     network = Network("a network", 2.0, 6.0)
-    # Four exchanges of four messages, and a reduction in two stages there and back.
-    expected = 3 * 4 + 16 * (2 + BYTES / 6) + 2 * 2 * 2
+    # Four messages through faces, four along edges, and a reduction in two stages there and back.
+    expected = 3 * 4 + 4 * (2 + BYTES / 6) + 4 * 2 + 2 * 2 * 2
     assert columns.iteration(3.0, network) == pytest.approx(expected)
 
 
@@ -28,5 +28,5 @@ def test_nothing_is_cut_in_a_direction_of_one_column() -> None:
     positions = np.array([[0.1, 1, 0.1], [0.9, 1, 0.1]])
     columns = cut(positions, np.array([0]), np.array([1]), (1, 2))
     assert columns.ghosts == 0
-    # One direction is cut: two messages in each of four exchanges.
-    assert columns.iteration(0.0, Network("a network", 1.0, 1.0)) == pytest.approx(8 + 2)
+    # One direction is cut: two messages.
+    assert columns.iteration(0.0, Network("a network", 1.0, 1.0)) == pytest.approx(2 + 2)
