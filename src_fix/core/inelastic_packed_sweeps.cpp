@@ -196,7 +196,9 @@ void PackedSweeps<Group>::find_shared(const ContactProblem &problem,
   for (std::size_t i = 0; i < slots; ++i) {
     const std::size_t m = mover_[i];
     if (problem.is_wall(static_cast<int>(i)) || !moves_[m]) continue;
-    if (all_count[i] > count[i] + 0.5) shared_[m] = 1;
+    // A slot of a particle that is in no constraint need not hear of others.
+    const bool is_here = HAS_BODIES<Group> || count[i] > 0.5;
+    if (is_here && all_count[i] > count[i] + 0.5) shared_[m] = 1;
     for (std::size_t k = 0; k < NUMBERS; ++k)
       of_others_[NUMBERS * m + k] += static_cast<float>(
           (is_copy_[i] ? 0.0 : all_sums[NUMBERS * i + k]) - sums[NUMBERS * i + k]);

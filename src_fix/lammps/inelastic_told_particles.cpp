@@ -4,15 +4,16 @@
 #include <cstddef>
 #include <numeric>
 #include <tuple>
+#include <utility>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
 
 namespace {
 
-// An atom that has chosen an owned particle: the particle's place, the rank that has the atom, and
-// its place there.
-using Copy = std::tuple<int, int, int>;
+// A chosen particle that this rank owns, by its place among the atoms; a rank that has chosen it;
+// and its number there.
+using Chosen = std::tuple<int, int, int>;
 
 constexpr int VECTOR = 3;    // numbers
 
@@ -53,28 +54,47 @@ ToldParticles::Lists ToldParticles::exchange(const Lists &to_ranks) const
   return from_ranks;
 }
 
-// Returns, of the particles that this rank owns, for each rank what it tells: triples of its atom,
-// another rank that has chosen this particle, and that one's atom.
-ToldParticles::Lists ToldParticles::copies_of_owned(const std::vector<char> &chosen,
-                                                    const std::vector<double> &owner) const
+// Lists the chosen particles with their atoms. Returns for each rank which of its own they are:
+// pairs of its place there and its number here.
+ToldParticles::Lists ToldParticles::list_particles(const std::vector<char> &chosen,
+                                                   const std::vector<double> &owner)
 {
+  const auto particle_of = [&](int atom) {
+    return std::pair(static_cast<int>(owner[3 * atom]), static_cast<int>(owner[3 * atom + 1]));
+  };
+  atoms_.clear();
+  for (int i = 0; i < static_cast<int>(owner.size() / 3); ++i)
+    if (chosen[i]) atoms_.push_back(i);
+  std::sort(atoms_.begin(), atoms_.end(), [&](int i, int j) {
+    return std::pair(particle_of(i), i) < std::pair(particle_of(j), j);
+  });
+  first_atom_.clear();
   Lists to_owners(ranks_);
-  for (std::size_t i = 0; 3 * i < owner.size(); ++i) {
-    if (!chosen[i]) continue;
-    std::vector<int> &list = to_owners[static_cast<int>(owner[3 * i])];
-    list.push_back(static_cast<int>(owner[3 * i + 1]));
-    list.push_back(static_cast<int>(i));
+  for (std::size_t k = 0; k < atoms_.size(); ++k) {
+    const auto particle = particle_of(atoms_[k]);
+    if (k > 0 && particle == particle_of(atoms_[k - 1])) continue;
+    to_owners[particle.first].push_back(particle.second);
+    to_owners[particle.first].push_back(static_cast<int>(first_atom_.size()));
+    first_atom_.push_back(static_cast<int>(k));
   }
+  first_atom_.push_back(static_cast<int>(atoms_.size()));
+  return to_owners;
+}
+
+// Returns, of the particles that this rank owns, for each rank whom it tells of them: triples of
+// its number of the particle, another rank that has chosen it, and that one's number.
+ToldParticles::Lists ToldParticles::ranks_of_owned(const Lists &to_owners) const
+{
   const Lists from_ranks = exchange(to_owners);
-  std::vector<Copy> copies;
+  std::vector<Chosen> chosen;
   for (int rank = 0; rank < ranks_; ++rank)
     for (std::size_t k = 0; k < from_ranks[rank].size(); k += 2)
-      copies.emplace_back(from_ranks[rank][k], rank, from_ranks[rank][k + 1]);
-  std::sort(copies.begin(), copies.end());
+      chosen.emplace_back(from_ranks[rank][k], rank, from_ranks[rank][k + 1]);
+  std::sort(chosen.begin(), chosen.end());
   Lists tell(ranks_);
-  for (auto begin = copies.begin(); begin != copies.end();) {
-    const auto end = std::find_if(begin, copies.end(), [&](const Copy &copy) {
-      return std::get<0>(copy) != std::get<0>(*begin);
+  for (auto begin = chosen.begin(); begin != chosen.end();) {
+    const auto end = std::find_if(begin, chosen.end(), [&](const Chosen &one) {
+      return std::get<0>(one) != std::get<0>(*begin);
     });
     for (auto from = begin; from != end; ++from)
       for (auto to = begin; to != end; ++to)
@@ -91,20 +111,22 @@ void ToldParticles::choose(const std::vector<char> &chosen, const std::vector<do
 {
   finish_telling();
   others_.clear();
-  images_.clear();
+  several_.clear();
   turn_ = turn;
-  Lists told(ranks_), names(ranks_);    // the atoms of this rank, and those of the others
-  for (const std::vector<int> &list : exchange(copies_of_owned(chosen, owner)))
+  const Lists to_owners = list_particles(chosen, owner);
+  const int particles = static_cast<int>(first_atom_.size()) - 1;
+  sum_.resize(particles);
+  own_.resize(atoms_.size());
+  for (int k = 0; images && k < particles; ++k)
+    if (first_atom_[k + 1] > first_atom_[k] + 1) several_.push_back(k);
+  Lists told(ranks_), names(ranks_);    // the numbers of this rank, and those of the others
+  for (const std::vector<int> &list : exchange(ranks_of_owned(to_owners)))
     for (std::size_t k = 0; k < list.size(); k += 3) {
-      const int mine = list[k], rank = list[k + 1], other = list[k + 2];
-      if (rank == me_) {
-        if (images) images_.push_back({mine, other, {}});
-        continue;
-      }
+      const int rank = list[k + 1];
       // The first number of a list is this rank's turn.
       if (names[rank].empty()) names[rank].push_back(turn);
-      told[rank].push_back(mine);
-      names[rank].push_back(other);
+      told[rank].push_back(list[k]);
+      names[rank].push_back(list[k + 2]);
     }
   const Lists heard = exchange(names);
   for (int rank = 0; rank < ranks_; ++rank) {
@@ -126,13 +148,16 @@ void ToldParticles::finish_telling()
 void ToldParticles::tell(const float *per_particle)
 {
   finish_telling();
-  for (OfImage &image : images_)
-    std::copy_n(per_particle + 4 * static_cast<std::size_t>(image.told), VECTOR,
-                image.vector.data());
+  for (std::size_t particle = 0; particle < sum_.size(); ++particle) {
+    Vector &sum = sum_[particle] = {};
+    for (int k = first_atom_[particle]; k < first_atom_[particle + 1]; ++k) {
+      std::copy_n(per_particle + 4 * static_cast<std::size_t>(atoms_[k]), VECTOR, own_[k].data());
+      for (int d = 0; d < VECTOR; ++d) sum[d] += own_[k][d];
+    }
+  }
   for (Other &other : others_) {
     float *out = other.out.data();
-    for (const int i : other.told)
-      out = std::copy_n(per_particle + 4 * static_cast<std::size_t>(i), VECTOR, out);
+    for (const int particle : other.told) out = std::copy_n(sum_[particle].data(), VECTOR, out);
     telling_.emplace_back();
     MPI_Isend(other.out.data(), static_cast<int>(other.out.size()), MPI_FLOAT, other.rank, 0,
               world_, &telling_.back());
@@ -146,14 +171,19 @@ void ToldParticles::hear(int turn, float *per_particle)
       per_particle[4 * static_cast<std::size_t>(atom) + d] += vector[d];
   };
   if (turn == turn_)
-    for (const OfImage &image : images_) add(image.heard, image.vector.data());
+    for (const int particle : several_)
+      for (int k = first_atom_[particle]; k < first_atom_[particle + 1]; ++k) {
+        Vector of_others;
+        for (int d = 0; d < VECTOR; ++d) of_others[d] = sum_[particle][d] - own_[k][d];
+        add(atoms_[k], of_others.data());
+      }
   for (Other &other : others_) {
     if (other.turn != turn) continue;
     MPI_Recv(other.in.data(), static_cast<int>(other.in.size()), MPI_FLOAT, other.rank, 0, world_,
              MPI_STATUS_IGNORE);
     const float *in = other.in.data();
-    for (const int i : other.heard) {
-      add(i, in);
+    for (const int particle : other.heard) {
+      for (int k = first_atom_[particle]; k < first_atom_[particle + 1]; ++k) add(atoms_[k], in);
       in += VECTOR;
     }
   }

@@ -30,29 +30,29 @@ class ToldParticles {
   void hear(int turn, float *per_particle);
 
  private:
-  // A rank that has chosen particles of this one, and the atoms that messages are of, in their
-  // order.
+  // A rank that has chosen particles that this one has chosen, too, and which of these messages are
+  // of, in their order.
   struct Other {
     int rank, turn;
     std::vector<int> told, heard;
     std::vector<float> out, in;
   };
-  // A vector of one atom, told to another atom of this rank.
-  struct OfImage {
-    int told, heard;
-    std::array<float, 3> vector;
-  };
+  using Vector = std::array<float, 3>;
   using Lists = std::vector<std::vector<int>>;    // a list for each rank
 
+  Lists list_particles(const std::vector<char> &chosen, const std::vector<double> &owner);
   Lists exchange(const Lists &to_ranks) const;
-  Lists copies_of_owned(const std::vector<char> &chosen, const std::vector<double> &owner) const;
+  Lists ranks_of_owned(const Lists &to_owners) const;
   void finish_telling();
 
   MPI_Comm world_;
   int me_ = 0, ranks_ = 1;
   int turn_ = 0;
+  // The atoms of chosen particles, one particle after the other, and where each particle begins.
+  std::vector<int> atoms_, first_atom_;
+  std::vector<int> several_;         // particles of several atoms that hear one another
+  std::vector<Vector> sum_, own_;    // told last: of a particle, of each atom
   std::vector<Other> others_;
-  std::vector<OfImage> images_;
   std::vector<MPI_Request> telling_;
 };
 
