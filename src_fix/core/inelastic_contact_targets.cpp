@@ -60,23 +60,23 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
   carried_.assign(problem.slots(), 0.0);
   for (std::size_t c = 0; c < count; ++c) {
     const double load = contacts.magnitude(c) * diagonal_[c];
+    if (load == 0.0) continue;
     carried_[mover(problem, contacts.first[c])] += load;
     carried_[mover(problem, contacts.second[c])] += load;
   }
   for (int slot = problem.particles; slot < problem.slots(); ++slot)
     if (!problem.is_mobile(slot)) carried_[slot] = 0.0;
   const double *const v = problem.predicted_velocity.data();
-  const auto length_of = [&](int i) {
-    return carried_[mover(problem, i)] +
-        problem.timestep * norm(v + 3 * static_cast<std::size_t>(i));
-  };
+  length_.resize(carried_.size());
+  for (std::size_t i = 0; i < length_.size(); ++i)
+    length_[i] = carried_[mover(problem, static_cast<int>(i))] + problem.timestep * norm(v + 3 * i);
   for (std::size_t c = 0; c < count; ++c) {
     const bool of_bodies = problem.is_member(contacts.first[c]) ||
         problem.is_member(contacts.second[c]);
     part_[c] = (of_bodies ? OF_BODIES : IN_NETWORKS) * limits.accuracy * limits.coarseness *
         contacts.refinement[c];
-    const double length = std::abs(gap_operator.free_gap()[c]) + length_of(contacts.first[c]) +
-        length_of(contacts.second[c]);
+    const double length = std::abs(gap_operator.free_gap()[c]) + length_[contacts.first[c]] +
+        length_[contacts.second[c]];
     least_[c] = std::max({ROUND_OFF * length, limits.least_length,
                           std::numeric_limits<double>::epsilon() * limits.tolerance,
                           part_[c] * of_guess_[c]});

@@ -81,7 +81,8 @@ class ContactTargets {
   std::vector<double> of_guess_;    // [length] max(r_c, l_c / 50000)
   std::vector<double> change_by_guess_;
   std::vector<double> least_, part_;
-  std::vector<double> carried_;    // [length] per slot: the impulses on it, for the round-off
+  // [length] per slot: the impulses on it, and with its own motion, for the round-off
+  std::vector<double> carried_, length_;
   double largest_ = 0.0;
 };
 

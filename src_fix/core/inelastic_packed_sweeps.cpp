@@ -70,6 +70,7 @@ bool PackedSweeps<Group>::prepare(const ContactProblem &problem,
                                   const std::vector<double> &change, double tolerance, Host &host)
 {
   const ContactSet &contacts = problem.contacts;
+  given_ = {&problem, &diagonal, &gap, scales, &targets};
   idle_gap_ = static_cast<float>(idle_gap / scales.length);
   start_ = contacts.impulse;
   of_impulses_ = contacts.set;
@@ -96,14 +97,12 @@ bool PackedSweeps<Group>::prepare(const ContactProblem &problem,
       }
     Packed &packed = at_cuts ? at_cuts_ : inside_;
     lanes += colour(first, second, packed, places);
-    for (std::size_t k = 0; k < chosen.size(); ++k)
-      write(problem, chosen[k], diagonal, gap, scales, targets, packed, places[k]);
+    for (std::size_t k = 0; k < chosen.size(); ++k) write(chosen[k], packed, places[k]);
   }
-  add_groups(idle_, (far.size() + WIDTH - 1) / WIDTH);
-  for (std::size_t k = 0; k < far.size(); ++k)
-    write(problem, far[k], diagonal, gap, scales, targets, idle_, k);
+  far_ = std::move(far);
 
-  states_.assign(static_cast<std::size_t>(movers_) + 1, State{});
+  states_.resize(static_cast<std::size_t>(movers_) + 1);
+  stop(states_);
   before_ = states_;
   told_.assign(problem.slots(), Vector{});
   heard_ = told_;
@@ -280,7 +279,6 @@ void PackedSweeps<Group>::clear_lane(Packed &packed, std::size_t place) const
     group.first_row[lane] = group.second_row[lane] = swept::Eight{};
   } else {
     for (int d = 0; d < 4; ++d) group.row[lane % 4][4 * (lane / 4) + d] = 0.0f;
-    group.first_mobility[lane] = group.second_mobility[lane] = 0.0f;
   }
   rest.source[lane] = NONE;
   rest.first[lane] = rest.second[lane] = 0;
@@ -330,33 +328,32 @@ std::size_t PackedSweeps<Group>::colour(const std::vector<int> &first,
 }
 
 template <typename Group>
-void PackedSweeps<Group>::write(const ContactProblem &problem, std::size_t c,
-                                const std::vector<double> &diagonal, const std::vector<double> &gap,
-                                const Scales &scales, const ContactTargets &targets, Packed &packed,
-                                std::size_t place) const
+void PackedSweeps<Group>::write(std::size_t c, Packed &packed, std::size_t place) const
 {
+  const ContactProblem &problem = *given_.problem;
   const ContactSet &contacts = problem.contacts;
+  const Scales &scales = given_.scales;
   Group &group = packed.groups[place / WIDTH];
   Rest &rest = packed.rest[place / WIDTH];
   const int lane = static_cast<int>(place % WIDTH);
   const double per_length = 1.0 / scales.length;
   const double unit = scales.impulse / scales.length;
-  const double whole = diagonal[c] + (has_ghosts_ ? from_other_ranks(problem, c) : 0.0);
+  const double whole = (*given_.diagonal)[c] + (has_ghosts_ ? from_other_ranks(problem, c) : 0.0);
   const double root = std::sqrt(whole * unit);
   const int first = mover_[contacts.first[c]], second = mover_[contacts.second[c]];
   group.first[lane] = static_cast<std::uint32_t>(first * sizeof(State));
   group.second[lane] = static_cast<std::uint32_t>(second * sizeof(State));
-  group.gap[lane] = static_cast<float>(gap[c] * per_length / root);
+  group.gap[lane] = static_cast<float>((*given_.gap)[c] * per_length / root);
   group.give[lane] = static_cast<float>(contacts.compliance[c] / whole);
-  group.least[lane] = static_cast<float>(contacts.set[c].changes_of(contacts.impulse[c]).least /
-                                         scales.impulse * root);
+  group.least[lane] =
+      static_cast<float>(of_impulses_[c].changes_of(start_[c]).least / scales.impulse * root);
   write_rows(problem, c, root, group, lane);
   rest.source[lane] = c;
   rest.first[lane] = contacts.first[c];
   rest.second[lane] = contacts.second[c];
   rest.root[lane] = static_cast<float>(root);
-  rest.least_target[lane] = static_cast<float>(targets.least()[c] * per_length);
-  rest.part[lane] = static_cast<float>(targets.part()[c]);
+  rest.least_target[lane] = static_cast<float>(given_.targets->least()[c] * per_length);
+  rest.part[lane] = static_cast<float>(given_.targets->part()[c]);
 }
 
 template <typename Group>
@@ -368,8 +365,6 @@ void PackedSweeps<Group>::write_rows(const ContactProblem &problem, std::size_t 
   if constexpr (!HAS_BODIES<Group>) {
     for (int d = 0; d < 3; ++d)
       group.row[lane % 4][4 * (lane / 4) + d] = static_cast<float>(n[d] / root);
-    group.first_mobility[lane] = mobility_[contacts.first[c]];
-    group.second_mobility[lane] = mobility_[contacts.second[c]];
   } else {
     for (const bool is_first : {true, false}) {
       const int slot = is_first ? contacts.first[c] : contacts.second[c];
@@ -410,8 +405,6 @@ void PackedSweeps<Group>::copy(const Packed &from, std::size_t source, Packed &t
     b.second_row[j] = a.second_row[i];
   } else {
     for (int d = 0; d < 4; ++d) b.row[j % 4][4 * (j / 4) + d] = a.row[i % 4][4 * (i / 4) + d];
-    b.first_mobility[j] = a.first_mobility[i];
-    b.second_mobility[j] = a.second_mobility[i];
   }
   rest_b.source[j] = rest_a.source[i];
   rest_b.first[j] = rest_a.first[i];
@@ -419,6 +412,14 @@ void PackedSweeps<Group>::copy(const Packed &from, std::size_t source, Packed &t
   rest_b.root[j] = rest_a.root[i];
   rest_b.least_target[j] = rest_a.least_target[i];
   rest_b.part[j] = rest_a.part[i];
+}
+
+// Sets the states of what impulses have not moved.
+template <typename Group> void PackedSweeps<Group>::stop(std::vector<State> &states) const
+{
+  std::fill(states.begin(), states.end(), State{});
+  if constexpr (!HAS_BODIES<Group>)
+    for (int m = 0; m < movers_; ++m) states[m].lanes[3] = mobility_[m];
 }
 
 template <typename Group>
@@ -555,7 +556,7 @@ template <typename Group> void PackedSweeps<Group>::refresh(Host &host)
 {
   for (const swept::When when : {swept::When::NOW, swept::When::BEFORE}) {
     std::vector<State> &states = when == swept::When::NOW ? states_ : before_;
-    std::fill(states.begin(), states.end(), State{});
+    stop(states);
     swept::add_impulses(at_cuts_.groups, when, states.data());
     swept::add_impulses(inside_.groups, when, states.data());
     if (!has_ghosts_) continue;
@@ -615,15 +616,19 @@ template <typename Group> bool PackedSweeps<Group>::sets_targets(long sweep)
 template <typename Group> void PackedSweeps<Group>::set_targets()
 {
   targets_.set(velocities());
-  for (Packed *const some : {&at_cuts_, &inside_, &idle_})
-    for (std::size_t g = 0; g < some->groups.size(); ++g) {
-      const Rest &rest = some->rest[g];
-      for (int lane = 0; lane < WIDTH; ++lane)
-        if (rest.source[lane] != NONE)
-          some->groups[g].inverse_target[lane] = rest.root[lane] /
-              targets_.target(rest.first[lane], rest.second[lane], rest.least_target[lane],
-                              rest.part[lane]);
-    }
+  for (Packed *const some : {&at_cuts_, &inside_})
+    for (std::size_t place = 0; place < some->lanes(); ++place)
+      if (!some->is_empty(place)) set_target(*some, place);
+}
+
+template <typename Group>
+void PackedSweeps<Group>::set_target(Packed &packed, std::size_t place) const
+{
+  const Rest &rest = packed.rest[place / WIDTH];
+  const auto lane = place % WIDTH;
+  packed.groups[place / WIDTH].inverse_target[lane] = rest.root[lane] /
+      targets_.target(rest.first[lane], rest.second[lane], rest.least_target[lane],
+                      rest.part[lane]);
 }
 
 template <typename Group> void PackedSweeps<Group>::keep_velocities()
@@ -648,8 +653,18 @@ template <typename Group> double PackedSweeps<Group>::moved_since_kept(double ac
   return accuracy * static_cast<double>(most);
 }
 
+// Packs what was far from closed at the start: many searches end before somebody looks at it.
+template <typename Group> void PackedSweeps<Group>::write_far()
+{
+  if (far_.empty()) return;
+  add_groups(idle_, (far_.size() + WIDTH - 1) / WIDTH);
+  for (std::size_t k = 0; k < far_.size(); ++k) write(far_[k], idle_, k);
+  far_.clear();
+}
+
 template <typename Group> void PackedSweeps<Group>::look_at_idle(double least_idle_gap)
 {
+  write_far();
   set_idle(least_idle_gap);
   looked_.resize(idle_.groups.size());
   swept::find_gaps(idle_.groups, states_.data(), looked_.data());
@@ -665,17 +680,6 @@ float PackedSweeps<Group>::looked_gap(const Packed &packed, std::size_t place) c
 {
   return looked_[place / WIDTH].lanes[place % WIDTH] *
       packed.rest[place / WIDTH].root[place % WIDTH];
-}
-
-template <typename Group>
-void PackedSweeps<Group>::join(const std::vector<double> &gap, const Scales &scales)
-{
-  std::vector<std::size_t> near;
-  for (std::size_t place = 0; place < idle_.lanes(); ++place)
-    if (!idle_.is_empty(place) &&
-        !(gap[idle_.rest[place / WIDTH].source[place % WIDTH]] / scales.length > idle_gap_))
-      near.push_back(place);
-  wake(near);
 }
 
 // Makes idle constraints working, given by their places in ascending order.
@@ -695,7 +699,10 @@ template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::
     }
     Packed &packed = at_cuts ? at_cuts_ : inside_;
     colour(first, second, packed, places);
-    for (std::size_t k = 0; k < chosen.size(); ++k) copy(idle_, chosen[k], packed, places[k]);
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      copy(idle_, chosen[k], packed, places[k]);
+      set_target(packed, places[k]);
+    }
   }
   std::size_t kept = near.front();
   auto next = near.begin();

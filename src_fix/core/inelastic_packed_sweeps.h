@@ -36,8 +36,9 @@ namespace inelastic {
 template <typename Group> class PackedSweeps {
  public:
   // Packs a problem, whose impulses are the start; the arguments are those of
-  // PackedIterations::prepare. Returns false where so many constraints have one mover in common
-  // that groups would be mostly empty. Collective; what is returned is this rank's answer.
+  // PackedIterations::prepare, and must outlive the search. Returns false where so many constraints
+  // have one mover in common that groups would be mostly empty. Collective; what is returned is
+  // this rank's answer.
   bool prepare(const ContactProblem &problem, const std::vector<double> &diagonal,
                const std::vector<double> &gap, double idle_gap, const Scales &scales,
                const ContactTargets &targets, const std::vector<double> &change, double tolerance,
@@ -70,9 +71,6 @@ template <typename Group> class PackedSweeps {
   // `least_idle_gap`, in packed units, where that is more. Makes the working ones idle that have no
   // impulse and larger gaps, where they are more than a few.
   void look_at_idle(double least_idle_gap);
-  // Makes the idle constraints working whose gaps are not above `idle_gap` by these gaps, one per
-  // constraint of the problem [length].
-  void join(const std::vector<double> &gap, const Scales &scales);
 
   // Writes the present impulses, in the order of the problem's constraints.
   void impulses(const Scales &scales, std::vector<double> &impulse) const;
@@ -108,6 +106,14 @@ template <typename Group> class PackedSweeps {
     float gap;
   };
 
+  // What `prepare` was given. Until all of it is packed nothing of it changes but the impulses.
+  struct Given {
+    const ContactProblem *problem;
+    const std::vector<double> *diagonal, *gap;
+    Scales scales;
+    const ContactTargets *targets;
+  };
+
   // How many numbers from_other_ranks needs of each mover.
   static constexpr std::size_t NUMBERS = std::is_same_v<Group, swept::BodyGroup> ? 1 : 6;
 
@@ -124,9 +130,8 @@ template <typename Group> class PackedSweeps {
   void add_groups(Packed &packed, std::size_t count) const;
   std::size_t colour(const std::vector<int> &first, const std::vector<int> &second, Packed &packed,
                      std::vector<std::size_t> &places);
-  void write(const ContactProblem &problem, std::size_t c, const std::vector<double> &diagonal,
-             const std::vector<double> &gap, const Scales &scales, const ContactTargets &targets,
-             Packed &packed, std::size_t place) const;
+  void write(std::size_t c, Packed &packed, std::size_t place) const;
+  void write_far();
   void write_rows(const ContactProblem &problem, std::size_t c, double root, Group &group,
                   int lane) const;
   static void copy(const Packed &from, std::size_t source, Packed &to, std::size_t place);
@@ -135,7 +140,9 @@ template <typename Group> class PackedSweeps {
   float look_at(const Packed &packed, std::vector<Unloaded> &unloaded);
   void set_idle(double least_idle_gap);
   void make_idle(const std::vector<Unloaded> &unloaded, Packed &packed);
+  void set_target(Packed &packed, std::size_t place) const;
   float looked_gap(const Packed &packed, std::size_t place) const;
+  void stop(std::vector<State> &states) const;
   void list_shared(Host &host);
   void keep_before_visit(float along);
   void tell_changes(Host &host);
@@ -147,6 +154,8 @@ template <typename Group> class PackedSweeps {
   // Working constraints: those of movers that other ranks have constraints of, too, and all others.
   Packed at_cuts_, inside_;
   Packed idle_;
+  Given given_{};
+  std::vector<std::size_t> far_;    // in the problem: idle constraints that are not packed yet
   std::vector<State> states_, before_;
   std::vector<Vector> velocity_;    // per slot
   std::vector<int> mover_;          // per slot

@@ -15,8 +15,11 @@ namespace {
   // A velocity, which is a sum of some impulses, is known to so many units of its own round-off.
   constexpr int BLURRED = 16;
 
+  template <typename Real> Real square(const typename packed::Vector<Real>::Lanes &a)
+  { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; }
+
   template <typename Real> Real length(const typename packed::Vector<Real>::Lanes &a)
-  { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
+  { return std::sqrt(square<Real>(a)); }
 
   template <typename Real>
   void set_lanes(packed::Vector<Real> &vector, double x, double y, double z)
@@ -55,19 +58,11 @@ template <typename Real> void PackedTargets<Real>::set(const std::vector<Vector>
 {
   changed_.resize(velocity.size());
   for (std::size_t i = 0; i < changed_.size(); ++i)
-    changed_[i] = !mobile_[i] ? std::numeric_limits<Real>::max()
-                              : std::max(length<Real>(at_start_[i].lanes + velocity[i].lanes),
-                                         length<Real>(since_guess_[i].lanes + velocity[i].lanes));
+    changed_[i] = !mobile_[i]
+        ? std::numeric_limits<Real>::max()
+        : std::sqrt(std::max(square<Real>(at_start_[i].lanes + velocity[i].lanes),
+                             square<Real>(since_guess_[i].lanes + velocity[i].lanes)));
 }
-
-template <typename Real>
-Real PackedTargets<Real>::target(std::size_t first, std::size_t second, Real least, Real part) const
-{ return std::min(most_, free_target(first, second, least, part)); }
-
-template <typename Real>
-Real PackedTargets<Real>::free_target(std::size_t first, std::size_t second, Real least,
-                                      Real part) const
-{ return std::max(least, part * std::min(changed_[first], changed_[second])); }
 
 template <typename Real> void PackedTargets<Real>::keep(const std::vector<Vector> &velocity)
 {

@@ -11,6 +11,7 @@
 #include "inelastic_contact_targets.h"
 #include "inelastic_packed_kernels.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -38,9 +39,11 @@ template <typename Real> class PackedTargets {
 
   // Returns the target of a constraint between two slots. `least` and `part` are those of
   // ContactTargets, in packed units.
-  Real target(std::size_t first, std::size_t second, Real least, Real part) const;
+  Real target(std::size_t first, std::size_t second, Real least, Real part) const
+  { return std::min(most_, free_target(first, second, least, part)); }
   // Returns the same without the bound by the tolerance.
-  Real free_target(std::size_t first, std::size_t second, Real least, Real part) const;
+  Real free_target(std::size_t first, std::size_t second, Real least, Real part) const
+  { return std::max(least, part * std::min(changed_[first], changed_[second])); }
 
   // Keeps velocities; the last two that were kept can be compared with.
   void keep(const std::vector<Vector> &velocity);

@@ -169,18 +169,23 @@ namespace {
     add_up(terms, sums);
   }
 
+  // Writes the inverse masses of two particles, each for all numbers of its state.
+  INELASTIC_INLINE void mobilities(const Eight &states, Eight &mobility)
+  { pick<3, 3, 3, 3, 7, 7, 7, 7>(states, states, mobility); }
+
   // Adds the changes of two impulses, of constraints K and K + 4, to their states.
   template <int K>
-  INELASTIC_INLINE void push_two(const ParticleGroup &group, const Eight &of_first,
-                                 const Eight &of_second, const Loaded<ParticleGroup, Wide> &loaded,
+  INELASTIC_INLINE void push_two(const ParticleGroup &group, const Eight &change,
+                                 const Loaded<ParticleGroup, Wide> &loaded,
                                  ParticleGroup::State *states)
   {
     constexpr int J = K + 4;
-    Eight first, second;
-    pick<K, K, K, K, J, J, J, J>(of_first, of_first, first);
-    pick<K, K, K, K, J, J, J, J>(of_second, of_second, second);
-    first = loaded.first[K] + group.row[K] * first;
-    second = loaded.second[K] - group.row[K] * second;
+    Eight by, of_first, of_second;
+    pick<K, K, K, K, J, J, J, J>(change, change, by);
+    mobilities(loaded.first[K], of_first);
+    mobilities(loaded.second[K], of_second);
+    const Eight first = loaded.first[K] + group.row[K] * (by * of_first);
+    const Eight second = loaded.second[K] - group.row[K] * (by * of_second);
     at(states, group.first[K]) = Four{first[0], first[1], first[2], first[3]};
     at(states, group.first[J]) = Four{first[4], first[5], first[6], first[7]};
     at(states, group.second[K]) = Four{second[0], second[1], second[2], second[3]};
@@ -193,23 +198,21 @@ namespace {
                              const Loaded<ParticleGroup, Wide> &loaded,
                              ParticleGroup::State *states)
   {
-    const Eight of_first = change * group.first_mobility;
-    const Eight of_second = change * group.second_mobility;
-    push_two<0>(group, of_first, of_second, loaded, states);
-    push_two<1>(group, of_first, of_second, loaded, states);
-    push_two<2>(group, of_first, of_second, loaded, states);
-    push_two<3>(group, of_first, of_second, loaded, states);
+    push_two<0>(group, change, loaded, states);
+    push_two<1>(group, change, loaded, states);
+    push_two<2>(group, change, loaded, states);
+    push_two<3>(group, change, loaded, states);
   }
 
   INELASTIC_INLINE void push(const ParticleGroup &group, int from, const Four &change,
                              const Loaded<ParticleGroup, Narrow> &, ParticleGroup::State *states)
   {
-    const Four of_first = change * part<Narrow>(group.first_mobility, from);
-    const Four of_second = change * part<Narrow>(group.second_mobility, from);
     for (int k = 0; k < 4; ++k) {
       const Four &row = part<Narrow>(group.row[k], from);
-      at(states, group.first[from + k]) += row * of_first[k];
-      at(states, group.second[from + k]) -= row * of_second[k];
+      Four &first = at(states, group.first[from + k]);
+      first += row * (change[k] * first[3]);
+      Four &second = at(states, group.second[from + k]);
+      second -= row * (change[k] * second[3]);
     }
   }
 
@@ -323,14 +326,26 @@ namespace {
       }
   }
 
+  // Two states of particles, which lie on multiples of 16 bytes.
+  typedef float Two __attribute__((vector_size(32), may_alias, aligned(16)));
+
   template <typename State>
   INELASTIC_INLINE void lead_all_on(std::vector<State> &states, std::vector<State> &before,
                                     float along)
   {
-    for (std::size_t i = 0; i < states.size(); ++i) {
-      const auto now = states[i].lanes;
-      states[i].lanes = now + along * (now - before[i].lanes);
-      before[i].lanes = now;
+    const std::size_t twos = states.size() * sizeof(State) / sizeof(Two);
+    // A deduced type would be aligned as all vectors of this size.
+    Two *const now = reinterpret_cast<Two *>(states.data());
+    Two *const last = reinterpret_cast<Two *>(before.data());
+    for (std::size_t i = 0; i < twos; ++i) {
+      const Two was = now[i];
+      now[i] = was + along * (was - last[i]);
+      last[i] = was;
+    }
+    for (std::size_t i = twos * sizeof(Two) / sizeof(State); i < states.size(); ++i) {
+      const auto was = states[i].lanes;
+      states[i].lanes = was + along * (was - before[i].lanes);
+      before[i].lanes = was;
     }
   }
 

@@ -37,13 +37,13 @@ struct alignas(32) Lanes {
   Eight inverse_target;
 };
 
-// Constraints of particles that turn with nothing. A state is a velocity, and a fourth number.
+// Constraints of particles that turn with nothing. A state is a velocity, and the inverse mass.
+// Sweeps take longer to read groups than to compute: what belongs to a mover is in its state.
 struct ParticleGroup : Lanes {
   struct alignas(16) State {
     Four lanes;
   };
   Eight row[4];    // constraint k is in row[k % 4], the lower half for k < 4: x y z and 0
-  Eight first_mobility, second_mobility;    // inverse masses
 };
 
 // Constraints of bodies and particles. A state is sqrt(M) v, 0, the spin in units of the root of
