@@ -10,9 +10,9 @@ import numpy as np
 NUMBERS = 20_000_000  # 160 MB an array: more than any cache gives a core
 REPEATS = 7
 # What a sweep reads and writes for a constraint of spheres, in single precision, beside the
-# particles (inelastic_sweep_kernels.h): two places, row, two mobilities, gap, compliance, the least
-# change, the inverse of the target, and twice (read and written) the change now and before.
-BYTES_A_CONSTRAINT = 8 + 16 + 8 + 4 + 4 + 4 + 4 + 2 * 8
+# particles (inelastic_sweep_kernels.h): two places, row, gap, compliance, the least change, the
+# inverse of the target, and twice (read and written) the change now and before.
+BYTES_A_CONSTRAINT = 8 + 16 + 4 + 4 + 4 + 4 + 2 * 8
 
 
 def bandwidth() -> float:
