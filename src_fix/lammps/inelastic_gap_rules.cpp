@@ -165,12 +165,14 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     if (!row.as_at_start && contacts.gap[c] != lessened) continue;
     if (contacts.gap[c] == linear_gap || overlaps_.is_bad(contact.gap_now)) continue;
     if (step_.is_member(contacts.first[c]) || step_.is_member(contacts.second[c])) continue;
-    if (contact.asked.parts) continue;
     const double at_end = gap_at_end(c, velocity);
     // A held contact is closed no faster than its gap asks for.
     const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
-    const bool may_stay = holds || contacts.impulse[c] == 0.0;
-    if ((at_end >= -allowed || step_.keeps_overlaps) && (at_end <= allowed || may_stay)) continue;
+    const bool may_be_open = holds || contacts.impulse[c] == 0.0 || contact.asked.parts;
+    if ((at_end >= -allowed || step_.keeps_overlaps) && (at_end <= allowed || may_be_open))
+      continue;
+    // Surfaces that part are asked for no less than that.
+    if (contact.asked.parts && contacts.gap[c] <= linear_gap) continue;
     allowed = LEFT * tolerance;
     if (contacts.impulse[c] > 0.0) contacts.set[c].least = 0.0;
     const bool first_time = row.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
