@@ -38,7 +38,7 @@ struct alignas(32) Lanes {
 };
 
 // Constraints of particles that turn with nothing. A state is a velocity, and the inverse mass.
-// Sweeps take longer to read groups than to compute: what belongs to a mover is in its state.
+// Sweeps of large scenes read their groups from memory: what belongs to a mover is in its state.
 struct ParticleGroup : Lanes {
   struct alignas(16) State {
     Four lanes;
