@@ -414,12 +414,12 @@ inelastic::ProjectionResult FixInelastic::solve()
       unsolved_.report(result);
     }
     // A step that is not solved, or pushes a bad start apart, says so itself.
-    const bool solved = result.status == inelastic::Status::CONVERGED && !step_.bad_start;
-    if (solved && walls_.any_moves())
+    const bool solved = result.status == inelastic::Status::CONVERGED;
+    if (solved && !step_.bad_start && walls_.any_moves())
       squeezed_.look();
     else
       squeezed_.skip();
-    if (length_.accepts(unsolved_.named(), squeezed_.said())) return result;
+    if (length_.accepts(solved, unsolved_.named(), squeezed_.said())) return result;
   }
 }
 

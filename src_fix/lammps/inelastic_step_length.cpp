@@ -315,7 +315,7 @@ void StepLength::fit_to_list()
     shorten(room_in_list(unhindered_spread(0.0), motion), "");
 }
 
-bool StepLength::accepts(const std::string &named, const std::string &squeezed)
+bool StepLength::accepts(bool solved, const std::string &named, const std::string &squeezed)
 {
   const bool may_shorten = step_.settings.shorten;
   // Pairs that are not listed were at least list_reach_ apart when the list was built.
@@ -344,7 +344,8 @@ bool StepLength::accepts(const std::string &named, const std::string &squeezed)
                "Fix inelastic: step {}: spheres move further than LAMMPS can follow them between "
                "two neighbour lists, {:.3g} times as far: lower the timestep, or use shorten yes",
                update->ntimestep, part);
-  if (part >= 1.0 || (may_shorten && step_.excess > 0.0)) {
+  // What a step that is not solved leaves too deep a shorter one may leave, too.
+  if (part >= 1.0 || (may_shorten && solved && step_.excess > 0.0)) {
     shorten(0.5, named);
     return false;
   }

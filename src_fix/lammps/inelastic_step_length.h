@@ -44,10 +44,10 @@ class StepLength : protected Pointers {
   // there is no use in solving first. Collective.
   void fit_to_list();
 
-  // Tells whether the step, solved, may be made. Otherwise it is shorter now, or there is an error.
-  // `named` tells of the constraint that is farthest from being met, if any, `squeezed` of what
-  // walls throw (inelastic_squeezed_grains.h). Collective.
-  bool accepts(const std::string &named, const std::string &squeezed);
+  // Tells whether the step may be made, `solved` or as far as it goes. Otherwise it is shorter now,
+  // or there is an error. `named` tells of the constraint that is farthest from being met, if any,
+  // `squeezed` of what walls throw (inelastic_squeezed_grains.h). Collective.
+  bool accepts(bool solved, const std::string &named, const std::string &squeezed);
 
   // Makes the time step shorter. Errors: it is so short already that something else is wrong.
   void shorten(double factor, const std::string &named);

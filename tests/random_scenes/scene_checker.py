@@ -427,7 +427,8 @@ class _Part:
                 hidden = "intersect" in self.facts["words"] and self.is_hidden(
                     last, i[beyond[k]], shape, -int(j[beyond[k]])
                 )
-                deeper[k] = not (hidden and self.facts["bad_start"])
+                pushed = self.facts["bad_start"] or self.facts["warn"]
+                deeper[k] = not (hidden and pushed)
         if deeper.any():
             worst = int(beyond[deeper][np.argmax(depth[beyond][deeper])])
             self.wrong(kind, self.pair(frame, i, j, worst, depth[worst]))
@@ -436,7 +437,8 @@ class _Part:
         """Whether LAMMPS does not show a sphere this wall, one of several parts of a region.
 
         It shows of an intersection the points that lie in all parts. Beside its edge a sphere can
-        stick out of a part there alone, which pushing it apart from others may make a little worse.
+        stick out of a part there alone, which pushing it apart from others may make a little worse,
+        and a step that is not solved as well.
         """
         others = [s for s in self.shapes if s["region"] == shape["region"] and s is not shape]
         for view in views(shape, frame.x[i], frame.time):
