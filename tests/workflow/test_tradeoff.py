@@ -615,6 +615,9 @@ def test_errors_of_a_solution() -> None:
     predicted = np.array([[1.0, 0, 1.0], [0, 0, 0]])
     found = errors(other, np.array([1.0, 0, 2, 1]), exact, np.array([2.0, 1, 1, 0]), predicted)
     assert found == {"velocity_error": 0.5, "force_error": 1.0, "missed": 1 / 3, "false": 1 / 3}
+    # The sweeps leave forces of 1e-16 of the others where there is none.
+    found = errors(exact, np.array([1.0, 0, 1e-16]), exact, np.array([1.0, 1e-15, 0]), predicted)
+    assert found["missed"] == found["false"] == 0
     nothing = np.zeros(2)
     found = errors(exact, nothing, exact, nothing, exact)
     assert all(math.isnan(value) for value in found.values())
