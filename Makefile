@@ -3,7 +3,7 @@
 # make test-all  the same, then the slow tests (ten minutes more)
 # make report    set up, write the report of the paper's studies from the results kept here
 # make validate  set up, check the physics (two hours on two cores)
-# make bench     set up, measure speed and accuracy (two to three hours; bench-quick: 9 minutes)
+# make bench     set up, measure speed and accuracy (four hours, then a million spheres; bench-quick: 9 minutes)
 # make tables    set up, print the measured tables of the documentation (hours)
 # make programs  install OVITO, VTK, ASE and Playwright, too (1.1 GB): slow tests open in them what is exported, and pages
 # make docs      build the documentation as a site, build/site, and check its links
