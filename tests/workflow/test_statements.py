@@ -412,10 +412,10 @@ def test_how_much_longer_uzawa_takes() -> None:
         (row[0], row[1]): float(row[3]) for row in cells if len(row) == 8 and row[1][:1].isdigit()
     }
     ratios = [
-        f"{ms['uzawa from zero', at] / ms['apgd from zero', at]:.0f}"
+        f"{ms['uzawa from zero', at] / ms['sweeps from zero', at]:.0f}"
         for at in ("0.0005", "5e-05", "5e-06")
     ]
-    assert f"takes {ratios[0]}, {ratios[1]} and {ratios[2]} times as long as `apgd` at" in said()
+    assert f"takes {ratios[0]}, {ratios[1]} and {ratios[2]} times as long as `sweeps` at" in said()
 
 
 # The pages of the fix
