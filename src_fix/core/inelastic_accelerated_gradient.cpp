@@ -218,7 +218,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
 
   SolverResult result;
   trend_of_targets_ = ResidualTrend();
-  const Guess guess = judge_first_guess(problem, limits, host);
+  const Guess guess = judge_first_guess(problem, host);
   result.residual = guess.residual;
   const double unsolved = targets_.judge(problem, limits, gap_operator_, gap_, host);
   if (unsolved <= 1.0)

@@ -1,7 +1,6 @@
 #include "inelastic_coloured_sweeps.h"
 
 #include "inelastic_infeasibility.h"
-#include "inelastic_settling.h"
 
 #include <algorithm>
 #include <cmath>
@@ -116,20 +115,13 @@ namespace {
 template <typename Group>
 ColouredSweeps::End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, ContactProblem &problem,
                                           const SolverLimits &limits, const Scales &scales,
-                                          Host &host, SolverResult &result)
+                                          Settling<PackedSweeps<Group>> &settling, Host &host,
+                                          SolverResult &result)
 {
   std::vector<double> &impulse = problem.contacts.impulse;
-  const double idle_gap = IDLE_GAP * std::max(limits.tolerance, result.residual.largest());
-  double refused = sweeps.prepare(problem, diagonal_, gap_, idle_gap, scales, targets_,
-                                  gap_operator_.change(), limits.tolerance, host)
-      ? 0.0
-      : 1.0;
-  host.reduce(nullptr, 0, &refused, 1);
-  if (refused > 0.0) return End::NO_PROGRESS;
   Momentum momentum;
   Looks looks(result.iterations);
   Upkeep upkeep(result.iterations);
-  Settling settling(sweeps, limits.accuracy > 0.0 && limits.coarseness == 1.0, result.iterations);
   ResidualTrend progress;
   const long begun = result.iterations;
   double first = 0.0, blur = 0.0;
@@ -178,10 +170,21 @@ bool ColouredSweeps::search(PackedSweeps<Group> &sweeps, ContactProblem &problem
                             SolverResult &result)
 {
   std::vector<double> &impulse = problem.contacts.impulse;
+  const auto idle_gap = [&] {
+    return IDLE_GAP * std::max(limits.tolerance, result.residual.largest());
+  };
+  double refused = sweeps.prepare(problem, diagonal_, gap_, idle_gap(), scales, targets_,
+                                  gap_operator_.change(), limits.tolerance, host)
+      ? 0.0
+      : 1.0;
+  host.reduce(nullptr, 0, &refused, 1);
+  if (refused > 0.0) return true;
+  Settling settling(sweeps, limits.accuracy > 0.0 && limits.coarseness == 1.0, result.iterations);
   for (int k = 0; k < MOST_SEARCHES; ++k) {
+    if (k > 0) sweeps.go_on(idle_gap(), gap_operator_.change(), limits.tolerance);
     const std::vector<double> before = impulse;
     const Residual residual_before = result.residual;
-    const End end = sweep(sweeps, problem, limits, scales, host, result);
+    const End end = sweep(sweeps, problem, limits, scales, settling, host, result);
     if (end == End::SOLVED) return true;
     if (end == End::BLURRED) continue;
     // The other solver goes on, from the better one of the impulses reached and those before. Where

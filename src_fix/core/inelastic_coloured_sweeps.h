@@ -20,6 +20,7 @@
 
 #include "inelastic_accelerated_gradient.h"
 #include "inelastic_packed_sweeps.h"
+#include "inelastic_settling.h"
 
 namespace inelastic {
 
@@ -43,7 +44,8 @@ class ColouredSweeps final : public AcceleratedProjectedGradient {
   // Sweeps until the impulses are a solution, or sweeps are of no more use.
   template <typename Group>
   End sweep(PackedSweeps<Group> &sweeps, ContactProblem &problem, const SolverLimits &limits,
-            const Scales &scales, Host &host, SolverResult &result);
+            const Scales &scales, Settling<PackedSweeps<Group>> &settling, Host &host,
+            SolverResult &result);
 
   PackedSweeps<swept::ParticleGroup> of_particles_;
   PackedSweeps<swept::BodyGroup> of_bodies_;

@@ -31,9 +31,8 @@ namespace {
 
 }    // namespace
 
-void ContactTargets::begin(const ContactProblem &problem, const SolverLimits &limits,
-                           const GapOperator &gap_operator, const std::vector<double> &gap,
-                           const std::vector<double> &diagonal)
+void ContactTargets::begin(const ContactProblem &problem, const GapOperator &gap_operator,
+                           const std::vector<double> &gap, const std::vector<double> &diagonal)
 {
   const ContactSet &contacts = problem.contacts;
   diagonal_ = diagonal;
@@ -42,7 +41,6 @@ void ContactTargets::begin(const ContactProblem &problem, const SolverLimits &li
   for (std::size_t c = 0; c < contacts.size(); ++c)
     of_guess_[c] = std::max(contacts.residual(c, gap.data()).largest(),
                             PART_OF_LOAD * contacts.magnitude(c) * diagonal[c]);
-  set_least(problem, limits, gap_operator);
 }
 
 void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits &limits,

@@ -42,9 +42,8 @@ class ContactTargets {
  public:
   // Takes the first guess: the operator was last applied to it, and `gap` are its gaps at the end
   // of the step. `diagonal` is that of A, one number per constraint as well.
-  void begin(const ContactProblem &problem, const SolverLimits &limits,
-             const GapOperator &gap_operator, const std::vector<double> &gap,
-             const std::vector<double> &diagonal);
+  void begin(const ContactProblem &problem, const GapOperator &gap_operator,
+             const std::vector<double> &gap, const std::vector<double> &diagonal);
 
   // Sets the targets for the present impulses, to which the operator was last applied. Returns the
   // largest residual as a part of its target, over all ranks; infinity if a number is not finite.

@@ -101,15 +101,41 @@ bool PackedSweeps<Group>::prepare(const ContactProblem &problem,
   }
   far_ = std::move(far);
 
-  states_.resize(static_cast<std::size_t>(movers_) + 1);
-  stop(states_);
-  before_ = states_;
   told_.assign(problem.slots(), Vector{});
   heard_ = told_;
   list_shared(host);
-  targets_.begin(problem, scales, targets, change, tolerance);
+  begin_search(change, tolerance);
   set_targets();
   return lanes <= MOST_LANES * near.size() + 2 * COLOURS * WIDTH;
+}
+
+// Begins with impulses that have not changed yet.
+template <typename Group>
+void PackedSweeps<Group>::begin_search(const std::vector<double> &change, double tolerance)
+{
+  states_.resize(static_cast<std::size_t>(movers_) + 1);
+  stop(states_);
+  before_ = states_;
+  targets_.begin(*given_.problem, given_.scales, *given_.targets, change, tolerance);
+}
+
+template <typename Group>
+void PackedSweeps<Group>::go_on(double idle_gap, const std::vector<double> &change,
+                                double tolerance)
+{
+  start_ = given_.problem->contacts.impulse;
+  idle_gap_ = static_cast<float>(idle_gap / given_.scales.length);
+  for (Packed *const some : {&at_cuts_, &inside_, &idle_})
+    for (std::size_t place = 0; place < some->lanes(); ++place)
+      if (!some->is_empty(place)) write_start(*some, place);
+  begin_search(change, tolerance);
+  // Nothing is packed as idle as long as something is far.
+  std::vector<std::size_t> near, far;
+  for (const std::size_t c : far_) ((*given_.gap)[c] > idle_gap ? far : near).push_back(c);
+  write_idle(near);
+  far_ = std::move(far);
+  wake_near();
+  set_targets();
 }
 
 // Numbers what moves: slots, or bodies and the particles that are in none. One mover more stands
@@ -280,9 +306,10 @@ void PackedSweeps<Group>::clear_lane(Packed &packed, std::size_t place) const
   } else {
     for (int d = 0; d < 4; ++d) group.row[lane % 4][4 * (lane / 4) + d] = 0.0f;
   }
-  rest.source[lane] = NONE;
+  rest.source[lane] = swept::NONE;
   rest.first[lane] = rest.second[lane] = 0;
-  rest.root[lane] = rest.least_target[lane] = rest.part[lane] = 0.0f;
+  rest.root[lane] = rest.part[lane] = 0.0f;
+  rest.least_target[lane] = 1.0f;
 }
 
 // Colours constraints, given by the movers of both sides, and adds groups for them. `places` gets
@@ -336,22 +363,37 @@ void PackedSweeps<Group>::write(std::size_t c, Packed &packed, std::size_t place
   Group &group = packed.groups[place / WIDTH];
   Rest &rest = packed.rest[place / WIDTH];
   const int lane = static_cast<int>(place % WIDTH);
-  const double per_length = 1.0 / scales.length;
   const double unit = scales.impulse / scales.length;
   const double whole = (*given_.diagonal)[c] + (has_ghosts_ ? from_other_ranks(problem, c) : 0.0);
-  const double root = std::sqrt(whole * unit);
+  // All is divided by the same number, which is kept in single precision.
+  rest.root[lane] = static_cast<float>(std::sqrt(whole * unit));
+  const auto root = static_cast<double>(rest.root[lane]);
   const int first = mover_[contacts.first[c]], second = mover_[contacts.second[c]];
   group.first[lane] = static_cast<std::uint32_t>(first * sizeof(State));
   group.second[lane] = static_cast<std::uint32_t>(second * sizeof(State));
-  group.gap[lane] = static_cast<float>((*given_.gap)[c] * per_length / root);
   group.give[lane] = static_cast<float>(contacts.compliance[c] / whole);
-  group.least[lane] =
-      static_cast<float>(of_impulses_[c].changes_of(start_[c]).least / scales.impulse * root);
   write_rows(problem, c, root, group, lane);
   rest.source[lane] = c;
   rest.first[lane] = contacts.first[c];
   rest.second[lane] = contacts.second[c];
-  rest.root[lane] = static_cast<float>(root);
+  write_start(packed, place);
+}
+
+// Writes what each search begins with.
+template <typename Group>
+void PackedSweeps<Group>::write_start(Packed &packed, std::size_t place) const
+{
+  Group &group = packed.groups[place / WIDTH];
+  Rest &rest = packed.rest[place / WIDTH];
+  const auto lane = place % WIDTH;
+  const std::size_t c = rest.source[lane];
+  const Scales &scales = given_.scales;
+  const double per_length = 1.0 / scales.length;
+  const auto root = static_cast<double>(rest.root[lane]);
+  group.gap[lane] = static_cast<float>((*given_.gap)[c] * per_length / root);
+  group.least[lane] =
+      static_cast<float>(of_impulses_[c].changes_of(start_[c]).least / scales.impulse * root);
+  group.now[lane] = group.before[lane] = 0.0f;
   rest.least_target[lane] = static_cast<float>(given_.targets->least()[c] * per_length);
   rest.part[lane] = static_cast<float>(given_.targets->part()[c]);
 }
@@ -616,19 +658,15 @@ template <typename Group> bool PackedSweeps<Group>::sets_targets(long sweep)
 template <typename Group> void PackedSweeps<Group>::set_targets()
 {
   targets_.set(velocities());
-  for (Packed *const some : {&at_cuts_, &inside_})
-    for (std::size_t place = 0; place < some->lanes(); ++place)
-      if (!some->is_empty(place)) set_target(*some, place);
+  for (Packed *const some : {&at_cuts_, &inside_}) set_targets(*some, 0);
 }
 
+// Sets the targets of the groups from a place on.
 template <typename Group>
-void PackedSweeps<Group>::set_target(Packed &packed, std::size_t place) const
+void PackedSweeps<Group>::set_targets(Packed &packed, std::size_t from) const
 {
-  const Rest &rest = packed.rest[place / WIDTH];
-  const auto lane = place % WIDTH;
-  packed.groups[place / WIDTH].inverse_target[lane] = rest.root[lane] /
-      targets_.target(rest.first[lane], rest.second[lane], rest.least_target[lane],
-                      rest.part[lane]);
+  swept::set_targets(packed.groups.data() + from, packed.rest.data() + from,
+                     packed.groups.size() - from, targets_.changed().data(), targets_.most());
 }
 
 template <typename Group> void PackedSweeps<Group>::keep_velocities()
@@ -653,33 +691,37 @@ template <typename Group> double PackedSweeps<Group>::moved_since_kept(double ac
   return accuracy * static_cast<double>(most);
 }
 
-// Packs what was far from closed at the start: many searches end before somebody looks at it.
-template <typename Group> void PackedSweeps<Group>::write_far()
+// Packs constraints as idle ones, where none are packed so far.
+template <typename Group>
+void PackedSweeps<Group>::write_idle(const std::vector<std::size_t> &constraints)
 {
-  if (far_.empty()) return;
-  add_groups(idle_, (far_.size() + WIDTH - 1) / WIDTH);
-  for (std::size_t k = 0; k < far_.size(); ++k) write(far_[k], idle_, k);
-  far_.clear();
+  if (constraints.empty()) return;
+  add_groups(idle_, (constraints.size() + WIDTH - 1) / WIDTH);
+  for (std::size_t k = 0; k < constraints.size(); ++k) write(constraints[k], idle_, k);
 }
 
 template <typename Group> void PackedSweeps<Group>::look_at_idle(double least_idle_gap)
 {
-  write_far();
+  // What was far from closed at the start is packed now: many searches end before.
+  write_idle(far_);
+  far_.clear();
   set_idle(least_idle_gap);
-  looked_.resize(idle_.groups.size());
-  swept::find_gaps(idle_.groups, states_.data(), looked_.data());
-  std::vector<std::size_t> near;
-  for (std::size_t place = 0; place < idle_.lanes(); ++place)
-    if (!idle_.is_empty(place) && !(looked_gap(idle_, place) > idle_gap_)) near.push_back(place);
-  wake(near);
+  wake_near();
 }
 
 // Returns a gap that was looked at last, as a length in packed units.
-template <typename Group>
-float PackedSweeps<Group>::looked_gap(const Packed &packed, std::size_t place) const
+template <typename Group> float PackedSweeps<Group>::looked_gap(std::size_t place) const
+{ return looked_[place / WIDTH].gap[place % WIDTH]; }
+
+// Makes the idle constraints working whose gaps are not above idle_gap_.
+template <typename Group> void PackedSweeps<Group>::wake_near()
 {
-  return looked_[place / WIDTH].lanes[place % WIDTH] *
-      packed.rest[place / WIDTH].root[place % WIDTH];
+  looked_.resize(idle_.groups.size());
+  swept::look(idle_.groups, idle_.rest.data(), states_.data(), looked_.data());
+  std::vector<std::size_t> near;
+  for (std::size_t place = 0; place < idle_.lanes(); ++place)
+    if (!idle_.is_empty(place) && !(looked_gap(place) > idle_gap_)) near.push_back(place);
+  wake(near);
 }
 
 // Makes idle constraints working, given by their places in ascending order.
@@ -698,11 +740,10 @@ template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::
       second.push_back(mover_[other]);
     }
     Packed &packed = at_cuts ? at_cuts_ : inside_;
+    const std::size_t from = packed.groups.size();
     colour(first, second, packed, places);
-    for (std::size_t k = 0; k < chosen.size(); ++k) {
-      copy(idle_, chosen[k], packed, places[k]);
-      set_target(packed, places[k]);
-    }
+    for (std::size_t k = 0; k < chosen.size(); ++k) copy(idle_, chosen[k], packed, places[k]);
+    set_targets(packed, from);
   }
   std::size_t kept = near.front();
   auto next = near.begin();
@@ -724,19 +765,14 @@ template <typename Group>
 float PackedSweeps<Group>::look_at(const Packed &packed, std::vector<Unloaded> &unloaded)
 {
   looked_.resize(packed.groups.size());
-  swept::find_gaps(packed.groups, states_.data(), looked_.data());
-  float residual = 0.0f;
-  for (std::size_t place = 0; place < packed.lanes(); ++place) {
-    if (packed.is_empty(place)) continue;
-    const Group &group = packed.groups[place / WIDTH];
-    const auto lane = place % WIDTH;
-    const float gap = looked_gap(packed, place);
-    const bool is_loaded = group.now[lane] > group.least[lane];
-    residual = std::max(residual, is_loaded ? std::abs(gap) : -gap);
-    if (!is_loaded && group.now[lane] == 0.0f && group.before[lane] == 0.0f &&
-        !of_impulses_[packed.rest[place / WIDTH].source[lane]].may_pull())
-      unloaded.push_back({place, gap});
-  }
+  const float residual =
+      swept::look(packed.groups, packed.rest.data(), states_.data(), looked_.data());
+  for (std::size_t g = 0; g < packed.groups.size(); ++g)
+    for (unsigned lanes = looked_[g].unloaded; lanes != 0; lanes &= lanes - 1) {
+      const std::size_t place = g * WIDTH + __builtin_ctz(lanes);
+      if (!packed.is_empty(place) && !of_impulses_[packed.rest[g].source[place % WIDTH]].may_pull())
+        unloaded.push_back({place, looked_gap(place)});
+    }
   return residual;
 }
 
@@ -795,7 +831,7 @@ void PackedSweeps<Group>::impulses(const Scales &scales, std::vector<double> &im
       const Group &group = some->groups[g];
       const Rest &rest = some->rest[g];
       for (int lane = 0; lane < WIDTH; ++lane) {
-        if (rest.source[lane] == NONE || !(group.now[lane] > group.least[lane])) continue;
+        if (rest.source[lane] == swept::NONE || !(group.now[lane] > group.least[lane])) continue;
         const std::size_t c = rest.source[lane];
         impulse[c] = of_impulses_[c].project(
             start_[c] + scales.impulse * static_cast<double>(group.now[lane] / rest.root[lane]));

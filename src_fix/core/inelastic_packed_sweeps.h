@@ -44,6 +44,11 @@ template <typename Group> class PackedSweeps {
                const ContactTargets &targets, const std::vector<double> &change, double tolerance,
                Host &host);
 
+  // Begins another search from the impulses of the last one, which are those of the problem now, as
+  // double precision has judged them: its gaps, changes of velocity and targets, in the places that
+  // `prepare` was given, are new. Colours and groups stay.
+  void go_on(double idle_gap, const std::vector<double> &change, double tolerance);
+
   // Leads all impulses on by `along` times their last change, and visits each constraint once.
   // Changes and residuals below `blur`, in scaled units, may be round-off. Collective; what is
   // returned is of this rank's constraints.
@@ -80,14 +85,7 @@ template <typename Group> class PackedSweeps {
   using Vector = packed::Vector<float>;
   static constexpr int WIDTH = swept::WIDTH;
 
-  // What a sweep does not read of the constraints of a group.
-  struct Rest {
-    std::size_t source[WIDTH];          // the place in the problem, or NONE: an empty lane
-    int first[WIDTH], second[WIDTH];    // slots
-    float root[WIDTH];                  // of D
-    float least_target[WIDTH], part[WIDTH];
-  };
-  static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
+  using Rest = swept::Rest;
 
   struct Packed {
     std::vector<Group> groups;
@@ -97,7 +95,7 @@ template <typename Group> class PackedSweeps {
     void clear();
     std::size_t lanes() const { return groups.size() * WIDTH; }
     bool is_empty(std::size_t lane) const
-    { return rest[lane / WIDTH].source[lane % WIDTH] == NONE; }
+    { return rest[lane / WIDTH].source[lane % WIDTH] == swept::NONE; }
   };
 
   // A constraint without an impulse, by its place, and its gap.
@@ -131,17 +129,20 @@ template <typename Group> class PackedSweeps {
   std::size_t colour(const std::vector<int> &first, const std::vector<int> &second, Packed &packed,
                      std::vector<std::size_t> &places);
   void write(std::size_t c, Packed &packed, std::size_t place) const;
-  void write_far();
+  void write_start(Packed &packed, std::size_t place) const;
+  void write_idle(const std::vector<std::size_t> &constraints);
+  void begin_search(const std::vector<double> &change, double tolerance);
   void write_rows(const ContactProblem &problem, std::size_t c, double root, Group &group,
                   int lane) const;
   static void copy(const Packed &from, std::size_t source, Packed &to, std::size_t place);
   void clear_lane(Packed &packed, std::size_t place) const;
+  void wake_near();
   void wake(const std::vector<std::size_t> &near);
   float look_at(const Packed &packed, std::vector<Unloaded> &unloaded);
   void set_idle(double least_idle_gap);
   void make_idle(const std::vector<Unloaded> &unloaded, Packed &packed);
-  void set_target(Packed &packed, std::size_t place) const;
-  float looked_gap(const Packed &packed, std::size_t place) const;
+  void set_targets(Packed &packed, std::size_t from) const;
+  float looked_gap(std::size_t place) const;
   void stop(std::vector<State> &states) const;
   void list_shared(Host &host);
   void keep_before_visit(float along);
@@ -180,7 +181,7 @@ template <typename Group> class PackedSweeps {
   std::vector<double> start_;           // impulses, in the order of the problem
   std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;
-  std::vector<swept::Gaps> looked_;
+  std::vector<swept::Looked> looked_;
   float idle_gap_ = 0.0f;    // above it a constraint without an impulse is idle
 };
 

@@ -37,6 +37,10 @@ template <typename Real> class PackedTargets {
   // Takes the velocities of which targets are a part.
   void set(const std::vector<Vector> &velocity);
 
+  // What target() takes of each slot, and the bound of all targets.
+  const std::vector<Real> &changed() const { return changed_; }
+  Real most() const { return most_; }
+
   // Returns the target of a constraint between two slots. `least` and `part` are those of
   // ContactTargets, in packed units.
   Real target(std::size_t first, std::size_t second, Real least, Real part) const

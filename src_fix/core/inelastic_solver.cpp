@@ -23,7 +23,7 @@ Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contact
   return {maxima[0], maxima[1]};
 }
 
-Guess Solver::judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host)
+Guess Solver::judge_first_guess(ContactProblem &problem, Host &host)
 {
   ContactSet &contacts = problem.contacts;
   const std::vector<double> &free_gap = gap_operator_.free_gap();
@@ -46,7 +46,7 @@ Guess Solver::judge_first_guess(ContactProblem &problem, const SolverLimits &lim
   guess.residual = {maxima[0], maxima[1]};
   guess.largest_length = maxima[2];
   guess.largest_diagonal = maxima[3];
-  targets_.begin(problem, limits, gap_operator_, gap_, diagonal_);
+  targets_.begin(problem, gap_operator_, gap_, diagonal_);
   return guess;
 }
 

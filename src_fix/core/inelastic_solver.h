@@ -110,7 +110,7 @@ class Solver {
  protected:
   // Makes the impulses of the problem admissible and judges them as the first guess. Sets the
   // diagonal, and tells the targets. The operator must be prepared for the problem. Collective.
-  Guess judge_first_guess(ContactProblem &problem, const SolverLimits &limits, Host &host);
+  Guess judge_first_guess(ContactProblem &problem, Host &host);
 
   GapOperator gap_operator_;
   ContactTargets targets_;

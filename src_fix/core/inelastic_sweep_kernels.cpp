@@ -298,19 +298,54 @@ namespace {
   }
 
   template <typename Size, typename Group>
-  INELASTIC_INLINE void gaps_of_all(const std::vector<Group> &groups,
-                                    const typename Group::State *states, Gaps *gap)
+  INELASTIC_INLINE float look_at_all(const std::vector<Group> &groups, const Rest *rest,
+                                     const typename Group::State *states, Looked *looked)
   {
+    using V = typename Size::Numbers;
+    V residual = {};
     for (const Group &group : groups) {
+      unsigned unloaded = 0;
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
         Loaded<Group, Size> loaded;
-        typename Size::Numbers opened;
+        V opened;
         opening(group, from, states, loaded, opened);
-        part<Size>(gap->lanes, from) = part<Size>(group.gap, from) +
-            part<Size>(group.give, from) * part<Size>(group.now, from) + opened;
+        const V &now = part<Size>(group.now, from), &least = part<Size>(group.least, from);
+        const V gap = (part<Size>(group.gap, from) + part<Size>(group.give, from) * now + opened) *
+            part<Size>(rest->root, from);
+        part<Size>(looked->gap, from) = gap;
+        const V under_force = now > least ? gap : -gap;
+        const V left = under_force > -gap ? under_force : -gap;
+        residual = left > residual ? left : residual;
+        const V &before = part<Size>(group.before, from);
+        const V most = now > before ? now : before, fewest = now < before ? now : before;
+        for (int k = 0; k < Size::COUNT; ++k)
+          unloaded |= unsigned{most[k] == 0.0f && fewest[k] == 0.0f && !(now[k] > least[k])}
+              << (from + k);
       }
-      ++gap;
+      looked->unloaded = static_cast<std::uint8_t>(unloaded);
+      ++rest;
+      ++looked;
     }
+    return static_cast<float>(largest_of<Size>(residual));
+  }
+
+  template <typename Size, typename Group>
+  INELASTIC_INLINE void set_all_targets(Group *groups, const Rest *rest, std::size_t count,
+                                        const float *changed, float most)
+  {
+    using V = typename Size::Numbers;
+    const V bound = most - V{};
+    for (std::size_t g = 0; g < count; ++g)
+      for (int from = 0; from < WIDTH; from += Size::COUNT) {
+        V less;
+        for (int k = 0; k < Size::COUNT; ++k)
+          less[k] = std::min(changed[rest[g].first[from + k]], changed[rest[g].second[from + k]]);
+        const V &least = part<Size>(rest[g].least_target, from);
+        const V by_velocity = part<Size>(rest[g].part, from) * less;
+        const V free = by_velocity > least ? by_velocity : least;
+        part<Size>(groups[g].inverse_target, from) =
+            part<Size>(rest[g].root, from) / (free < bound ? free : bound);
+      }
   }
 
   template <typename Size, typename Group>
@@ -363,18 +398,21 @@ namespace {
   }
 
   // The passes over groups of each kind, by vectors of eight and of four numbers.
-#define INELASTIC_PASSES(GROUP)                                                                 \
-  INELASTIC_CLONES void wide_sweep(GROUP *groups, std::size_t count, GROUP::State *states,      \
-                                   float along, float blur, Swept &swept)                       \
-  { sweep_all<Wide>(groups, count, states, along, blur, swept); }                               \
-  INELASTIC_CLONES double wide_unsolved(const std::vector<GROUP> &groups,                       \
-                                        const GROUP::State *states, float blur)                 \
-  { return unsolved_of_all<Wide>(groups, states, blur); }                                       \
-  INELASTIC_CLONES void wide_gaps(const std::vector<GROUP> &groups, const GROUP::State *states, \
-                                  Gaps *gap)                                                    \
-  { gaps_of_all<Wide>(groups, states, gap); }                                                   \
-  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,                   \
-                                 GROUP::State *states)                                          \
+#define INELASTIC_PASSES(GROUP)                                                            \
+  INELASTIC_CLONES void wide_sweep(GROUP *groups, std::size_t count, GROUP::State *states, \
+                                   float along, float blur, Swept &swept)                  \
+  { sweep_all<Wide>(groups, count, states, along, blur, swept); }                          \
+  INELASTIC_CLONES double wide_unsolved(const std::vector<GROUP> &groups,                  \
+                                        const GROUP::State *states, float blur)            \
+  { return unsolved_of_all<Wide>(groups, states, blur); }                                  \
+  INELASTIC_CLONES float wide_look(const std::vector<GROUP> &groups, const Rest *rest,     \
+                                   const GROUP::State *states, Looked *looked)             \
+  { return look_at_all<Wide>(groups, rest, states, looked); }                              \
+  INELASTIC_CLONES void wide_targets(GROUP *groups, const Rest *rest, std::size_t count,   \
+                                     const float *changed, float most)                     \
+  { set_all_targets<Wide>(groups, rest, count, changed, most); }                           \
+  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,              \
+                                 GROUP::State *states)                                     \
   { add_all<Wide>(groups, when, states); }
 
   INELASTIC_PASSES(ParticleGroup)
@@ -396,8 +434,18 @@ namespace {
     return is_wide() ? wide_unsolved(groups, states, blur)                                       \
                      : unsolved_of_all<Narrow>(groups, states, blur);                            \
   }                                                                                              \
-  void find_gaps(const std::vector<GROUP> &groups, const GROUP::State *states, Gaps *gap)        \
-  { is_wide() ? wide_gaps(groups, states, gap) : gaps_of_all<Narrow>(groups, states, gap); }     \
+  float look(const std::vector<GROUP> &groups, const Rest *rest, const GROUP::State *states,     \
+             Looked *looked)                                                                     \
+  {                                                                                              \
+    return is_wide() ? wide_look(groups, rest, states, looked)                                   \
+                     : look_at_all<Narrow>(groups, rest, states, looked);                        \
+  }                                                                                              \
+  void set_targets(GROUP *groups, const Rest *rest, std::size_t count, const float *changed,     \
+                   float most)                                                                   \
+  {                                                                                              \
+    is_wide() ? wide_targets(groups, rest, count, changed, most)                                 \
+              : set_all_targets<Narrow>(groups, rest, count, changed, most);                     \
+  }                                                                                              \
   void add_impulses(const std::vector<GROUP> &groups, When when, GROUP::State *states)           \
   { is_wide() ? wide_add(groups, when, states) : add_all<Narrow>(groups, when, states); }
 

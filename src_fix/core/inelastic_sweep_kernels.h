@@ -55,6 +55,15 @@ struct BodyGroup : Lanes {
   Eight first_row[WIDTH], second_row[WIDTH];    // by the constraint
 };
 
+// What a sweep does not read of the constraints of a group.
+struct alignas(32) Rest {
+  Eight root;                                   // of D
+  Eight least_target, part;                     // of PackedTargets::target
+  std::size_t source[WIDTH];                    // the place in the problem; NONE in an empty lane
+  std::uint32_t first[WIDTH], second[WIDTH];    // slots
+};
+constexpr std::size_t NONE = static_cast<std::size_t>(-1);
+
 // A sweep returns these over its constraints.
 struct Swept {
   double uphill = 0.0;    // > 0 where the dual function rises along the last change
@@ -78,15 +87,23 @@ double find_unsolved(const std::vector<ParticleGroup> &groups, const ParticleGro
 double find_unsolved(const std::vector<BodyGroup> &groups, const BodyGroup::State *states,
                      float blur);
 
-// The gaps w of a group, in scaled units.
-struct alignas(32) Gaps {
-  Eight lanes;
+// What a look at a group finds.
+struct alignas(32) Looked {
+  Eight gap;                // w, as a length in packed units
+  std::uint8_t unloaded;    // a bit for each constraint whose impulse is and was the least and 0
 };
 
-// Writes those of all groups.
-void find_gaps(const std::vector<ParticleGroup> &groups, const ParticleGroup::State *states,
-               Gaps *gap);
-void find_gaps(const std::vector<BodyGroup> &groups, const BodyGroup::State *states, Gaps *gap);
+// Looks at all groups; returns their largest residual, as a length in packed units.
+float look(const std::vector<ParticleGroup> &groups, const Rest *rest,
+           const ParticleGroup::State *states, Looked *looked);
+float look(const std::vector<BodyGroup> &groups, const Rest *rest, const BodyGroup::State *states,
+           Looked *looked);
+
+// Sets the targets of `count` groups: `changed` and `most` are those of PackedTargets.
+void set_targets(ParticleGroup *groups, const Rest *rest, std::size_t count, const float *changed,
+                 float most);
+void set_targets(BodyGroup *groups, const Rest *rest, std::size_t count, const float *changed,
+                 float most);
 
 // Adds to the states what all impulses make of them, those now or before the last sweep.
 enum class When { NOW, BEFORE };

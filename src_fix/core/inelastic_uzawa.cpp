@@ -14,7 +14,7 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
   gap_operator_.prepare(problem);
 
   SolverResult result;
-  judge_first_guess(problem, limits, host);
+  judge_first_guess(problem, host);
   std::fill(contacts.impulse.begin(), contacts.impulse.end(), 0.0);
   const auto ended = [&](Status status) {
     result.status = status;

@@ -442,10 +442,11 @@ def test_body_of_one_sphere_is_a_free_sphere(solve: Solve, inertia: float) -> No
     spheres = in_bodies(given, np.zeros((4, 3)), [(2,), (0,)])
     spheres.bodies.inverse_inertia[:] = np.eye(3) / inertia
     free, accuracy = solve(given)
-    joined, _ = solve(spheres)
+    joined, accuracy_joined = solve(spheres)
     # Sweeps take bodies for what they are, and round otherwise; velocities add up along the column.
-    assert_within(joined.velocity, free.velocity, 8 * accuracy)
-    assert_within(joined.impulse, free.impulse, 8 * 4 * 3 * accuracy)
+    both = accuracy + accuracy_joined
+    assert_within(joined.velocity, free.velocity, 4 * both)
+    assert_within(joined.impulse, free.impulse, 4 * 4 * 3 * both)
 
 
 def test_body_that_cannot_move_acts_like_a_wall(solve: Solve) -> None:
@@ -455,11 +456,11 @@ def test_body_that_cannot_move_acts_like_a_wall(solve: Solve) -> None:
     given = in_bodies(given, [(0, 0, 1), (0, 0, 0), (1, 0, 0)], [(1, 2)])
     given.bodies.inverse_mass[:] = 0
     given.bodies.inverse_inertia[:] = 0
-    on_body, _ = solve(given)
-    # Sweeps round bodies otherwise than spheres.
-    assert_within(on_body.velocity[0], on_wall.velocity[0], 2 * accuracy)
+    on_body, accuracy_on_body = solve(given)
+    # Sweeps round bodies otherwise than spheres: each is as accurate as its own residual.
+    assert_within(on_body.velocity[0], on_wall.velocity[0], accuracy + accuracy_on_body)
     assert np.array_equal(on_body.velocity[1:], np.zeros((2, 3)))
-    assert_within(on_body.impulse, on_wall.impulse, 2 * 2 * accuracy)
+    assert_within(on_body.impulse, on_wall.impulse, 2 * (accuracy + accuracy_on_body))
 
 
 def test_seesaw_hands_the_motion_on(solve: Solve) -> None:
