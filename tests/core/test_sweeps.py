@@ -100,6 +100,24 @@ def test_what_sweeps_do_not_solve_goes_to_the_other_solver() -> None:
     assert_solved(given)
 
 
+def test_a_wall_that_was_far_stops_what_is_squeezed_out() -> None:
+    """A heavy sphere presses a light one out of a wedge, six times as fast as itself, to a wall.
+
+    The wall is farther than sweeps look at the start, and they end before they look again: the
+    residuals in double precision bring it in.
+    """
+    slope, far, tolerance = 0.15, 5.5, 0.1
+    aside = (slope, 0, -np.sqrt(1 - slope**2))
+    contacts = [(1, 0, aside, 0), (1, WALL, UP, 0), (1, WALL, (-1, 0, 0), far)]
+    given = problem([(0, 0, -1), (0, 0, 0)], [1000, 1], contacts, timestep=1)
+    found = given.project(tolerance)
+    assert found.converged
+    assert max(given.residual(found.impulse)) <= tolerance
+    assert found.impulse[2] > 0
+    # The wall lets it go as far as the tolerance beyond the gap.
+    assert far - tolerance <= found.velocity[1, 0] <= far + tolerance
+
+
 def test_the_same_bits_from_run_to_run() -> None:
     given = heap(3, particles=200, overlap=0.01)
     one, other = given.project(TOLERANCE), given.project(TOLERANCE)
