@@ -129,7 +129,7 @@ void PackedSweeps<Group>::go_on(double idle_gap, const std::vector<double> &chan
     for (std::size_t place = 0; place < some->lanes(); ++place)
       if (!some->is_empty(place)) write_start(*some, place);
   begin_search(change, tolerance);
-  // Nothing is packed as idle as long as something is far.
+  // Of what is far only this is packed: as long as something is far, nothing else is idle.
   std::vector<std::size_t> near, far;
   for (const std::size_t c : far_) ((*given_.gap)[c] > idle_gap ? far : near).push_back(c);
   write_idle(near);
@@ -309,7 +309,7 @@ void PackedSweeps<Group>::clear_lane(Packed &packed, std::size_t place) const
   rest.source[lane] = swept::NONE;
   rest.first[lane] = rest.second[lane] = 0;
   rest.root[lane] = rest.part[lane] = 0.0f;
-  rest.least_target[lane] = 1.0f;
+  rest.least_target[lane] = 1.0f;    // any that can be divided by
 }
 
 // Colours constraints, given by the movers of both sides, and adds groups for them. `places` gets

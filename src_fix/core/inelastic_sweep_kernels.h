@@ -99,7 +99,8 @@ float look(const std::vector<ParticleGroup> &groups, const Rest *rest,
 float look(const std::vector<BodyGroup> &groups, const Rest *rest, const BodyGroup::State *states,
            Looked *looked);
 
-// Sets the targets of `count` groups: `changed` and `most` are those of PackedTargets.
+// Sets the targets of `count` groups as PackedTargets::target has them, from its `changed` and
+// `most`.
 void set_targets(ParticleGroup *groups, const Rest *rest, std::size_t count, const float *changed,
                  float most);
 void set_targets(BodyGroup *groups, const Rest *rest, std::size_t count, const float *changed,
