@@ -713,21 +713,30 @@ template <typename Group> void PackedSweeps<Group>::look_at_idle(double least_id
 template <typename Group> float PackedSweeps<Group>::looked_gap(std::size_t place) const
 { return looked_[place / WIDTH].gap[place % WIDTH]; }
 
-// Makes the idle constraints working whose gaps are not above idle_gap_.
+// Makes the idle constraints working whose gaps are not above idle_gap_. Their lanes are left empty
+// until half of all are: looks are frequent, and wake a few of many.
 template <typename Group> void PackedSweeps<Group>::wake_near()
 {
   looked_.resize(idle_.groups.size());
   swept::look(idle_.groups, idle_.rest.data(), states_.data(), looked_.data());
   std::vector<std::size_t> near;
-  for (std::size_t place = 0; place < idle_.lanes(); ++place)
-    if (!idle_.is_empty(place) && !(looked_gap(place) > idle_gap_)) near.push_back(place);
+  std::size_t empty = 0;
+  for (std::size_t place = 0; place < idle_.lanes(); ++place) {
+    if (looked_gap(place) > idle_gap_) continue;    // that of an empty lane is 0
+    if (idle_.is_empty(place))
+      ++empty;
+    else
+      near.push_back(place);
+  }
+  if (near.empty()) return;
   wake(near);
+  for (const std::size_t place : near) clear_lane(idle_, place);
+  if (2 * (empty + near.size()) > idle_.lanes()) close_up_idle();
 }
 
 // Makes idle constraints working, given by their places in ascending order.
 template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::size_t> &near)
 {
-  if (near.empty()) return;
   for (const bool at_cuts : {true, false}) {
     std::vector<std::size_t> chosen, places;
     std::vector<int> first, second;
@@ -745,14 +754,14 @@ template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::
     for (std::size_t k = 0; k < chosen.size(); ++k) copy(idle_, chosen[k], packed, places[k]);
     set_targets(packed, from);
   }
-  std::size_t kept = near.front();
-  auto next = near.begin();
-  for (std::size_t place = kept; place < idle_.lanes(); ++place) {
-    if (next != near.end() && *next == place)
-      ++next;
-    else if (!idle_.is_empty(place))
-      copy(idle_, place, idle_, kept++);
-  }
+}
+
+// Idle constraints move up to where lanes are empty.
+template <typename Group> void PackedSweeps<Group>::close_up_idle()
+{
+  std::size_t kept = 0;
+  for (std::size_t place = 0; place < idle_.lanes(); ++place)
+    if (!idle_.is_empty(place)) copy(idle_, place, idle_, kept++);
   const std::size_t groups = (kept + WIDTH - 1) / WIDTH;
   idle_.groups.resize(groups);
   idle_.rest.resize(groups);

@@ -138,6 +138,7 @@ template <typename Group> class PackedSweeps {
   void clear_lane(Packed &packed, std::size_t place) const;
   void wake_near();
   void wake(const std::vector<std::size_t> &near);
+  void close_up_idle();
   float look_at(const Packed &packed, std::vector<Unloaded> &unloaded);
   void set_idle(double least_idle_gap);
   void make_idle(const std::vector<Unloaded> &unloaded, Packed &packed);
