@@ -12,6 +12,8 @@ from lammps_inelastic.workflow.decks import OUT, find_deck
 from lammps_inelastic.workflow.shipped import DECKS
 
 ROOT = Path(__file__).parents[2]
+# An unpacked archive is no repository, and git knows nothing of it.
+of_a_clone = pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no clone: nothing is ignored")
 
 
 def left_by_commands() -> list[str]:
@@ -27,18 +29,14 @@ def test_the_commands_leave_something() -> None:
     assert {"out/", "minimal/", "gluey/", "response/", "settling/"} <= {*left_by_commands()}
 
 
+@of_a_clone
 @pytest.mark.parametrize("name", left_by_commands())
 def test_git_ignores_what_a_command_leaves(name: str) -> None:
-    if not (ROOT / ".git").exists():
-        # An unpacked archive is no repository, and git knows nothing of it.
-        pytest.skip("no clone: nothing is ignored")
     found = subprocess.run(["git", "check-ignore", "--quiet", name], cwd=ROOT)
     assert found.returncode == 0
 
 
+@of_a_clone
 def test_git_ignores_no_file_that_belongs_to_the_repository() -> None:
-    if not (ROOT / ".git").exists():
-        # As above.
-        pytest.skip("no clone: nothing is ignored")
     command = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     assert subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout == b""
