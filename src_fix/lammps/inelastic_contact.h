@@ -43,6 +43,12 @@ struct Row {
   bool followed = false;      // the gap was set by where an earlier solution of the step ends
 };
 
+// How the gap of a row comes to what the end of the step wants, from round to round.
+struct Approach {
+  double change = 0.0;    // [length] that the last round wanted
+  double part = 1.0;      // of it, which the gap was changed by
+};
+
 // A contact as the contact law sees it (inelastic_law_contacts.h).
 struct LawState {
   std::array<double, inelastic::ContactLaw::MOST_REMEMBERED> remembered;

@@ -206,9 +206,28 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
     }
   }
   if (contacts.gap[c] == gap) return 0;
-  contacts.gap[c] = gap;
-  row.as_at_start = false;
+  approach(c, gap);
   return 1;
+}
+
+// Changes the gap of constraint c towards the one that the present velocity asks for. Bodies may
+// answer by turning the other way, so that the next round asks for the opposite, and so on without
+// an end: the gap takes that part of the way at whose end the secant through the last two rounds
+// asks for no more, and never goes farther than it is asked to. Rounds that only take apart what is
+// too deep take the whole way.
+void GapRules::approach(std::size_t c, double wanted)
+{
+  double &gap = step_.problem.contacts.gap[c];
+  double part = 1.0;
+  if (step_.relinearisations <= MAX_RELINEARISATIONS / 2) {
+    Approach &last = step_.approaches[c];
+    const double change = wanted - gap;
+    if (last.change != 0.0 && change / last.change < 1.0)
+      part = std::min(1.0, last.part / (1.0 - change / last.change));
+    last = {change, part};
+  }
+  gap = part == 1.0 ? wanted : gap + part * (wanted - gap);
+  step_.rows[c].as_at_start = false;
 }
 
 double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) const
@@ -233,15 +252,14 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
   // A contact that may keep its overlap, and with the residual still gets too deep, has to give it
   // back.
   if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(contact.gap_now))
-    gap = std::min(gap, contact.gap_now - row.wall_motion);
+    gap = std::min(gap, exact_gap + std::min(wanted_gap(contact), 0.0));
   if (!too_deep) {
     const bool worth_it = contacts.impulse[c] > 0.0 &&
         gap - contacts.gap[c] > RELINEARISE_BEYOND * step_.settings.tolerance &&
         step_.relinearisations <= MAX_RELINEARISATIONS / 2;
     if (!worth_it) return 0;
   }
-  contacts.gap[c] = gap;
-  row.as_at_start = false;
+  approach(c, gap);
   row.followed = step_.is_member(contacts.first[c]) || step_.is_member(contacts.second[c]);
   return 1;
 }

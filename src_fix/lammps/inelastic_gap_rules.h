@@ -47,9 +47,10 @@ class GapRules {
   bool ends_too_deep(const Contact &contact, double gap_at_end);
 
   // Sets the gap of constraint c to one that is exact for the present velocity, or to the
-  // linearised one if that is smaller. A gap that was set for an earlier velocity is set again, so
-  // that no force keeps surfaces apart that have parted meanwhile, and the step does not depend on
-  // how it was found. Returns how many constraints changed.
+  // linearised one if that is smaller; approach() says how far it goes there in one round. A gap
+  // that was set for an earlier velocity is set again, so that no force keeps surfaces apart that
+  // have parted meanwhile, and the step does not depend on how it was found. Returns how many
+  // constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
   // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the
@@ -71,6 +72,7 @@ class GapRules {
 
  private:
   std::optional<std::array<double, 2>> load_changes(int i, int j) const;
+  void approach(std::size_t c, double wanted);
   double closed_gap(const Contact &contact, double last, double most_closing) const;
   double contact_gap(const Contact &contact) const;
   double given_back(const Contact &contact) const;

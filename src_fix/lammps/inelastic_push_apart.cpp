@@ -36,6 +36,7 @@ void PushApart::begin_trial(const inelastic::ContactSet &contacts)
   const inelastic::ContactSet last = present;
   present = contacts;
   for (std::size_t c = contacts.size(); c < last.size(); ++c) present.add_of(last, c);
+  step_.approaches.clear();
 }
 
 // A push that begins asks for everything.
