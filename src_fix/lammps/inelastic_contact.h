@@ -43,10 +43,11 @@ struct Row {
   bool followed = false;      // the gap was set by where an earlier solution of the step ends
 };
 
-// How the gap of a row comes to what the end of the step wants, from round to round.
+// How the gap of a row came nearer to what the end of the step asks for, in the last round that
+// changed it.
 struct Approach {
-  double change = 0.0;    // [length] that the last round wanted
-  double part = 1.0;      // of it, which the gap was changed by
+  double change = 0.0;    // [length] that was asked for
+  double part = 1.0;      // the part of it by which the gap was changed
 };
 
 // A contact as the contact law sees it (inelastic_law_contacts.h).

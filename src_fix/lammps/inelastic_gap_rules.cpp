@@ -210,11 +210,11 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
   return 1;
 }
 
-// Changes the gap of constraint c towards the one that the present velocity asks for. Bodies may
+// Changes the gap of constraint c towards `wanted`, for which the present velocity asks. A body may
 // answer by turning the other way, so that the next round asks for the opposite, and so on without
-// an end: the gap takes that part of the way at whose end the secant through the last two rounds
-// asks for no more, and never goes farther than it is asked to. Rounds that only take apart what is
-// too deep take the whole way.
+// an end. The gap therefore takes the part of the way to where the secant through the last two
+// rounds is zero, and never more than the whole. In late rounds, which only take apart what is too
+// deep, it takes the whole.
 void GapRules::approach(std::size_t c, double wanted)
 {
   double &gap = step_.problem.contacts.gap[c];
@@ -249,8 +249,8 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
   const Contact &contact = step_.contact_of(c);
   const double linear_gap = effective_gap(contact) - row.wall_motion;
   double gap = std::min(exact_gap, linear_gap);
-  // A contact that may keep its overlap, and with the residual still gets too deep, has to give it
-  // back.
+  // A contact that may keep its overlap, and with the residual still ends too deep, has to give it
+  // back by that end.
   if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(contact.gap_now))
     gap = std::min(gap, exact_gap + std::min(wanted_gap(contact), 0.0));
   if (!too_deep) {
