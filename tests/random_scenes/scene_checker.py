@@ -357,14 +357,16 @@ class _Part:
 
         It looks at curved walls, and at cones, from a point that is off, in each direction, by
         1e-12 of how far it looks, or by 1e-12: as far as the step without contacts takes a sphere,
-        and more; for a wall that may move away from what it holds, as the box is wide.
+        and more; for a wall that may move away while a law remembers its contact, as the box is
+        wide.
         """
         if not (self.curved or any(shape["kind"] == "cone" for shape in self.shapes)):
             return 0.0
         forced = self.to_v / frame.mass * np.linalg.norm(frame.before, axis=1)
         goes = frame.h * (np.linalg.norm(frame.v, axis=1) + frame.h * forced)
         far = 10 * self.facts["largest"] + 2 * float(goes.max(initial=0.0))
-        if "law gluey" in self.facts["words"] and any(moves(shape) for shape in self.shapes):
+        law = any(word.startswith("law ") for word in self.facts["words"])
+        if law and any(moves(shape) for shape in self.shapes):
             far = max(far, frame.widest)
         return 2e-12 * min(1.0, far)
 
