@@ -206,7 +206,10 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
     }
   }
   if (contacts.gap[c] == gap) return 0;
-  approach(c, gap);
+  // The whole way at once, unlike approach(): what is still open after the rounds that may close it
+  // would stay so under a force.
+  contacts.gap[c] = gap;
+  row.as_at_start = false;
   return 1;
 }
 
