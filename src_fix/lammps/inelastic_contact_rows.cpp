@@ -12,6 +12,7 @@ void ContactRows::begin_step()
   step_.problem.contacts.clear();
   step_.contacts.clear();
   step_.rows.clear();
+  step_.approaches.clear();
   laws_.begin_step();
 }
 

@@ -84,7 +84,8 @@ struct StepState {
   double excess = 0.0;
   // Rounds that have looked at the end of the step. (constraints, push_apart)
   int relinearisations = 0;
-  // By row, of those alone whose gaps the end of the step has changed. (gap_rules)
+  // By row, of those alone whose gaps the end of the step has changed. (gap_rules;
+  // begun anew with the rows, contact_rows, and with each trial, push_apart)
   std::unordered_map<std::size_t, Approach> approaches;
   bool at_rest = false;    // nothing moves in this step (rest)
   // What went wrong on this rank while constraints were collected; empty if nothing.
