@@ -322,11 +322,28 @@ long WallConstraints::add_planes_within(const Viewpoints &beyond)
   walls_.view(
       last_inside(beyond), only_inexact(),
       [&](const Viewpoint &from, const WallView &view) {
-        changed += add_plane(from, view, true);
+        changed += add_plane(from, view, !is_kept_by_plane(from, view));
       },
       [](const Viewpoint &, const std::string &) {
       });
   return changed;
+}
+
+// Tells whether a sphere has the plane of this wall already and, along it, does not end too deep.
+// To set it anew would only take back what the round has changed of its gap.
+bool WallConstraints::is_kept_by_plane(const Viewpoint &from, const WallView &view)
+{
+  const int i = from.atom;
+  const auto existing = constraint_.find(key(i, view.wall));
+  if (existing == constraint_.end() || step_.is_member(i) ||
+      !is_same_plane(existing->second, view.normal))
+    return false;
+  double to_end[3];    // from the viewpoint
+  for (int d = 0; d < 3; ++d)
+    to_end[d] = atom->x[i][d] + step_.problem.timestep * step_.velocity[3 * i + d] - from.where[d] -
+        from.image[d];
+  return !rules_.ends_too_deep(step_.contact_of(existing->second),
+                               gap_at_end(view, i) + dot(view.normal, to_end));
 }
 
 // Finds by bisection how far along the step each of these centres is still inside. Collective.
