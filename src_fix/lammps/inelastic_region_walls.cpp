@@ -17,7 +17,8 @@ using namespace Inelastic_NS;
 
 namespace {
 
-// Off an axis, in units of the reach: far above round-off, far below any tolerance.
+// Off an axis, in units of the reach: far above round-off, and so little that the distance changes
+// by the part along the normal alone.
 constexpr double OFF_AXIS[3] = {1.0e-12, 0.7e-12, 0.4e-12};
 constexpr double EVERYTHING = 1.0e300;    // a reach that no wall exceeds
 
@@ -176,17 +177,21 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
                       std::vector<WallView> &views)
 {
   Region *region = obstacle.region;
-  double x[3] = {where[0], where[1], where[2]};
   // From a point exactly on its axis LAMMPS does not see the side of a cone or a cylinder, nor from
   // outside anything of a cone (a division by zero).
-  if (!obstacle.exact || obstacle.cone)
-    for (int d = 0; d < 3; ++d) x[d] += OFF_AXIS[d] * std::min(reach, 1.0);
+  const double off = !obstacle.exact || obstacle.cone ? std::min(reach, 1.0) : 0.0;
+  double x[3];
+  for (int d = 0; d < 3; ++d) x[d] = where[d] + off * OFF_AXIS[d];
   views.clear();
   look(region, x, reach, seen_);
   for (const Contact &contact : seen_) {
     if (!(contact.r > 0.0)) return false;
-    views.push_back(make_view(contact, obstacle.first_wall));
-    views.back().convex = obstacle.convex;
+    WallView view = make_view(contact, obstacle.first_wall);
+    view.convex = obstacle.convex;
+    // Looks of different reach, at the end of a step and at the start of the next, see the same.
+    for (int d = 0; d < 3; ++d) view.distance -= view.normal[d] * (x[d] - where[d]);
+    view.distance_now = view.distance;
+    views.push_back(view);
   }
   // Beyond the wall of one part of an intersection LAMMPS may still show another one's.
   return (!seen_.empty() && !obstacle.joined) || region->match(x[0], x[1], x[2]) != 0;

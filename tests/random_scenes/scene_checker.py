@@ -181,7 +181,6 @@ class _Frame:
     h: float
     time: float
     periods: Array
-    widest: float
     thermo: dict[str, float]
     first: bool
     deepest: float = 0.0
@@ -253,7 +252,6 @@ class _Part:
             thermo["Dt"],
             thermo["Time"],
             np.where(self.facts["periodic"], wide, 0.0),
-            float(wide.max()),
             thermo,
             last is None,
         )
@@ -348,27 +346,8 @@ class _Part:
                     factor * self.eps + slack,
                     shape,
                 )
-        slack += self.off_axis(frame)
         self.close("reported overlap", frame.thermo["f_contact[4]"], frame.deepest, slack)
         self.report.seen["overlapping frames"] += int(frame.deepest > REGULAR * self.eps)
-
-    def off_axis(self, frame: _Frame) -> float:
-        """By how much the fix sees the distance of a wall wrong, length.
-
-        It looks at curved walls, and at cones, from a point that is off, in each direction, by
-        1e-12 of how far it looks, or by 1e-12: as far as the step without contacts takes a sphere,
-        and more; for a wall that may move away while a law remembers its contact, as the box is
-        wide.
-        """
-        if not (self.curved or any(shape["kind"] == "cone" for shape in self.shapes)):
-            return 0.0
-        forced = self.to_v / frame.mass * np.linalg.norm(frame.before, axis=1)
-        goes = frame.h * (np.linalg.norm(frame.v, axis=1) + frame.h * forced)
-        far = 10 * self.facts["largest"] + 2 * float(goes.max(initial=0.0))
-        law = any(word.startswith("law ") for word in self.facts["words"])
-        if law and any(moves(shape) for shape in self.shapes):
-            far = max(far, frame.widest)
-        return 2e-12 * min(1.0, far)
 
     def deep(
         self,
@@ -556,7 +535,7 @@ class _Part:
 
     def wall_contacts(self, frame: _Frame, listed: dict[str, Array]) -> None:
         """Normals and gaps of walls, where these are not tangent planes added for the end."""
-        slack = 10 * ROUND_OFF * self.lengths(frame) + self.off_axis(frame)
+        slack = 10 * ROUND_OFF * self.lengths(frame)
         for row in np.flatnonzero(~listed["pair"]):
             k, number = listed["i"][row], listed["wall"][row]
             found = [
