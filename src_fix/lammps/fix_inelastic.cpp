@@ -347,9 +347,14 @@ void FixInelastic::advance(int vflag, Kick kick)
   std::vector<char> at_rest;    // one mark per particle
   if (rest_.decide(at_rest)) {
     const PhaseClock::Within solving(clock_, PhaseClock::SOLVE);
-    result.iterations += hold_still_.run(at_rest, [this] {
-      return constraints_.add_violated();
-    });
+    result.iterations += hold_still_.run(
+        at_rest,
+        [this] {
+          return constraints_.add_violated();
+        },
+        [this] {
+          return constraints_.excess();
+        });
   }
   finish(result);
 }

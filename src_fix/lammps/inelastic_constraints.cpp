@@ -4,6 +4,7 @@
 #include "inelastic_mover.h"
 
 #include <algorithm>
+#include <utility>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
@@ -54,14 +55,8 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   movers_.turn(problem, velocity, step_.motion_of_bodies);
   const long added = pairs_.add_violated() + wall_constraints_.add_violated();
   const long changed = step_.phase == Phase::CONTACT ? rules_.keep_within_tolerance(velocity) : 0;
-  long relinearised = 0;
-  step_.excess = 0.0;
-  if (movers_.any_turns() || rows_.may_hold() || wall_constraints_.need_relinearising()) {
-    ++step_.relinearisations;
-    if (movers_.any_turns() || rows_.may_hold()) relinearised += pairs_.relinearise();
-    if (wall_constraints_.need_relinearising())
-      relinearised += wall_constraints_.relinearise(margin_);
-  }
+  if (need_relinearising()) ++step_.relinearisations;
+  const long relinearised = relinearise();
   double sums[3] = {static_cast<double>(added), static_cast<double>(relinearised),
                     static_cast<double>(changed)};
   ranks_.reduce(sums, 3, &step_.excess, 1);
@@ -69,6 +64,31 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
   relinearised_ = relinearised_ || sums[1] > 0.0;
   ranks_.fail_together(step_.problem_found);
   return added + changed + relinearised;
+}
+
+bool Constraints::need_relinearising() const
+{ return movers_.any_turns() || rows_.may_hold() || wall_constraints_.need_relinearising(); }
+
+// Notes the excess of the step on this rank. Returns how many constraints changed. Collective.
+long Constraints::relinearise()
+{
+  step_.excess = 0.0;
+  long changed = 0;
+  if (movers_.any_turns() || rows_.may_hold()) changed += pairs_.relinearise();
+  if (wall_constraints_.need_relinearising()) changed += wall_constraints_.relinearise(margin_);
+  return changed;
+}
+
+double Constraints::excess()
+{
+  if (!need_relinearising()) return 0.0;
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
+  // After the last round no constraint changes any more.
+  const int rounds = std::exchange(step_.relinearisations, GapRules::MAX_RELINEARISATIONS + 1);
+  relinearise();
+  step_.relinearisations = rounds;
+  ranks_.reduce(nullptr, 0, &step_.excess, 1);
+  return step_.excess;
 }
 
 long Constraints::add_violated()

@@ -49,6 +49,10 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   // Collective, same errors.
   long add_violated();
 
+  // Finds the excess (StepState) that the velocities of the step leave; changes no constraint.
+  // Collective.
+  double excess();
+
   // The first tells whether gaps were set by the end of the step, the second whether the last solve
   // knew of such gaps.
   bool relinearised() const { return relinearised_; }
@@ -59,6 +63,9 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   void adapt_margin(double reach);
 
  private:
+  bool need_relinearising() const;
+  long relinearise();
+
   Step &step_;
   GhostExchange &ranks_;
   PhaseClock &clock_;

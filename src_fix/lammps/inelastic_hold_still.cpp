@@ -46,7 +46,8 @@ std::vector<char> HoldStill::with_ghosts(const std::vector<char> &stopped) const
   return all;
 }
 
-long HoldStill::run(const std::vector<char> &stopped, const std::function<long()> &add_violated)
+long HoldStill::run(const std::vector<char> &stopped, const std::function<long()> &add_violated,
+                    const std::function<double()> &excess)
 {
   // Moving particles may meet stopped ones that they would not have met, and then come upon others.
   constexpr int MOST_ROUNDS = 20;
@@ -54,6 +55,7 @@ long HoldStill::run(const std::vector<char> &stopped, const std::function<long()
   const std::vector<double> velocity = step_.velocity;
   std::vector<double> &impulse = step_.problem.contacts.impulse;
   std::vector<double> impulse_before = impulse;
+  const double excess_before = step_.excess;
   long iterations = 0;
   for (int round = 0; round < MOST_ROUNDS; ++round) {
     const inelastic::SolverResult result = project(still);
@@ -62,6 +64,7 @@ long HoldStill::run(const std::vector<char> &stopped, const std::function<long()
     turn_bodies();
     const std::size_t known = impulse.size();
     if (add_violated() == 0) {
+      if (excess() > excess_before) break;
       note_stop();
       return iterations;
     }
@@ -70,6 +73,7 @@ long HoldStill::run(const std::vector<char> &stopped, const std::function<long()
   impulse_before.resize(impulse.size(), 0.0);
   impulse = impulse_before;
   step_.velocity = velocity;
+  step_.excess = excess_before;
   turn_bodies();
   return iterations;
 }

@@ -23,10 +23,12 @@ class HoldStill {
 
   // Changes velocities and impulses of the step, which is solved. The marks are one per particle,
   // those of ghosts are not read; of a body any marked member will do. `add_violated` adds
-  // constraints that the step's velocities violate, and returns how many all ranks added. Returns
-  // the number of iterations that it took. Where the moving particles find no room nothing is
-  // changed. Collective.
-  long run(const std::vector<char> &stopped, const std::function<long()> &add_violated);
+  // constraints that the step's velocities violate, and returns how many all ranks added; `excess`
+  // finds the excess that they leave (StepState). Returns the number of iterations that it took.
+  // Where the moving particles find no room, or would leave more excess, nothing is changed.
+  // Collective.
+  long run(const std::vector<char> &stopped, const std::function<long()> &add_violated,
+           const std::function<double()> &excess);
 
  private:
   std::vector<char> with_ghosts(const std::vector<char> &stopped) const;

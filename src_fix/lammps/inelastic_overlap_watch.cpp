@@ -71,7 +71,9 @@ void OverlapWatch::end_step(bool certain)
 {
   pushes_in_velocity_ = step_.bad_start || pushed_before_;
   pushed_before_ = step_.bad_start;
-  left_ = certain ? REGULAR_OVERLAP * step_.settings.tolerance +
+  // In tolerances: the next start knows an overlap by other sums than this end.
+  constexpr double ROUND_OFF = 0.1;
+  left_ = certain ? (REGULAR_OVERLAP + ROUND_OFF) * step_.settings.tolerance +
           (step_.bad_start ? step_.largest_overlap : 0.0) + step_.excess
                   : EXTREME;
 }
