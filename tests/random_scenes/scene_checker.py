@@ -159,8 +159,10 @@ def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
                 break
             final = k + 1 == len(particles)
             last = part.frame(table, rows, thermo[table.step], of_bodies, last, final)
-        # Without `shorten` a step may leave more than 2 EPS, which later ones take apart.
-        left = last.deepest + last.thermo["f_contact[11]"] if last is not None else 0.0
+        # Without `shorten` a step may leave more than 2 EPS, which later ones take apart. (The part
+        # behind `run every` is empty.)
+        if last is not None:
+            left = last.deepest + last.thermo["f_contact[11]"]
     return report
 
 
