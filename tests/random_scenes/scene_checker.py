@@ -377,6 +377,8 @@ class _Part:
             bound = np.maximum(bound, (REGULAR + 1) * self.eps)
         if self.facts["warn"]:
             short = max(0.0, last.thermo["f_contact[2]"] - self.eps)
+            # What is lacking comes on top of an overlap that an unsolved step keeps.
+            short += min(last.deepest, self.eps) if short > 0.0 else 0.0
             # Beside a bad start regular overlaps are kept until the push, for which an unsolved
             # step has no iterations left: what is lacking comes on top.
             keeps = short > 0.0 and last.deepest > REGULAR * self.eps
@@ -731,7 +733,8 @@ class _Part:
         now = new.v - 0.5 * new.h * accelerate * new.force
         sizes = np.linalg.norm(new.v, axis=1) + np.linalg.norm(last.v, axis=1)
         sizes += np.linalg.norm(now - new.v, axis=1) + np.linalg.norm(after - last.v, axis=1)
-        slack = ROUND_OFF * (sizes + 1e-300)[:, None]
+        # A drag that stops a sphere in one step leaves round-off of round-off, whose squares are 0.
+        slack = ROUND_OFF * (sizes + 1e-100 * sizes.max(initial=0.0) + 1e-300)[:, None]
         self.close("velocity", now[alone], after[alone], slack[alone], new.id[alone])
 
     def inertia(self, frame: _Frame, mine: Array, arm: Array) -> Array:
