@@ -157,7 +157,8 @@ def finding(of: Answer, facts: Facts) -> str:
     if len(errors) > 1:
         return "two different errors: " + " / ".join(errors)
     # A step that `maxiter ... warn` goes on with unsolved may end beyond a box of fixed size.
-    if facts["warn"] and re.search(UNSOLVED, of.screen) and "Lost atoms" in errors[0]:
+    lost = re.search(r"Lost atoms|Rigid body atoms .* missing", errors[0])
+    if facts["warn"] and re.search(UNSOLVED, of.screen) and lost:
         return ""
     for pattern, condition in REFUSALS:
         if re.search(pattern, errors[0]):
