@@ -30,9 +30,7 @@ namespace {
 constexpr double BELOW_ONE = 1.0 - 1.0e-12;    // by the round-off of a sum of a cutoff and a skin
 constexpr double ABOVE_ONE = 1.0 + 1.0e-12;    // by that of a quotient
 constexpr double SHORTEST_STEP = 1.0e-6;       // of the regular one: below, something else is wrong
-// Of the one that was tried first, in which spheres go no further than the list reaches: below, it
-// is not the step that is too long.
-constexpr double SHORTEST_UNSOLVED = 1.0e-3;
+constexpr double SHORTEST_UNSOLVED = 1.0e-3;    // below, it is not the step that is too long
 // An overlap of two spheres is not known better than this part of the largest coordinate. Each of
 // the three coordinates of either is rounded by up to half of the machine epsilon.
 constexpr double POSITIONS_RESOLVED = 2.0 * std::numeric_limits<double>::epsilon();
@@ -307,10 +305,7 @@ bool StepLength::needs_new_list()
 ------------------------------------------------------------------------- */
 
 void StepLength::begin_step()
-{
-  spread_at_start_ = spread_since_build(nullptr);
-  longest_unsolved_ = 0.0;
-}
+{ spread_at_start_ = spread_since_build(nullptr); }
 
 void StepLength::fit_to_list()
 {
@@ -357,11 +352,8 @@ bool StepLength::accepts(bool solved, const std::string &named, const std::strin
   return true;
 }
 
-bool StepLength::may_shorten_unsolved()
-{
-  if (longest_unsolved_ == 0.0) longest_unsolved_ = update->dt;
-  return step_.settings.shorten && update->dt > SHORTEST_UNSOLVED * longest_unsolved_;
-}
+bool StepLength::may_shorten_unsolved() const
+{ return step_.settings.shorten && update->dt > SHORTEST_UNSOLVED * step_.regular_timestep; }
 
 void StepLength::shorten(double factor, const std::string &named)
 {

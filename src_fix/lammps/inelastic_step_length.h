@@ -52,8 +52,8 @@ class StepLength : protected Pointers {
   // Makes the time step shorter. Errors: it is so short already that something else is wrong.
   void shorten(double factor, const std::string &named);
 
-  // Tells whether the keyword allows a shorter step for this one, which could not be solved.
-  bool may_shorten_unsolved();
+  // Tells whether the keyword allows a shorter step for one that could not be solved.
+  bool may_shorten_unsolved() const;
 
   // Tells whether the list must be built before the next step, which may be half as fast again.
   // Collective.
@@ -98,7 +98,6 @@ class StepLength : protected Pointers {
   double farthest_[3] = {EXTREME, EXTREME, EXTREME};
   std::vector<double> position_at_build_, radius_at_build_;
   std::vector<double> displacement_, unhindered_;    // room
-  double longest_unsolved_ = 0.0;                    // [time] of this step; 0 = none
   bool shortened_ = false;                           // restore() must undo it
   bool setting_timestep_ = false;                    // the fix itself is changing it
   long shortened_steps_ = 0;
