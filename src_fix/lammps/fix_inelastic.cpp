@@ -409,9 +409,9 @@ inelastic::ProjectionResult FixInelastic::solve()
       // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
       // shorter one. Any other step takes fewer iterations when it is shorter; with warn a run that
       // has few of them goes on, as it is.
-      if (length_.may_shorten_unsolved() &&
-          (no_room || !settings_.warn_only || constraints_.relinearised() ||
-           unsolved_.law_parts())) {
+      const bool law_parts = unsolved_.law_parts();
+      if (length_.may_shorten_unsolved(law_parts) &&
+          (no_room || !settings_.warn_only || constraints_.relinearised() || law_parts)) {
         length_.shorten(0.5, unsolved_.named());
         continue;
       }

@@ -305,14 +305,19 @@ bool StepLength::needs_new_list()
 ------------------------------------------------------------------------- */
 
 void StepLength::begin_step()
-{ spread_at_start_ = spread_since_build(nullptr); }
+{
+  spread_at_start_ = spread_since_build(nullptr);
+  first_timestep_ = 0.0;
+}
 
 void StepLength::fit_to_list()
 {
-  if (!step_.settings.shorten || spread_at_start_ >= list_reach_) return;
-  const double motion = unhindered_spread(step_.kicks());
-  if (spread_at_start_ + update->dt * motion > list_reach_)
-    shorten(room_in_list(unhindered_spread(0.0), motion), "");
+  if (step_.settings.shorten && spread_at_start_ < list_reach_) {
+    const double motion = unhindered_spread(step_.kicks());
+    if (spread_at_start_ + update->dt * motion > list_reach_)
+      shorten(room_in_list(unhindered_spread(0.0), motion), "");
+  }
+  if (first_timestep_ == 0.0) first_timestep_ = update->dt;
 }
 
 bool StepLength::accepts(bool solved, const std::string &named, const std::string &squeezed)
@@ -352,8 +357,13 @@ bool StepLength::accepts(bool solved, const std::string &named, const std::strin
   return true;
 }
 
-bool StepLength::may_shorten_unsolved() const
-{ return step_.settings.shorten && update->dt > SHORTEST_UNSOLVED * step_.regular_timestep; }
+bool StepLength::may_shorten_unsolved(bool law_parts) const
+{
+  // What a law asks for can be had in a step that is short enough, however short the list has made
+  // it. A bed that is being crushed cannot be helped by steps that are ever shorter.
+  const double from = law_parts ? first_timestep_ : step_.regular_timestep;
+  return step_.settings.shorten && update->dt > SHORTEST_UNSOLVED * from;
+}
 
 void StepLength::shorten(double factor, const std::string &named)
 {

@@ -52,8 +52,9 @@ class StepLength : protected Pointers {
   // Makes the time step shorter. Errors: it is so short already that something else is wrong.
   void shorten(double factor, const std::string &named);
 
-  // Tells whether the keyword allows a shorter step for one that could not be solved.
-  bool may_shorten_unsolved() const;
+  // Tells whether the keyword allows a shorter step for one that could not be solved, in which the
+  // contact law asks surfaces to part or does not.
+  bool may_shorten_unsolved(bool law_parts) const;
 
   // Tells whether the list must be built before the next step, which may be half as fast again.
   // Collective.
@@ -98,8 +99,10 @@ class StepLength : protected Pointers {
   double farthest_[3] = {EXTREME, EXTREME, EXTREME};
   std::vector<double> position_at_build_, radius_at_build_;
   std::vector<double> displacement_, unhindered_;    // room
-  bool shortened_ = false;                           // restore() must undo it
-  bool setting_timestep_ = false;                    // the fix itself is changing it
+  // [time] The length with which this step was tried first; 0 before that
+  double first_timestep_ = 0.0;
+  bool shortened_ = false;           // restore() must undo it
+  bool setting_timestep_ = false;    // the fix itself is changing it
   long shortened_steps_ = 0;
 };
 
