@@ -35,6 +35,7 @@ from tests.helpers.convergence import ACCURACIES, STEPS, TOLERANCES
 from tests.helpers.convergence import SCENES as EXACT
 from tests.helpers.grainwise import FEW, compare_folder, largest_but
 from tests.helpers.pouring import (
+    DeckError,
     Packing,
     Projections,
     measure,
@@ -463,8 +464,12 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=9)
     arguments = parser.parse_args()
     for name in arguments.tables or TABLES:
-        for line in TABLES[name](arguments.seeds):
-            print(line, flush=True)
+        try:
+            for line in TABLES[name](arguments.seeds):
+                print(line, flush=True)
+        except DeckError as error:
+            print(f"{parser.prog}: {name}: {error.reason}", file=sys.stderr)
+            return 1
         print(flush=True)
     return 0
 

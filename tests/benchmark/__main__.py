@@ -22,6 +22,7 @@ from tests.benchmark import (
     scenes_without,
     settling,
 )
+from tests.helpers.pouring import DeckError
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,9 @@ def main() -> int:
             parts[name]()
         except earlier.EarlierError as error:
             parser.error(str(error))
+        except DeckError as error:
+            print(f"{parser.prog}: {name}: {error.reason}", file=sys.stderr)
+            return 1
     return 0
 
 

@@ -48,6 +48,16 @@ def shipped_deck(name: str) -> str:
     return (files("lammps_inelastic.inputs") / f"{name}.in").read_text()
 
 
+class DeckError(RuntimeError):
+    """LAMMPS has refused a deck, or could not end it."""
+
+    @property
+    def reason(self) -> str:
+        """The line in which LAMMPS says why; without one the last that it wrote."""
+        lines = str(self).splitlines() or ["it wrote nothing"]
+        return next((line for line in lines if line.startswith("ERROR")), lines[-1])
+
+
 def run_deck(
     folder: Path,
     deck: str,
@@ -57,7 +67,7 @@ def run_deck(
 ) -> str:
     """Run a deck in `folder`, which becomes its `out`; return the log.
 
-    The plugin is the installed one, or that in the folder `plugin`. Raises RuntimeError with the
+    The plugin is the installed one, or that in the folder `plugin`. Raises DeckError with the
     end of the output when lmp fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -80,7 +90,7 @@ def run_deck(
         check=False,
     )
     if done.returncode != 0:
-        raise RuntimeError("\n".join(done.stdout.splitlines()[-15:]))
+        raise DeckError("\n".join((done.stdout + done.stderr).splitlines()[-15:]))
     return (folder / "log.lammps").read_text()
 
 
