@@ -98,10 +98,54 @@ bool AcceleratedProjectedGradient::judge(const ContactProblem &problem, const So
   gap_.resize(impulse.size());
   gap_operator_.apply(problem, impulse.data(), gap_.data(), host);
   result.residual = residual_over_ranks(gap_.data(), problem.contacts, host);
-  return targets_.judge(problem, limits, gap_operator_, gap_, host) <= 1.0;
+  result.accurate = targets_.judge(problem, limits, gap_operator_, gap_, host) <= 1.0;
+  result.unresolved = targets_.unresolved();
+  return result.accurate;
 }
 
-std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const ContactProblem &problem,
+double AcceleratedProjectedGradient::number_loaded(const ContactProblem &problem, Host &host)
+{
+  double loaded = 0.0;
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c)
+    if (problem.contacts.is_loaded(c)) loaded += 1.0;
+  host.reduce(&loaded, 1, nullptr, 0);
+  return loaded;
+}
+
+bool AcceleratedProjectedGradient::is_time_for_slow_modes(long iteration)
+{
+  // With a ratio of n the smallest eigenvalues of A fall to about its n-th part.
+  constexpr double DIFFERENT = 30.0, VERY_DIFFERENT = 1000.0;
+  return mass_ratio_ >= DIFFERENT &&
+      plateau_.is_time_to_try(iteration, mass_ratio_ >= VERY_DIFFERENT);
+}
+
+bool AcceleratedProjectedGradient::solve_slow_modes(ContactProblem &problem,
+                                                    const SolverLimits &limits, Host &host,
+                                                    SolverResult &result)
+{
+  const std::vector<double> before = problem.contacts.impulse;
+  // The searches that may go on have taken their gaps and targets from the members.
+  ContactTargets targets = targets_;
+  std::vector<double> gap(before.size());
+  double unsolved = 0.0;
+  const auto judge_here = [&] {
+    gap_operator_.apply(problem, problem.contacts.impulse.data(), gap.data(), host);
+    return unsolved = targets.judge(problem, limits, gap_operator_, gap, host);
+  };
+  judge_here();
+  result.iterations +=
+      conjugate_gradients_.search(problem, gap_operator_, diagonal_, gap,
+                                  limits.max_iterations - result.iterations, judge_here, host);
+  if (unsolved <= 1.0 && judge(problem, limits, host, result)) {
+    result.status = Status::CONVERGED;
+    return true;
+  }
+  problem.contacts.impulse = before;
+  return false;
+}
+
+std::optional<Status> AcceleratedProjectedGradient::judge_prospects(ContactProblem &problem,
                                                                     const SolverLimits &limits,
                                                                     bool single_precision,
                                                                     Host &host,
@@ -118,6 +162,9 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   const bool blurred = limits.tolerance < BELOW_ROUND_OFF * result.round_off;
   const bool stuck =
       result.iterations >= LONG && trend_of_targets_.least() > STUCK * trend_of_targets_.earlier();
+  if (!infeasible && is_time_for_slow_modes(result.iterations) &&
+      solve_slow_modes(problem, limits, host, result))
+    return Status::CONVERGED;
   if (!infeasible && !blurred && !stuck) return std::nullopt;
   if (judge(problem, limits, host, result)) return Status::CONVERGED;
   if (infeasible) return Status::INFEASIBLE;
@@ -125,7 +172,9 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(const Contac
   if (result.residual.largest() <= limits.tolerance) return Status::CONVERGED;
   // Round-off of single precision may keep the residual up; double precision then goes on.
   if (!single_precision) return std::nullopt;
+  is_stuck_ = true;
   result.trend = trend_of_targets_ = ResidualTrend();
+  plateau_ = Plateau();
   return Status::OUT_OF_ITERATIONS;
 }
 
@@ -151,6 +200,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   Momentum momentum;
   Settling settling(iterations, limits.accuracy > 0.0 && limits.coarseness == 1.0,
                     result.iterations);
+  const long most = most_on_plateau(number_loaded(problem, host));
   long next_check = 0, failures = 0;
   double blur = 0.0;
   while (result.iterations < limits.max_iterations) {
@@ -165,6 +215,14 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     const double packed_residual = std::max(-passed.least_gap, passed.most_under_force);
     result.trend.see(result.iterations, scales.length * packed_residual);
     trend_of_targets_.see(result.iterations, passed.unsolved);
+    plateau_.see(result.iterations, passed.unsolved);
+    // Where the targets are not to be had, the tolerance will do.
+    if (scales.length * packed_residual <= limits.tolerance &&
+        plateau_.lasts(result.iterations, most)) {
+      iterations.impulses_before(scales, impulse);
+      if (judge(problem, limits, host, result) || result.residual.largest() <= limits.tolerance)
+        return Status::CONVERGED;
+    }
 
     blur = least_residual<Real>(passed.farthest);
     bool solved = passed.unblurred <= 1.0 && result.iterations >= next_check;
@@ -218,9 +276,14 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
 
   SolverResult result;
   trend_of_targets_ = ResidualTrend();
+  plateau_ = Plateau();
+  is_stuck_ = false;
   const Guess guess = judge_first_guess(problem, host);
   result.residual = guess.residual;
+  mass_ratio_ = guess.largest_inverse_mass / guess.least_inverse_mass;
   const double unsolved = targets_.judge(problem, limits, gap_operator_, gap_, host);
+  result.accurate = unsolved <= 1.0;
+  result.unresolved = targets_.unresolved();
   if (unsolved <= 1.0)
     result.status = Status::CONVERGED;
   else if (!std::isfinite(result.residual.feasibility))
@@ -240,7 +303,7 @@ SolverResult AcceleratedProjectedGradient::solve(ContactProblem &problem,
   };
   bool of_use = unsolved < WITHIN_SINGLE;
   if (of_use) of_use = search_first(problem, limits, scales, host, result);
-  for (int search = 0; of_use && search < MOST_SEARCHES && !settled(); ++search) {
+  for (int search = 0; of_use && search < MOST_SEARCHES && !settled() && !is_stuck_; ++search) {
     result.status = iterate(single_, problem, limits, scales, host, result);
     // All other ends of a search have judged what they leave.
     if (result.status == Status::NOT_FINITE)

@@ -35,6 +35,7 @@
 
 #pragma once
 
+#include "inelastic_conjugate_gradients.h"
 #include "inelastic_packed_iterations.h"
 #include "inelastic_solver.h"
 
@@ -60,12 +61,28 @@ class AcceleratedProjectedGradient : public Solver {
   bool judge(const ContactProblem &problem, const SolverLimits &limits, Host &host,
              SolverResult &result);
 
+  // Tells whether masses are so different that a few slow modes may be what keeps the residual up,
+  // and these are to be solved otherwise now.
+  bool is_time_for_slow_modes(long iteration);
+
+  // Tries conjugate gradients (inelastic_conjugate_gradients.h) on the impulses in `problem`. If
+  // they solve the problem, the result is settled and this returns true. Otherwise all stays as it
+  // was but the number of iterations. Collective.
+  bool solve_slow_modes(ContactProblem &problem, const SolverLimits &limits, Host &host,
+                        SolverResult &result);
+
+  // Returns how many impulses of all ranks are above their least ones. Collective.
+  static double number_loaded(const ContactProblem &problem, Host &host);
+
   // Returns how the search ends if more iterations from the impulses in `problem` are of no use, in
   // the precision that it has.
-  std::optional<Status> judge_prospects(const ContactProblem &problem, const SolverLimits &limits,
+  std::optional<Status> judge_prospects(ContactProblem &problem, const SolverLimits &limits,
                                         bool single_precision, Host &host, SolverResult &result);
 
   ResidualTrend trend_of_targets_;    // of the largest residual as a part of its target
+  Plateau plateau_;
+  bool is_stuck_ = false;      // single precision gets no further
+  double mass_ratio_ = 1.0;    // of the heaviest to the lightest that can move
 
  private:
   // Iterates from the impulses in `problem`, whose gaps are gap_, until all residuals, judged in
@@ -81,6 +98,7 @@ class AcceleratedProjectedGradient : public Solver {
   void raise_curvature(const packed::Passed &passed);
 
   double curvature_ = 0.0;    // L; 0 = not yet known
+  ConjugateGradients conjugate_gradients_;
   PackedIterations<float> single_;
   PackedIterations<double> double_;
 };

@@ -30,6 +30,9 @@ namespace {
   // The states are computed anew after at most so many sweeps: the round-off of each stays in them.
   constexpr long REFRESH_EVERY = 50;
 
+  // The residual is looked at in every so many sweeps at least, to see whether it comes down.
+  constexpr long PLATEAU_EVERY = 50;
+
   // Sweeps diverge if their largest change of an impulse grows to so many times that of the first.
   constexpr double DIVERGED = 1.0e3;
 
@@ -151,6 +154,10 @@ ColouredSweeps::End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, ContactPr
       }
       if (near && !settled) looks.wait(result.iterations + std::max(3L, result.iterations / 10));
     }
+    if ((result.iterations - begun) % PLATEAU_EVERY == 0) {
+      const auto end = leave_plateau(sweeps, problem, limits, scales, blur, host, result);
+      if (end) return *end;
+    }
     if ((result.iterations - begun) % CHECK_EVERY == 0) {
       sweeps.impulses(scales, impulse);
       if (is_infeasible(problem, gap_operator_, limits, host)) return End::INFEASIBLE;
@@ -161,6 +168,29 @@ ColouredSweeps::End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, ContactPr
     upkeep.run(result.iterations, sweeps, IDLE_GAP * limits.tolerance / scales.length, host);
     settling.see(result.iterations);
   }
+  return End::NO_PROGRESS;
+}
+
+template <typename Group>
+std::optional<ColouredSweeps::End>
+ColouredSweeps::leave_plateau(const PackedSweeps<Group> &sweeps, ContactProblem &problem,
+                              const SolverLimits &limits, const Scales &scales, double blur,
+                              Host &host, SolverResult &result)
+{
+  plateau_.see(result.iterations, find_unsolved(sweeps, blur, host));
+  const bool tries = is_time_for_slow_modes(result.iterations);
+  if (!tries && !plateau_.lasts(result.iterations, most_on_plateau(0.0))) return std::nullopt;
+  sweeps.impulses(scales, problem.contacts.impulse);
+  if (tries && solve_slow_modes(problem, limits, host, result)) return End::SOLVED;
+  const long most = most_on_plateau(number_loaded(problem, host));
+  if (!plateau_.lasts(result.iterations, most)) return std::nullopt;
+  // Where the targets are not to be had, the tolerance will do.
+  if (judge(problem, limits, host, result) || result.residual.largest() <= limits.tolerance) {
+    result.status = Status::CONVERGED;
+    return End::SOLVED;
+  }
+  constexpr long TIMES = 2;
+  if (!plateau_.lasts(result.iterations, TIMES * most)) return std::nullopt;
   return End::NO_PROGRESS;
 }
 

@@ -22,6 +22,8 @@
 #include "inelastic_packed_sweeps.h"
 #include "inelastic_settling.h"
 
+#include <optional>
+
 namespace inelastic {
 
 class ColouredSweeps final : public AcceleratedProjectedGradient {
@@ -46,6 +48,14 @@ class ColouredSweeps final : public AcceleratedProjectedGradient {
   End sweep(PackedSweeps<Group> &sweeps, ContactProblem &problem, const SolverLimits &limits,
             const Scales &scales, Settling<PackedSweeps<Group>> &settling, Host &host,
             SolverResult &result);
+
+  // Returns how sweeps end because the residual no longer comes down: a few slow modes are solved
+  // otherwise, or the residual is within the tolerance and the targets are not to be had, or the
+  // other solver goes on. Collective.
+  template <typename Group>
+  std::optional<End> leave_plateau(const PackedSweeps<Group> &sweeps, ContactProblem &problem,
+                                   const SolverLimits &limits, const Scales &scales, double blur,
+                                   Host &host, SolverResult &result);
 
   PackedSweeps<swept::ParticleGroup> of_particles_;
   PackedSweeps<swept::BodyGroup> of_bodies_;

@@ -32,15 +32,19 @@ namespace {
 }    // namespace
 
 void ContactTargets::begin(const ContactProblem &problem, const GapOperator &gap_operator,
-                           const std::vector<double> &gap, const std::vector<double> &diagonal)
+                           const std::vector<double> &gap, const std::vector<double> &diagonal,
+                           double least_inverse_mass)
 {
   const ContactSet &contacts = problem.contacts;
   diagonal_ = diagonal;
   change_by_guess_ = gap_operator.change();
   of_guess_.resize(contacts.size());
-  for (std::size_t c = 0; c < contacts.size(); ++c)
-    of_guess_[c] = std::max(contacts.residual(c, gap.data()).largest(),
-                            PART_OF_LOAD * contacts.magnitude(c) * diagonal[c]);
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const double lighter = std::max(problem.inverse_mass_of(contacts.first[c]),
+                                    problem.inverse_mass_of(contacts.second[c]));
+    const double load = contacts.magnitude(c) * diagonal[c] * (least_inverse_mass / lighter);
+    of_guess_[c] = std::max(contacts.residual(c, gap.data()).largest(), PART_OF_LOAD * load);
+  }
 }
 
 void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits &limits,
@@ -107,19 +111,23 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
     const double added[3] = {now[0] - before[0], now[1] - before[1], now[2] - before[2]};
     of_slot[i] = problem.timestep * std::max(norm(now), norm(added));
   }
-  double maxima[2] = {0.0, 0.0};    // the largest part of a target, the largest target
+  // The largest part of a target, the largest target, and the largest part that is unresolved.
+  double maxima[3] = {0.0, 0.0, 0.0};
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double by_velocity =
         part_[c] * std::min(of_slot[contacts.first[c]], of_slot[contacts.second[c]]);
-    const double target = std::min(limits.tolerance, std::max(least_[c], by_velocity));
-    const Residual left = contacts.residual(c, gap.data());
-    maxima[0] =
-        std::max(maxima[0], (counts == Counts::ALL ? left.largest() : left.feasibility) / target);
+    const double resolved = std::max(least_[c], by_velocity);
+    const double target = std::min(limits.tolerance, resolved);
+    const Residual residual = contacts.residual(c, gap.data());
+    const double left = counts == Counts::ALL ? residual.largest() : residual.feasibility;
+    maxima[0] = std::max(maxima[0], left / target);
+    maxima[2] = std::max(maxima[2], part_[c] * left / resolved);
     if (contacts.is_loaded(c) || gap[c] < NEAR * limits.tolerance)
       maxima[1] = std::max(maxima[1], target);
   }
-  host.reduce(nullptr, 0, maxima, 2);
+  host.reduce(nullptr, 0, maxima, 3);
   largest_ = maxima[1];
+  unresolved_ = maxima[2];
   return maxima[0];
 }
 

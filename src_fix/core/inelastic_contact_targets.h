@@ -20,8 +20,10 @@
 //
 // - r_c is the residual of the first guess: for two spheres that meet, by how much they would
 //   overlap;
-// - l_c is the length by which the contact's own impulse of the first guess opens its gap. It
-//   matters where forces balance and change no velocity, and tells there what is small.
+// - l_c is the length by which the contact's own impulse of the first guess would open its gap if
+//   its sides were as heavy as the heaviest of the scene. It matters where forces balance and
+//   change no velocity, and tells there what is small. (Light particles carry a heavy one: the
+//   length by which they would move is none that anything moves.)
 //
 // Changes of velocity are those of the present impulses. Contacts of bodies have A/48. A contact
 // whose refinement (inelastic_contact_set.h) is below 1 has that part of A.
@@ -41,9 +43,11 @@ struct SolverLimits;
 class ContactTargets {
  public:
   // Takes the first guess: the operator was last applied to it, and `gap` are its gaps at the end
-  // of the step. `diagonal` is that of A, one number per constraint as well.
+  // of the step. `diagonal` is that of A, one number per constraint as well, and the inverse mass
+  // [1 / mass] that of the heaviest that can move.
   void begin(const ContactProblem &problem, const GapOperator &gap_operator,
-             const std::vector<double> &gap, const std::vector<double> &diagonal);
+             const std::vector<double> &gap, const std::vector<double> &diagonal,
+             double least_inverse_mass);
 
   // Sets the targets for the present impulses, to which the operator was last applied. Returns the
   // largest residual as a part of its target, over all ranks; infinity if a number is not finite.
@@ -66,6 +70,9 @@ class ContactTargets {
   const std::vector<double> &change_by_guess() const { return change_by_guess_; }
   // [length] The largest target of a constraint with impulse, or near it, on all ranks.
   double largest() const { return largest_; }
+  // The largest residual, over all ranks, as a part of the lengths v_c, r_c and l_c of its
+  // constraint, and of round-off; 0 without an accuracy.
+  double unresolved() const { return unresolved_; }
 
  private:
   enum class Counts { ALL, FEASIBILITY };    // of the residuals
@@ -82,7 +89,7 @@ class ContactTargets {
   std::vector<double> least_, part_;
   // [length] per slot: the impulses on it, and with its own motion, for the round-off
   std::vector<double> carried_, length_;
-  double largest_ = 0.0;
+  double largest_ = 0.0, unresolved_ = 0.0;
 };
 
 }    // namespace inelastic

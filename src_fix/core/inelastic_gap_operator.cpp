@@ -66,6 +66,14 @@ void GapOperator::apply(const ContactProblem &problem, const double *impulse, do
                                gap_at_end);
 }
 
+void GapOperator::product(const ContactProblem &problem, const double *impulse, double *opened,
+                          Host &host)
+{
+  find_change(problem, impulse, host);
+  const std::vector<double> none(free_gap_.size(), 0.0);
+  problem.contacts.gaps_at_end(none.data(), problem.timestep, change_.data(), impulse, opened);
+}
+
 void GapOperator::velocity(const ContactProblem &problem, const double *impulse, double *velocity,
                            Host &host)
 {

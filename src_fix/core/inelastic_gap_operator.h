@@ -27,6 +27,9 @@ class GapOperator {
   // Writes w(impulse) [length], one per constraint.
   void apply(const ContactProblem &problem, const double *impulse, double *gap_at_end, Host &host);
 
+  // Writes A impulse [length], one per constraint.
+  void product(const ContactProblem &problem, const double *impulse, double *opened, Host &host);
+
   // Writes V* + M^-1 G^T impulse, 3 per slot [length / time].
   void velocity(const ContactProblem &problem, const double *impulse, double *velocity, Host &host);
 

@@ -61,6 +61,8 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
     result.iterations += solved.iterations;
     result.residual = solved.residual;
     result.round_off = solved.round_off;
+    result.accurate = solved.accurate;
+    result.unresolved = solved.unresolved;
     result.trend = solved.trend;
 
     const std::size_t solved_for = problem.contacts.size();

@@ -37,7 +37,10 @@ struct ProjectionResult {
   int rounds = 0;
   Residual residual;         // over all constraints that came to light, on all ranks
   double round_off = 0.0;    // [length] of the last solve: see SolverResult
-  ResidualTrend trend;       // of the last solve
+  // Of the last solve: see SolverResult.
+  bool accurate = false;
+  double unresolved = 0.0;
+  ResidualTrend trend;    // of the last solve
 
   // The constraint of this rank that is farthest from being met, and the gap [length] that it
   // leaves at the end of the step. NONE if the status is CONVERGED or this rank has no such

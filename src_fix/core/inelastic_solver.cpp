@@ -40,13 +40,27 @@ Guess Solver::judge_first_guess(ContactProblem &problem, Host &host)
         {guess.largest_length, std::abs(free_gap[c]), contacts.magnitude(c) * diagonal_[c]});
     guess.largest_diagonal = std::max(guess.largest_diagonal, diagonal_[c]);
   }
-  double maxima[4] = {mine.feasibility, mine.complementarity, guess.largest_length,
-                      guess.largest_diagonal};
-  host.reduce(nullptr, 0, maxima, 4);
+  constexpr double NONE = std::numeric_limits<double>::max();
+  double least = NONE, most = 0.0;
+  for (const std::vector<int> *const sides : {&contacts.first, &contacts.second})
+    for (const int slot : *sides) {
+      const double inverse_mass = problem.inverse_mass_of(slot);
+      if (inverse_mass > 0.0) least = std::min(least, inverse_mass);
+      most = std::max(most, inverse_mass);
+    }
+  double maxima[6] = {mine.feasibility,
+                      mine.complementarity,
+                      guess.largest_length,
+                      guess.largest_diagonal,
+                      -least,
+                      most};
+  host.reduce(nullptr, 0, maxima, 6);
   guess.residual = {maxima[0], maxima[1]};
   guess.largest_length = maxima[2];
   guess.largest_diagonal = maxima[3];
-  targets_.begin(problem, gap_operator_, gap_, diagonal_);
+  guess.least_inverse_mass = -maxima[4];
+  guess.largest_inverse_mass = maxima[5];
+  targets_.begin(problem, gap_operator_, gap_, diagonal_, guess.least_inverse_mass);
   return guess;
 }
 

@@ -77,12 +77,56 @@ class ResidualTrend {
   double least_ = NONE, at_mark_ = NONE, before_mark_ = NONE;
 };
 
+// Tells where the largest residual, as a part of its target, no longer comes down. A search passes
+// levels on which it stays for a while, the longer the more contacts there are.
+class Plateau {
+ public:
+  // Takes that part at an iteration.
+  void see(long iteration, double unsolved)
+  {
+    if (!(unsolved < PROGRESS * mark_)) return;
+    mark_ = unsolved;
+    marked_ = iteration;
+  }
+
+  // Tells whether it has stayed for so many iterations.
+  bool lasts(long iteration, long so_many) const { return iteration - marked_ > so_many; }
+
+  // Tells whether it has stayed for half of all iterations, or for so many. With `always` it need
+  // not have stayed. Notes that something else is tried then: the next time comes after as many
+  // iterations again.
+  bool is_time_to_try(long iteration, bool always)
+  {
+    constexpr long FIRST = 100;
+    if (iteration < std::max(FIRST, 2 * tried_)) return false;
+    if (!always && !lasts(iteration, std::max(FIRST, iteration / 2))) return false;
+    tried_ = iteration;
+    return true;
+  }
+
+ private:
+  static constexpr double PROGRESS = 0.5;
+  double mark_ = std::numeric_limits<double>::infinity();
+  long marked_ = 0, tried_ = 0;
+};
+
+// So many iterations without progress are of no use where impulses of so many constraints are not
+// their least ones: conjugate gradients, which sweeps and accelerated gradients do not surpass,
+// would have ended.
+inline long most_on_plateau(double loaded)
+{
+  constexpr double LEAST = 150.0, EACH = 0.75;
+  return static_cast<long>(std::max(LEAST, EACH * loaded));
+}
+
 // What is known before the iterations, from the first guess of the impulses; over all ranks.
 struct Guess {
   Residual residual;
   double largest_length =
       0.0;    // [length] The largest gap without impulses, or change by an impulse.
   double largest_diagonal = 0.0;    // [time / mass] of A
+  // [1 / mass] Of what can move and has a constraint: that of the heaviest and of the lightest.
+  double least_inverse_mass = 0.0, largest_inverse_mass = 0.0;
 };
 
 struct SolverResult {
@@ -90,6 +134,10 @@ struct SolverResult {
   long iterations = 0;
   Residual residual;         // over all ranks
   double round_off = 0.0;    // [length] of the gaps where impulses act; no residual gets below it
+  // Whether all residuals are within their targets, and the largest one as a part of what contacts
+  // change (ContactTargets::unresolved).
+  bool accurate = false;
+  double unresolved = 0.0;
   ResidualTrend trend;
 };
 

@@ -40,11 +40,11 @@ struct Unknowns {
   { return !bodies.empty() && slot < particles && bodies.body[slot] >= 0; }
 
   // Tells whether impulses move a slot.
-  bool is_mobile(int slot) const
-  {
-    return is_member(slot) ? bodies.inverse_mass[bodies.body[slot]] > 0.0
-                           : inverse_mass[slot] > 0.0;
-  }
+  bool is_mobile(int slot) const { return inverse_mass_of(slot) > 0.0; }
+
+  // Returns the inverse mass of a slot, or of the body that it belongs to [1 / mass].
+  double inverse_mass_of(int slot) const
+  { return is_member(slot) ? bodies.inverse_mass[bodies.body[slot]] : inverse_mass[slot]; }
 
   // Tells whether impulses move any wall.
   bool any_wall_moves() const;

@@ -25,8 +25,9 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
   while (true) {
     gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
     result.residual = residual_over_ranks(gap_.data(), contacts, host);
-    if (targets_.judge_feasibility(problem, limits, gap_operator_, gap_, host) <= 1.0)
-      return ended(Status::CONVERGED);
+    result.accurate = targets_.judge_feasibility(problem, limits, gap_operator_, gap_, host) <= 1.0;
+    result.unresolved = targets_.unresolved();
+    if (result.accurate) return ended(Status::CONVERGED);
     if (!std::isfinite(result.residual.feasibility)) return ended(Status::NOT_FINITE);
     if (result.iterations >= limits.max_iterations) return ended(Status::OUT_OF_ITERATIONS);
     if (result.iterations > 0) result.trend.see(result.iterations, result.residual.feasibility);

@@ -43,8 +43,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     spheres_(lmp, step_, ranks_, state_), walls_(lmp, settings_.regions),
     constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
     solver_(inelastic::make_solver(settings_.solver)), push_apart_(step_, constraints_, movers_),
-    length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_),
-    hold_still_(step_, ranks_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
+    length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_, movers_),
+    check_(lmp, this, step_, ranks_, state_, movers_),
     unsolved_(lmp, step_, constraints_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
@@ -344,17 +344,15 @@ void FixInelastic::advance(int vflag, Kick kick)
   check_.before_step();
   inelastic::ProjectionResult result = solve();
   if (rest_.look(result)) refine(result);
-  std::vector<char> at_rest;    // one mark per particle
-  if (rest_.decide(at_rest)) {
+  {
     const PhaseClock::Within solving(clock_, PhaseClock::SOLVE);
-    result.iterations += hold_still_.run(
-        at_rest,
-        [this] {
-          return constraints_.add_violated();
-        },
-        [this] {
-          return constraints_.excess();
-        });
+    const HoldStill::Constraints constraints = {[this] {
+                                                  return constraints_.add_violated();
+                                                },
+                                                [this] {
+                                                  return constraints_.excess();
+                                                }};
+    result.iterations += rest_.hold(constraints, least_length());
   }
   finish(result);
 }
@@ -437,11 +435,18 @@ void FixInelastic::predict()
   step_.impulse_per_force = step_.kicks() * update->dt * force->ftm2v;
   problem.timestep = update->dt;
   problem.resize(nall, walls_.number_of_walls());
-  if (laws_.has_law()) step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
   for (int i = 0; i < nall; ++i)
     problem.inverse_mass[i] = step_.is_mobile(atom, i) ? 1.0 / mass_of(atom, i) : 0.0;
+  if (laws_.has_law()) {
+    step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
+    movers_.find_velocity_before(step_.velocity_before);
+  }
   movers_.predict();
 }
+
+// [length] What is shorter is round-off of positions.
+double FixInelastic::least_length() const
+{ return std::numeric_limits<double>::epsilon() * length_.smallest_radius(); }
 
 inelastic::ProjectionResult FixInelastic::project(long max_iterations)
 {
@@ -450,7 +455,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
   constexpr double BEYOND_REACH = 10.0;
   const double reach = (settings_.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
   inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
-  limits.least_length = std::numeric_limits<double>::epsilon() * length_.smallest_radius();
+  limits.least_length = least_length();
   // The accuracy is that of momentum, and a push is none.
   if (step_.phase == Phase::CONTACT) {
     // Bodies turn: their constraints are linearised anew in many rounds, of which only the last

@@ -20,7 +20,6 @@ FixStyle(inelastic,FixInelastic);
 #include "inelastic_constraints.h"
 #include "inelastic_contact_output.h"
 #include "inelastic_ghost_exchange.h"
-#include "inelastic_hold_still.h"
 #include "inelastic_law_contacts.h"
 #include "inelastic_motion_check.h"
 #include "inelastic_phase_clock.h"
@@ -100,7 +99,6 @@ class FixInelastic : public Fix {
   Inelastic_NS::PushApart push_apart_;
   Inelastic_NS::StepLength length_;
   Inelastic_NS::Rest rest_;
-  Inelastic_NS::HoldStill hold_still_;
   Inelastic_NS::MotionCheck check_;
   Inelastic_NS::UnsolvedStep unsolved_;
   Inelastic_NS::SqueezedGrains squeezed_;
@@ -123,6 +121,7 @@ class FixInelastic : public Fix {
   inelastic::ProjectionResult solve();
   void refine(inelastic::ProjectionResult &result);
   void predict();
+  double least_length() const;
   inelastic::ProjectionResult project(long max_iterations);
   void finish(const inelastic::ProjectionResult &result);
 };

@@ -11,9 +11,14 @@ using namespace Inelastic_NS;
 
 namespace {
 
-// The moving particles were solved for already: only where they would end deeper by so many
-// tolerances, because others are at rest, do their velocities change.
+// A contact of a moving particle with one that is held may end deeper than the tolerance less this
+// part of it only where the step asks for that.
 constexpr double DEEPER = 0.1;
+// The part of the accuracy to which a contact of a moving particle with one that is held is solved.
+// A slow motion that goes away from what is held shows there: its contact opens.
+constexpr double REFINED = 1.0 / 16.0;
+// The same for a contact that is none of a cluster with held particles: the tolerance alone counts.
+constexpr double ANYTHING = 1.0e9;
 // Where more iterations would be needed, moving particles have no room beside those at rest:
 // nothing is stopped in the step.
 constexpr long MOST_ITERATIONS = 2000;
@@ -25,71 +30,86 @@ HoldStill::HoldStill(Step &step, GhostExchange &ranks, Movers &movers) :
 {
 }
 
-std::vector<char> HoldStill::with_ghosts(const std::vector<char> &stopped) const
+void HoldStill::begin()
 {
-  std::vector<double> marks(3 * stopped.size(), 0.0);
-  for (std::size_t i = 0; i < stopped.size(); ++i) marks[3 * i] = stopped[i];
-  ranks_.share_with_ghosts(marks.data());
-  std::vector<char> all(stopped.size());
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = marks[3 * i] != 0.0;
-  const inelastic::RigidBodies &bodies = step_.problem.bodies;
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const auto first = bodies.member.begin() + bodies.start[b];
-    const auto last = bodies.member.begin() + bodies.start[b + 1];
-    const bool any = std::any_of(first, last, [&all](int i) {
-      return all[i] != 0;
-    });
-    std::for_each(first, last, [&all, any](int i) {
-      all[i] = any;
-    });
-  }
-  return all;
+  velocity_before_ = step_.velocity;
+  impulse_before_ = step_.problem.contacts.impulse;
+  excess_before_ = step_.excess;
+  iterations_ = 0;
 }
 
-long HoldStill::run(const std::vector<char> &stopped, const std::function<long()> &add_violated,
-                    const std::function<double()> &excess)
+void HoldStill::take_back_impulses()
+{
+  // Constraints that were added since had none.
+  impulse_before_.resize(step_.problem.contacts.size(), 0.0);
+  step_.problem.contacts.impulse = impulse_before_;
+}
+
+void HoldStill::go_back()
+{
+  take_back_impulses();
+  step_.velocity = velocity_before_;
+  step_.excess = excess_before_;
+  turn_bodies();
+}
+
+bool HoldStill::run(const Held &held, const Constraints &constraints, double least_length)
 {
   // Moving particles may meet stopped ones that they would not have met, and then come upon others.
   constexpr int MOST_ROUNDS = 20;
-  const std::vector<char> still = with_ghosts(stopped);
-  const std::vector<double> velocity = step_.velocity;
   std::vector<double> &impulse = step_.problem.contacts.impulse;
-  std::vector<double> impulse_before = impulse;
-  const double excess_before = step_.excess;
-  long iterations = 0;
   for (int round = 0; round < MOST_ROUNDS; ++round) {
-    const inelastic::SolverResult result = project(still);
-    iterations += result.iterations;
-    if (result.status != inelastic::Status::CONVERGED) break;
+    const inelastic::SolverResult result = project(held, least_length);
+    iterations_ += result.iterations;
+    if (result.status != inelastic::Status::CONVERGED || !result.accurate) return false;
     turn_bodies();
     const std::size_t known = impulse.size();
-    if (add_violated() == 0) {
-      if (excess() > excess_before) break;
-      note_stop();
-      return iterations;
+    if (constraints.add_violated() > 0) {
+      std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(known), impulse.end(), 0.0);
+      continue;
     }
-    std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(known), impulse.end(), 0.0);
+    double lacking = has_room(held) ? 0.0 : 1.0;
+    ranks_.reduce(nullptr, 0, &lacking, 1);
+    return lacking == 0.0 && constraints.excess() <= excess_before_;
   }
-  impulse_before.resize(impulse.size(), 0.0);
-  impulse = impulse_before;
-  step_.velocity = velocity;
-  step_.excess = excess_before;
-  turn_bodies();
-  return iterations;
+  return false;
 }
 
-// Projects the velocities of the step with the marked particles as obstacles; changes nothing if it
-// does not converge.
-inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
+bool HoldStill::is_still(const Held &held, int slot) const
+{
+  const bool particle = !step_.problem.is_wall(slot);
+  return (particle && held.particles[slot]) || !step_.problem.is_mobile(slot);
+}
+
+// Tells whether what is held may go on as it is to, beside what cannot give way.
+bool HoldStill::has_room(const Held &held) const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const int i = contacts.first[c], j = contacts.second[c];
+    if (!is_still(held, i) || !is_still(held, j)) continue;
+    double opening = 0.0;
+    for (int d = 0; d < 3; ++d)
+      opening +=
+          contacts.normal[3 * c + d] * (step_.velocity[3 * i + d] - step_.velocity[3 * j + d]);
+    const double closing = -step_.problem.timestep * opening;
+    if (closing > 0.0 && closing - contacts.gap[c] > DEEPER * step_.settings.tolerance)
+      return false;
+  }
+  return true;
+}
+
+// Projects the predicted velocities with the held particles as obstacles, from the impulses of the
+// step.
+inelastic::SolverResult HoldStill::project(const Held &held, double least_length)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   moving_.timestep = problem.timestep;
   static_cast<inelastic::Unknowns &>(moving_) = problem;
-  moving_.predicted_velocity = step_.velocity;
-  for (std::size_t i = 0; i < still.size(); ++i) {
-    if (!still[i]) continue;
+  for (std::size_t i = 0; i < held.particles.size(); ++i) {
+    if (!held.particles[i]) continue;
     moving_.inverse_mass[i] = 0.0;
-    std::fill_n(&moving_.predicted_velocity[3 * i], 3, 0.0);
+    std::copy_n(&held.velocity[3 * i], 3, &moving_.predicted_velocity[3 * i]);
     if (!step_.is_member(static_cast<int>(i))) continue;
     const auto b = static_cast<std::size_t>(problem.bodies.body[i]);
     moving_.bodies.inverse_mass[b] = 0.0;
@@ -102,41 +122,54 @@ inelastic::SolverResult HoldStill::project(const std::vector<char> &still)
     const double *const n = &problem.contacts.normal[3 * c];
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
     if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
+    contacts.add_of(problem.contacts, c);
+    contacts.impulse.back() = problem.contacts.impulse[c];
+    source.push_back(c);
+    const auto either = [&](const std::vector<char> &marks) {
+      return (!problem.is_wall(i) && marks[i]) || (!problem.is_wall(j) && marks[j]);
+    };
+    // Other clusters stay as they are, unless they come to overlap what is held.
+    if (!either(held.beside)) contacts.refinement.back() = ANYTHING;
+    if (!either(held.particles)) continue;
     // A contact that counts as closed, and overlaps, is to end within the tolerance, the residual
     // included.
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
         (1.0 - DEEPER) * step_.settings.tolerance;
-    contacts.add_of(problem.contacts, c);
     contacts.gap.back() = std::min(problem.contacts.gap[c], ends_within);
-    // With the step's own impulse the contact still pushes, or pulls by no more than it may.
-    const auto changes = problem.contacts.set[c].changes_of(problem.contacts.impulse[c]);
-    contacts.set.back() = {std::min(0.0, changes.least)};
-    source.push_back(c);
+    contacts.refinement.back() = std::min(REFINED, problem.contacts.refinement[c]);
   }
   inelastic::SolverLimits limits;
-  limits.tolerance = DEEPER * step_.settings.tolerance;
+  limits.tolerance = step_.settings.tolerance;
   limits.max_iterations = std::min(MOST_ITERATIONS, step_.settings.max_iterations);
+  limits.accuracy = step_.settings.accuracy;
+  limits.least_length = least_length;
   const inelastic::SolverResult result = solver_->solve(moving_, limits, ranks_);
   if (result.status != inelastic::Status::CONVERGED) return result;
   solver_->gap_operator().velocity_applied(moving_, step_.velocity.data());
   for (std::size_t k = 0; k < source.size(); ++k)
-    step_.problem.contacts.impulse[source[k]] += contacts.impulse[k];
+    step_.problem.contacts.impulse[source[k]] = contacts.impulse[k];
   return result;
 }
 
 void HoldStill::turn_bodies()
 { movers_.turn(step_.problem, step_.velocity, step_.motion_of_bodies); }
 
-// Tells the movers that bodies at rest are to have other velocities than the contact forces give
-// them.
-void HoldStill::note_stop()
+const std::vector<double> &HoldStill::find_by_contacts()
 {
-  if (!movers_.any_turns()) return;
   const inelastic::ContactProblem &problem = step_.problem;
-  std::vector<double> by_contacts(step_.velocity.size());
+  by_contacts_.resize(step_.velocity.size());
   inelastic::GapOperator gap_operator;
   gap_operator.prepare(problem);
-  gap_operator.velocity(problem, problem.contacts.impulse.data(), by_contacts.data(), ranks_);
-  movers_.note_stop(problem, by_contacts, step_.velocity);
+  gap_operator.velocity(problem, problem.contacts.impulse.data(), by_contacts_.data(), ranks_);
+  return by_contacts_;
+}
+
+// Bodies at rest are to have other velocities than the contact forces give them.
+void HoldStill::stop(const Held &held)
+{
+  for (std::size_t i = 0; i < held.particles.size(); ++i)
+    if (held.particles[i]) std::copy_n(&held.velocity[3 * i], 3, &step_.velocity[3 * i]);
+  if (!movers_.any_turns()) return;
+  movers_.note_stop(step_.problem, by_contacts_, step_.velocity);
   turn_bodies();
 }

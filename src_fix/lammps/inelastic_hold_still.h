@@ -1,6 +1,7 @@
 // This room takes the velocities of particles at rest away (inelastic_rest.h). The moving particles
-// beside them were solved for with these velocities: they are projected once more, with the
-// particles at rest as obstacles, so that nothing moves into these.
+// beside them were solved for with these velocities: they are solved for once more, with the
+// particles at rest as obstacles, so that nothing moves into these, and what they are pushed by is
+// what obstacles push.
 
 #ifndef INELASTIC_HOLD_STILL_H
 #define INELASTIC_HOLD_STILL_H
@@ -21,20 +22,47 @@ class HoldStill {
  public:
   HoldStill(Step &step, GhostExchange &ranks, Movers &movers);
 
-  // Changes velocities and impulses of the step, which is solved. The marks are one per particle,
-  // those of ghosts are not read; of a body any marked member will do. `add_violated` adds
-  // constraints that the step's velocities violate, and returns how many all ranks added; `excess`
-  // finds the excess that they leave (StepState). Returns the number of iterations that it took.
-  // Where the moving particles find no room, or would leave more excess, nothing is changed.
-  // Collective.
-  long run(const std::vector<char> &stopped, const std::function<long()> &add_violated,
-           const std::function<double()> &excess);
+  // What particles are to do, ghosts included: one mark per particle that is held, the velocity
+  // that it is to have, 3 per particle [length / time], and one mark per particle in a cluster in
+  // which some are held.
+  struct Held {
+    std::vector<char> particles;
+    std::vector<double> velocity;
+    std::vector<char> beside;
+  };
+  // `add_violated` adds constraints that the step's velocities violate, and returns how many all
+  // ranks added; `excess` finds the excess that they leave (StepState).
+  struct Constraints {
+    std::function<long()> add_violated;
+    std::function<double()> excess;
+  };
+
+  // Keeps the velocities, impulses and the excess of the step, which is solved.
+  void begin();
+
+  // Changes velocities and impulses of the step. Returns false where the moving particles find no
+  // room, or would leave more excess: go_back() must follow then. Collective.
+  bool run(const Held &held, const Constraints &constraints, double least_length);
+
+  // The velocities that the forces of all contacts give, 3 per slot [length / time]: of what is
+  // held they differ from the velocities of the step by what does not balance. Collective.
+  const std::vector<double> &find_by_contacts();
+
+  // Takes the velocities of what is held from these on, and tells the movers. Collective.
+  void stop(const Held &held);
+
+  // Gives the step its impulses again as they were kept; with go_back() its velocities and excess,
+  // too.
+  void take_back_impulses();
+  void go_back();
+
+  long iterations() const { return iterations_; }    // since begin()
 
  private:
-  std::vector<char> with_ghosts(const std::vector<char> &stopped) const;
-  inelastic::SolverResult project(const std::vector<char> &still);
+  inelastic::SolverResult project(const Held &held, double least_length);
+  bool has_room(const Held &held) const;
+  bool is_still(const Held &held, int slot) const;
   void turn_bodies();
-  void note_stop();
 
   Step &step_;
   GhostExchange &ranks_;
@@ -42,6 +70,9 @@ class HoldStill {
   // Not the solver of the steps, which learns from them.
   std::unique_ptr<inelastic::Solver> solver_;
   inelastic::ContactProblem moving_;
+  std::vector<double> velocity_before_, impulse_before_, by_contacts_;
+  double excess_before_ = 0.0;
+  long iterations_ = 0;
 };
 
 }    // namespace LAMMPS_NS::Inelastic_NS

@@ -17,6 +17,11 @@ void Movers::predict()
   for (Mover *mover : all_) mover->predict();
 }
 
+void Movers::find_velocity_before(std::vector<double> &velocity)
+{
+  for (Mover *mover : all_) mover->find_velocity_before(velocity);
+}
+
 void Movers::apply(const double *contact_force)
 {
   for (Mover *mover : all_) mover->apply(contact_force);

@@ -21,6 +21,10 @@ class Mover {
   // end with if there were no contacts. Collective.
   virtual void predict() = 0;
 
+  // Sets the velocities of the step's particles before its forces, those of a push left out, ghosts
+  // included; 3 per particle. predict() must follow. Collective.
+  virtual void find_velocity_before(std::vector<double> &velocity) = 0;
+
   // Adds forces to LAMMPS's, so that the next move is the projected one, and keeps what the next
   // step and its check need. `contact_force` is 3 per particle.
   virtual void apply(const double *contact_force) = 0;
@@ -84,6 +88,7 @@ class Movers {
   void add(Mover *mover);
 
   void predict();
+  void find_velocity_before(std::vector<double> &velocity);
   void apply(const double *contact_force);
 
   // The movers that turn particles. See Mover.

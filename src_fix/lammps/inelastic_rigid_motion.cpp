@@ -48,10 +48,15 @@ std::string RigidMotion::measure()
 void RigidMotion::predict()
 {
   measure_inertia();
-  if (step_.settings.law) predict_bodies(0.0, step_.velocity_before);
   predict_bodies(step_.impulse_per_force, step_.problem.predicted_velocity);
   predicted_ = step_.problem.predicted_velocity;
   pushing_ = stopping_ = false;
+}
+
+void RigidMotion::find_velocity_before(std::vector<double> &velocity)
+{
+  measure_inertia();
+  predict_bodies(0.0, velocity);
 }
 
 // Sets the velocities of members (3 per particle) after forces have acted for a time, in units that

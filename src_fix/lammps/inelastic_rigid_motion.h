@@ -51,6 +51,7 @@ class RigidMotion final : public Mover, protected Pointers {
 
   // At the start of a run, and of a body that is new, momenta are those of the atoms.
   void predict() override;
+  void find_velocity_before(std::vector<double> &velocity) override;
   void apply(const double *contact_force) override;
 
   void turn(const inelastic::ContactProblem &problem, const std::vector<double> &velocity,

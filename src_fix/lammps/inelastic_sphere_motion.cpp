@@ -14,23 +14,27 @@ SphereMotion::SphereMotion(LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomSt
 }
 
 void SphereMotion::predict()
+{ predict_after(step_.impulse_per_force, step_.problem.predicted_velocity); }
+
+void SphereMotion::find_velocity_before(std::vector<double> &velocity)
+{ predict_after(0.0, velocity); }
+
+// Sets the velocities after forces have acted for a time, in units that turn a force into a
+// momentum.
+void SphereMotion::predict_after(double kick, std::vector<double> &velocity)
 {
-  inelastic::ContactProblem &problem = step_.problem;
   const bool whole = step_.kick == Kick::WHOLE;
-  const bool law = step_.settings.law != nullptr;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (step_.is_member(i)) continue;
-    const double kick_per_force = step_.impulse_per_force * problem.inverse_mass[i];
+    const double kick_per_force = kick * step_.problem.inverse_mass[i];
     // The push that took overlaps apart is no momentum; between runs it is not in the velocity.
     const double *const push = state_.push_next(i);
     for (int d = 0; d < 3; ++d) {
       const double before = atom->v[i][d] - (whole ? push[d] : 0.0);
-      problem.predicted_velocity[3 * i + d] = before + kick_per_force * atom->f[i][d];
-      if (law) step_.velocity_before[3 * i + d] = before;
+      velocity[3 * i + d] = before + kick_per_force * atom->f[i][d];
     }
   }
-  ranks_.share_with_ghosts(problem.predicted_velocity.data());
-  if (law) ranks_.share_with_ghosts(step_.velocity_before.data());
+  ranks_.share_with_ghosts(velocity.data());
 }
 
 void SphereMotion::apply(const double *)

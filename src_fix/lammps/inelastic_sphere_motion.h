@@ -18,9 +18,12 @@ class SphereMotion final : public Mover, protected Pointers {
   SphereMotion(class LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state);
 
   void predict() override;
+  void find_velocity_before(std::vector<double> &velocity) override;
   void apply(const double *contact_force) override;
 
  private:
+  void predict_after(double kick, std::vector<double> &velocity);
+
   Step &step_;
   GhostExchange &ranks_;
   AtomState &state_;
