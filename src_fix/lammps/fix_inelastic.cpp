@@ -45,7 +45,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     solver_(inelastic::make_solver(settings_.solver)), push_apart_(step_, constraints_, movers_),
     length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_, movers_),
     check_(lmp, this, step_, ranks_, state_, movers_),
-    unsolved_(lmp, step_, constraints_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
+    hard_(lmp, step_, ranks_), unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
   movers_.add(&spheres_);
@@ -317,6 +317,7 @@ void FixInelastic::check_volume()
 void FixInelastic::begin_summary()
 {
   summary_.begin(length_.shortened_steps());
+  hard_.begin_run();
   constraints_.overlaps().begin_count();
 }
 
@@ -365,6 +366,8 @@ void FixInelastic::refine(inelastic::ProjectionResult &result)
   result.iterations += refined.iterations;
   result.status = refined.status;
   result.residual = refined.residual;
+  result.accurate = refined.accurate;
+  result.unresolved = refined.unresolved;
   if (refined.status == inelastic::Status::CONVERGED) {
     rest_.look_again();
     return;
@@ -378,6 +381,7 @@ inelastic::ProjectionResult FixInelastic::solve()
 {
   length_.begin_step();
   unsolved_.begin_step();
+  hard_.begin_step();
   step_.keeps_overlaps = constraints_.overlaps().pushed_before();
   while (true) {
     unsolved_.begin_trial();
@@ -401,7 +405,10 @@ inelastic::ProjectionResult FixInelastic::solve()
       push_apart_.run(atom, result, [this](long iterations) {
         return project(iterations);
       });
-    if (result.status != inelastic::Status::CONVERGED) {
+    // What can hardly be solved looks solved in a step that is short enough, in which EPS is more than
+    // anything moves.
+    const bool hardly = hard_.has_shortened() && hard_.is_hardly_solved(result);
+    if (result.status != inelastic::Status::CONVERGED || hardly) {
       const bool no_room = result.status == inelastic::Status::INFEASIBLE;
       if (no_room) unsolved_.note_no_room();
       // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
@@ -409,7 +416,8 @@ inelastic::ProjectionResult FixInelastic::solve()
       // has few of them goes on, as it is.
       const bool law_parts = unsolved_.law_parts();
       if (length_.may_shorten_unsolved(law_parts) &&
-          (no_room || !settings_.warn_only || constraints_.relinearised() || law_parts)) {
+          (no_room || !settings_.warn_only || constraints_.relinearised() || law_parts || hardly)) {
+        hard_.note_shortened();
         length_.shorten(0.5, unsolved_.named());
         continue;
       }
@@ -474,6 +482,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
 // The step is solved: gives it to LAMMPS, to the output, and to the next step.
 void FixInelastic::finish(const inelastic::ProjectionResult &result)
 {
+  hard_.end_step(result);
   OverlapWatch &overlaps = constraints_.overlaps();
   overlaps.warn_of_unexpected();
   squeezed_.warn();
@@ -511,7 +520,8 @@ void FixInelastic::post_run()
   check_.end_run(constraints_.overlaps().pushes_in_velocity());
   state_.take_out_pushes();
   restart_peratom = laws_.has_law();
-  summary_.log(length_.shortened_steps(), constraints_.overlaps().unexpected_steps());
+  summary_.log(length_.shortened_steps(), constraints_.overlaps().unexpected_steps(),
+               hard_.counts());
   begin_summary();
 }
 

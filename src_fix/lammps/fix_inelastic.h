@@ -20,6 +20,7 @@ FixStyle(inelastic,FixInelastic);
 #include "inelastic_constraints.h"
 #include "inelastic_contact_output.h"
 #include "inelastic_ghost_exchange.h"
+#include "inelastic_hard_steps.h"
 #include "inelastic_law_contacts.h"
 #include "inelastic_motion_check.h"
 #include "inelastic_phase_clock.h"
@@ -100,6 +101,7 @@ class FixInelastic : public Fix {
   Inelastic_NS::StepLength length_;
   Inelastic_NS::Rest rest_;
   Inelastic_NS::MotionCheck check_;
+  Inelastic_NS::HardSteps hard_;
   Inelastic_NS::UnsolvedStep unsolved_;
   Inelastic_NS::SqueezedGrains squeezed_;
   Inelastic_NS::ContactOutput output_;

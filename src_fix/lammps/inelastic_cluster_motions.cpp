@@ -88,11 +88,12 @@ ClusterMotions::ClusterMotions(LAMMPS *lmp, const Step &step, GhostExchange &ran
 {
 }
 
-void ClusterMotions::measure(double limit)
+void ClusterMotions::measure(double limit, double quiet_steps)
 {
   measure_clusters();
   measure_resistance();
   measure_by_motion(limit);
+  measure_slip(quiet_steps);
 }
 
 bool ClusterMotions::counts(int i) const
@@ -335,5 +336,44 @@ void ClusterMotions::measure_by_motion(double limit)
       cluster.resisted = s[RESISTED] / (cluster.mass * cluster.speed * cluster.speed);
     if (s[HELD_NUMBER] > 0.0) cluster.held_speed = std::sqrt(s[SQUARES] / s[HELD_NUMBER]);
     cluster.held_moves = maxima[MAXIMA * k + MOVES] > 0.0;
+  }
+}
+
+// Measures how fast held particles move towards, or away from, others that they touch with a force.
+void ClusterMotions::measure_slip(double quiet_steps)
+{
+  double any = 0.0;
+  for (const ClusterMotion &cluster : motions_)
+    if (cluster.quiet_steps >= quiet_steps) any = 1.0;
+  ranks_.reduce(nullptr, 0, &any, 1);
+  if (any == 0.0) return;
+  std::vector<double> units(3 * static_cast<std::size_t>(step_.problem.particles), 0.0);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!counts(i)) continue;
+    const Motion motion = motion_of(i);
+    if (is_held(i, motion)) units[3 * static_cast<std::size_t>(i)] = unit(i, motion);
+  }
+  ranks_.share_with_ghosts(units.data());
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  enum { SQUARES, NUMBER, SUMS };
+  std::vector<double> sums(SUMS * clusters_.size(), 0.0), most(clusters_.size(), 0.0);
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const int i = contacts.first[c], j = contacts.second[c];
+    if (contacts.impulse[c] == 0.0 || !clusters_.is_mobile(i) || !clusters_.is_mobile(j)) continue;
+    const double one = units[3 * static_cast<std::size_t>(i)];
+    const double other = units[3 * static_cast<std::size_t>(j)];
+    if ((one > 0.0) == (other > 0.0)) continue;
+    const int held = one > 0.0 ? i : j;
+    const double speed = std::abs(dot(&contacts.normal[3 * c], own_velocity(held).data()));
+    const auto k = static_cast<std::size_t>(clusters_.of(held));
+    sums[SUMS * k + SQUARES] += speed * speed;
+    sums[SUMS * k + NUMBER] += 1.0;
+    most[k] = std::max(most[k], speed / std::max(one, other));
+  }
+  clusters_.over_ranks(SUMS, sums, 1, most);
+  for (std::size_t k = 0; k < motions_.size(); ++k) {
+    const double *const s = &sums[SUMS * k];
+    motions_[k].slip = s[NUMBER] > 0.0 ? std::sqrt(s[SQUARES] / s[NUMBER]) : 0.0;
+    motions_[k].most_slip = most[k];
   }
 }

@@ -11,14 +11,9 @@ using namespace Inelastic_NS;
 
 namespace {
 
-// A contact of a moving particle with one that is held may end deeper than the tolerance less this
-// part of it only where the step asks for that.
+// The moving particles were solved for already: only where they would end deeper by so many
+// tolerances, because others are at rest, do their velocities change.
 constexpr double DEEPER = 0.1;
-// The part of the accuracy to which a contact of a moving particle with one that is held is solved.
-// A slow motion that goes away from what is held shows there: its contact opens.
-constexpr double REFINED = 1.0 / 16.0;
-// The same for a contact that is none of a cluster with held particles: the tolerance alone counts.
-constexpr double ANYTHING = 1.0e9;
 // Where more iterations would be needed, moving particles have no room beside those at rest:
 // nothing is stopped in the step.
 constexpr long MOST_ITERATIONS = 2000;
@@ -53,15 +48,15 @@ void HoldStill::go_back()
   turn_bodies();
 }
 
-bool HoldStill::run(const Held &held, const Constraints &constraints, double least_length)
+bool HoldStill::run(const Held &held, const Constraints &constraints)
 {
   // Moving particles may meet stopped ones that they would not have met, and then come upon others.
   constexpr int MOST_ROUNDS = 20;
   std::vector<double> &impulse = step_.problem.contacts.impulse;
   for (int round = 0; round < MOST_ROUNDS; ++round) {
-    const inelastic::SolverResult result = project(held, least_length);
+    const inelastic::SolverResult result = project(held);
     iterations_ += result.iterations;
-    if (result.status != inelastic::Status::CONVERGED || !result.accurate) return false;
+    if (result.status != inelastic::Status::CONVERGED) return false;
     turn_bodies();
     const std::size_t known = impulse.size();
     if (constraints.add_violated() > 0) {
@@ -99,13 +94,13 @@ bool HoldStill::has_room(const Held &held) const
   return true;
 }
 
-// Projects the predicted velocities with the held particles as obstacles, from the impulses of the
-// step.
-inelastic::SolverResult HoldStill::project(const Held &held, double least_length)
+// Projects the velocities of the step with the held particles as obstacles.
+inelastic::SolverResult HoldStill::project(const Held &held)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   moving_.timestep = problem.timestep;
   static_cast<inelastic::Unknowns &>(moving_) = problem;
+  moving_.predicted_velocity = step_.velocity;
   for (std::size_t i = 0; i < held.particles.size(); ++i) {
     if (!held.particles[i]) continue;
     moving_.inverse_mass[i] = 0.0;
@@ -122,32 +117,27 @@ inelastic::SolverResult HoldStill::project(const Held &held, double least_length
     const double *const n = &problem.contacts.normal[3 * c];
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
     if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
-    contacts.add_of(problem.contacts, c);
-    contacts.impulse.back() = problem.contacts.impulse[c];
-    source.push_back(c);
-    const auto either = [&](const std::vector<char> &marks) {
-      return (!problem.is_wall(i) && marks[i]) || (!problem.is_wall(j) && marks[j]);
-    };
-    // Other clusters stay as they are, unless they come to overlap what is held.
-    if (!either(held.beside)) contacts.refinement.back() = ANYTHING;
-    if (!either(held.particles)) continue;
     // A contact that counts as closed, and overlaps, is to end within the tolerance, the residual
     // included.
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
         (1.0 - DEEPER) * step_.settings.tolerance;
+    contacts.add_of(problem.contacts, c);
     contacts.gap.back() = std::min(problem.contacts.gap[c], ends_within);
-    contacts.refinement.back() = std::min(REFINED, problem.contacts.refinement[c]);
+    // With the step's own impulse a contact that may pull still does so by no more than it may. One
+    // that pushes keeps its impulse: where an obstacle seems to stay behind it was only slower, by
+    // less than what is known of its velocity.
+    const auto changes = problem.contacts.set[c].changes_of(problem.contacts.impulse[c]);
+    contacts.set.back() = {step_.may_hold(c) ? std::min(0.0, changes.least) : 0.0};
+    source.push_back(c);
   }
   inelastic::SolverLimits limits;
-  limits.tolerance = step_.settings.tolerance;
+  limits.tolerance = DEEPER * step_.settings.tolerance;
   limits.max_iterations = std::min(MOST_ITERATIONS, step_.settings.max_iterations);
-  limits.accuracy = step_.settings.accuracy;
-  limits.least_length = least_length;
   const inelastic::SolverResult result = solver_->solve(moving_, limits, ranks_);
   if (result.status != inelastic::Status::CONVERGED) return result;
   solver_->gap_operator().velocity_applied(moving_, step_.velocity.data());
   for (std::size_t k = 0; k < source.size(); ++k)
-    step_.problem.contacts.impulse[source[k]] = contacts.impulse[k];
+    step_.problem.contacts.impulse[source[k]] += contacts.impulse[k];
   return result;
 }
 

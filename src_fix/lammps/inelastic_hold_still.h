@@ -1,7 +1,6 @@
 // This room takes the velocities of particles at rest away (inelastic_rest.h). The moving particles
-// beside them were solved for with these velocities: they are solved for once more, with the
-// particles at rest as obstacles, so that nothing moves into these, and what they are pushed by is
-// what obstacles push.
+// beside them were solved for with these velocities: they are projected once more, with the
+// particles at rest as obstacles, so that nothing moves into these.
 
 #ifndef INELASTIC_HOLD_STILL_H
 #define INELASTIC_HOLD_STILL_H
@@ -22,13 +21,11 @@ class HoldStill {
  public:
   HoldStill(Step &step, GhostExchange &ranks, Movers &movers);
 
-  // What particles are to do, ghosts included: one mark per particle that is held, the velocity
-  // that it is to have, 3 per particle [length / time], and one mark per particle in a cluster in
-  // which some are held.
+  // What particles are to do, ghosts included: one mark per particle that is held, and the velocity
+  // that it is to have, 3 per particle [length / time].
   struct Held {
     std::vector<char> particles;
     std::vector<double> velocity;
-    std::vector<char> beside;
   };
   // `add_violated` adds constraints that the step's velocities violate, and returns how many all
   // ranks added; `excess` finds the excess that they leave (StepState).
@@ -42,7 +39,7 @@ class HoldStill {
 
   // Changes velocities and impulses of the step. Returns false where the moving particles find no
   // room, or would leave more excess: go_back() must follow then. Collective.
-  bool run(const Held &held, const Constraints &constraints, double least_length);
+  bool run(const Held &held, const Constraints &constraints);
 
   // The velocities that the forces of all contacts give, 3 per slot [length / time]: of what is
   // held they differ from the velocities of the step by what does not balance. Collective.
@@ -59,7 +56,7 @@ class HoldStill {
   long iterations() const { return iterations_; }    // since begin()
 
  private:
-  inelastic::SolverResult project(const Held &held, double least_length);
+  inelastic::SolverResult project(const Held &held);
   bool has_room(const Held &held) const;
   bool is_still(const Held &held, int slot) const;
   void turn_bodies();

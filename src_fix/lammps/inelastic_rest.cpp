@@ -20,6 +20,9 @@ namespace {
 // the mean speed that they would have without contacts, and its motion as a whole this part of what
 // resists it.
 constexpr double QUIET = 0.1;
+// A trial comes where this speed is at most so large a part, or some accuracies where these are
+// more: what is faster still moves when it has begun at rest.
+constexpr double SLOW = 0.005;
 // So many quiet steps come before a trial: a force that nothing balances would show.
 constexpr double PATIENCE = 8.0;
 // The count of a cluster at rest.
@@ -33,6 +36,13 @@ constexpr double PAUSE = 50.0;
 // below.
 constexpr double AT_REST = 5.0;
 constexpr double COARSEST_ACCURACY = 1.0e-3;
+// When it comes to rest it is no faster than so many along the normal of a contact with something
+// that is not held: as much of the force there is lacking.
+constexpr double SLIP = 1.0;
+// An error of the solver becomes smaller than this part in the more accurate solution of a trial.
+constexpr double ERRORS_LEFT = 0.5;
+// Below this part of what particles would have without contacts slip is round-off.
+constexpr double LEAST_SLIP = 1.0e-9;
 // A cluster moves if it is faster than this part of what it would be without contacts, whatever
 // resists it.
 constexpr double ROUND_OFF = 1.0e-12;
@@ -89,7 +99,7 @@ bool Rest::look(const inelastic::ProjectionResult &result)
 }
 
 void Rest::look_again()
-{ motions_.measure(limit()); }
+{ motions_.measure(limit(), PATIENCE); }
 
 bool Rest::is_quiet(const ClusterMotion &cluster) const
 {
@@ -104,6 +114,20 @@ bool Rest::moves(const ClusterMotion &cluster) const
 {
   const double round_off = ROUND_OFF * cluster.without_contacts;
   return cluster.held_moves || cluster.speed > std::max(limit() * cluster.resisted, round_off);
+}
+
+// Tells whether a quiet cluster is so slow that a trial may pass.
+bool Rest::is_slow(const ClusterMotion &cluster) const
+{
+  const double part = std::clamp(AT_REST * step_.settings.accuracy, SLOW, QUIET);
+  return cluster.held_speed <= part * cluster.without_contacts;
+}
+
+// Tells whether something held gives way to, or follows, what is not held.
+bool Rest::slips(const ClusterMotion &cluster) const
+{
+  return cluster.slip > LEAST_SLIP * cluster.without_contacts &&
+      cluster.most_slip > SLIP / AT_REST * limit();
 }
 
 bool Rest::is_at_rest(const ClusterMotion &cluster) const
@@ -134,9 +158,9 @@ long Rest::hold(const HoldStill::Constraints &constraints, double least_length)
   HoldStill::Held held;
   hold_still_.begin();
   while (any_stopped()) {
-    take_trial_impulses();
+    take_trial();
     held = held_now();
-    const bool has_room = hold_still_.run(held, constraints, least_length);
+    const bool has_room = hold_still_.run(held, constraints);
     if (has_room && !let_go_unbalanced(hold_still_.find_by_contacts(), held)) {
       hold_still_.stop(held);
       break;
@@ -164,7 +188,8 @@ void Rest::decide()
     if (is_at_rest(cluster))
       fates_[k] = is_quiet(cluster) && !moves(cluster) ? Fate::RESTS : Fate::LET_GO;
     // In the half kick of a run nothing is tried: velocities may have been given.
-    else if (cluster.quiet_steps == PATIENCE && is_quiet(cluster) && step_.kick == Kick::WHOLE)
+    else if (cluster.quiet_steps == PATIENCE && is_quiet(cluster) && is_slow(cluster) &&
+             step_.kick == Kick::WHOLE)
       fates_[k] = Fate::FAILS;
   }
   mark_held(Fate::RESTS);
@@ -173,6 +198,10 @@ void Rest::decide()
 // Marks the held particles of the clusters of one fate, as the step is now.
 void Rest::mark_held(Fate fate)
 {
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    const int k = motions_.clusters().of(static_cast<int>(i));
+    if (k != Clusters::NONE && fates_[k] == fate) held_[i] = 0;
+  }
   std::vector<double> marks(3 * held_.size(), 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!motions_.counts(i) || fates_[motions_.clusters().of(i)] != fate) continue;
@@ -222,28 +251,53 @@ RestTrial::Begun Rest::begin_trial() const
 // Tries the clusters that fail as long as no trial shows that they rest.
 long Rest::try_clusters(double least_length)
 {
-  double any = std::count(fates_.begin(), fates_.end(), Fate::FAILS) > 0 ? 1.0 : 0.0;
-  ranks_.reduce(nullptr, 0, &any, 1);
-  if (any == 0.0) return 0;
+  const auto any_has = [this](Fate fate) {
+    double any = std::count(fates_.begin(), fates_.end(), fate) > 0 ? 1.0 : 0.0;
+    ranks_.reduce(nullptr, 0, &any, 1);
+    return any > 0.0;
+  };
+  if (!any_has(Fate::FAILS)) return 0;
   mark_held(Fate::FAILS);
-  const bool solved = trial_.run(begin_trial(), least_length);
-  if (!solved) return trial_.iterations();
-  // The motions of the trial decide, with the clusters of the step.
+  const RestTrial::Begun begun = begin_trial();
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    if (begun.particles[i]) held_[i] = 0;
+  if (!trial_.run(begun, least_length)) return trial_.iterations();
+  std::vector<ClusterMotion> of_trial(motions_.size());
+  judge_trial(of_trial, [this](std::size_t k) {
+    return is_quiet(motions_[k]) && !moves(motions_[k]);
+  });
+  double any_slip = 0.0;
+  for (std::size_t k = 0; k < fates_.size(); ++k)
+    if (fates_[k] == Fate::PASSES && of_trial[k].slip > LEAST_SLIP * of_trial[k].without_contacts)
+      any_slip = 1.0;
+  ranks_.reduce(nullptr, 0, &any_slip, 1);
+  if (any_slip == 0.0) return trial_.iterations();
+  const bool solved = trial_.refine(begun, least_length);
+  const std::vector<ClusterMotion> coarse = of_trial;
+  judge_trial(of_trial, [&](std::size_t k) {
+    const double least = LEAST_SLIP * motions_[k].without_contacts;
+    return solved && fates_[k] == Fate::PASSES && is_quiet(motions_[k]) && !moves(motions_[k]) &&
+        !slips(motions_[k]) && motions_[k].slip <= std::max(least, ERRORS_LEFT * coarse[k].slip);
+  });
+  return trial_.iterations();
+}
+
+// Lets the clusters that are tried pass or fail by their motions in the trial, which it sets.
+void Rest::judge_trial(std::vector<ClusterMotion> &of_trial,
+                       const std::function<bool(std::size_t)> &passes)
+{
   std::vector<ClusterMotion> of_step(motions_.size());
   for (std::size_t k = 0; k < of_step.size(); ++k) of_step[k] = motions_[k];
   trial_.exchange();
   look_again();
-  for (std::size_t i = 0; i < held_.size(); ++i) {
-    const int k = motions_.clusters().of(static_cast<int>(i));
-    if (k != Clusters::NONE && fates_[k] == Fate::FAILS) held_[i] = 0;
+  for (std::size_t k = 0; k < fates_.size(); ++k) {
+    of_trial[k] = motions_[k];
+    if (fates_[k] != Fate::FAILS && fates_[k] != Fate::PASSES) continue;
+    fates_[k] = passes(k) ? Fate::PASSES : Fate::FAILS;
   }
-  for (std::size_t k = 0; k < fates_.size(); ++k)
-    if (fates_[k] == Fate::FAILS && is_quiet(motions_[k]) && !moves(motions_[k]))
-      fates_[k] = Fate::PASSES;
   mark_held(Fate::PASSES);
   trial_.exchange();
   motions_.swap(of_step);
-  return trial_.iterations();
 }
 
 bool Rest::is_stopped(int slot) const
@@ -266,18 +320,17 @@ HoldStill::Held Rest::held_now() const
 {
   HoldStill::Held held;
   held.particles.assign(held_.size(), 0);
-  held.beside.assign(held_.size(), 0);
   held.velocity.assign(3 * held_.size(), 0.0);
   for (std::size_t i = 0; i < held_.size(); ++i) {
     if (!is_stopped(static_cast<int>(i))) continue;
-    held.beside[i] = 1;
     held.particles[i] = held_[i];
     std::copy_n(motions_.of(static_cast<int>(i)).common.begin(), 3, &held.velocity[3 * i]);
   }
   return held;
 }
 
-void Rest::take_trial_impulses()
+// What passes ends as its trial does.
+void Rest::take_trial()
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
   const Clusters &clusters = motions_.clusters();
@@ -288,6 +341,9 @@ void Rest::take_trial_impulses()
   for (std::size_t c = 0; c < trial_.impulse().size() && c < contacts.size(); ++c)
     if (passes(contacts.first[c]) || passes(contacts.second[c]))
       contacts.impulse[c] = trial_.impulse()[c];
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    if (passes(static_cast<int>(i)))
+      std::copy_n(&trial_.velocity()[3 * i], 3, &step_.velocity[3 * i]);
 }
 
 /* ----------------------------------------------------------------------
@@ -331,9 +387,9 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!held.particles[i]) continue;
     const int k = clusters.of(i);
-    // A particle that stops in this step loses what it had before, too.
-    const std::vector<double> &balanced = fates_[k] == Fate::PASSES ? trial_.velocity_before()
-                                                                    : held.velocity;
+    // A particle that is stopped in this step loses what it had before, too.
+    const bool had = fates_[k] == Fate::PASSES && trial_.begins_at_rest(i);
+    const std::vector<double> &balanced = had ? trial_.velocity_before() : held.velocity;
     if (motions_.speed_between(i, by_contacts, balanced) > limit() * unit_[i]) unbalanced[k] = 1.0;
   }
   clusters.over_ranks(1, none, 1, unbalanced);

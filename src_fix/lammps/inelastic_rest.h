@@ -22,11 +22,16 @@
 // cluster is at rest; if not the step stays as it was solved, and the cluster is looked at again
 // later.
 //
+// Slow motion looks like an error of the solver: that of a light particle, for instance, which
+// follows two heavy ones that it drives apart. Where held particles touch others that are not held,
+// the trial is therefore solved once more, far more accurately: their velocities there must become
+// smaller, as errors do.
+//
 // In a cluster at rest the held particles are stopped, in every step. Moving particles beside them
-// are solved for once more, with these as obstacles (inelastic_hold_still.h). What pushes, or gives
-// way to, a held particle changes the forces on it: only where these still balance is anything
-// stopped. Otherwise the step stays as it was solved, and the cluster is let go. So what moves
-// loses no momentum, and what is stopped less than errors of the solver make.
+// are projected once more, with these as obstacles (inelastic_hold_still.h). Where that changes the
+// forces on a held particle so that they no longer balance, the step stays as it was solved, and
+// the cluster is let go. So what moves loses no momentum, and what is stopped no more than errors
+// of the solver are.
 //
 // A cluster at rest in which something would move is solved more accurately before it is let go.
 // Where the loads of a cluster at rest all change by one factor, its contact forces do.
@@ -42,6 +47,7 @@
 
 #include "pointers.h"
 
+#include <functional>
 #include <vector>
 
 namespace LAMMPS_NS::Inelastic_NS {
@@ -79,6 +85,8 @@ class Rest : protected Pointers {
 
   bool is_quiet(const ClusterMotion &cluster) const;
   bool moves(const ClusterMotion &cluster) const;
+  bool is_slow(const ClusterMotion &cluster) const;
+  bool slips(const ClusterMotion &cluster) const;
   bool is_at_rest(const ClusterMotion &cluster) const;
   bool needs_refinement(const ClusterMotion &cluster) const;
   void forget();
@@ -86,12 +94,14 @@ class Rest : protected Pointers {
 
   void decide();
   long try_clusters(double least_length);
+  void judge_trial(std::vector<ClusterMotion> &of_trial,
+                   const std::function<bool(std::size_t)> &passes);
   RestTrial::Begun begin_trial() const;
   void mark_held(Fate fate);
   bool is_stopped(int slot) const;
   bool any_stopped() const;
   HoldStill::Held held_now() const;
-  void take_trial_impulses();
+  void take_trial();
   bool let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held);
   void find_common_velocities(const std::vector<double> &by_contacts, HoldStill::Held &held);
   void end_step(const HoldStill::Held &held);

@@ -13,7 +13,7 @@ namespace {
 
 // The part of the accuracy to which contacts are solved in a trial. The residuals of a bed, which
 // is isostatic, make velocities of some fifty times their size.
-constexpr double REFINED = 1.0 / 4.0;
+constexpr double REFINED = 1.0 / 4.0, REFINED_AGAIN = 1.0 / 16.0;
 // Contacts that get a force in the trial count as closed in a further round of it.
 constexpr int MOST_ROUNDS = 4;
 
@@ -32,20 +32,29 @@ bool RestTrial::run(const Begun &begun, double least_length)
   movers_.predict();
   movers_.turn(problem, step_.velocity, step_.motion_of_bodies);
   tried_ = problem;
+  begun_at_rest_ = begun.particles;
   for (std::size_t i = 0; i < begun.particles.size(); ++i)
     if (begun.particles[i])
       for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
         tried_.predicted_velocity[k] += begun.common[k] - before_[k];
-  for (std::size_t c = 0; c < tried_.contacts.size(); ++c)
-    if (begun.constraints[c])
-      tried_.contacts.refinement[c] = std::min(tried_.contacts.refinement[c], REFINED);
+  iterations_ = 0;
+  return solve(begun, REFINED, least_length);
+}
+
+bool RestTrial::refine(const Begun &begun, double least_length)
+{ return solve(begun, REFINED_AGAIN, least_length); }
+
+bool RestTrial::solve(const Begun &begun, double refinement, double least_length)
+{
+  inelastic::ContactSet &contacts = tried_.contacts;
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    if (begun.constraints[c]) contacts.refinement[c] = std::min(contacts.refinement[c], refinement);
   inelastic::SolverLimits limits;
   limits.tolerance = step_.settings.tolerance;
   limits.max_iterations = step_.settings.max_iterations;
   limits.accuracy = step_.settings.accuracy;
   limits.least_length = least_length;
   velocity_.resize(step_.velocity.size());
-  iterations_ = 0;
   for (int round = 0; round < MOST_ROUNDS; ++round) {
     const bool closed = close_contacts(begun);
     if (round > 0 && !closed) break;

@@ -32,7 +32,10 @@ class RestTrial {
   // Solves the step so, from its impulses, with this length as the least target
   // (SolverLimits::least_length). Returns whether the targets were reached. Collective.
   bool run(const Begun &begun, double least_length);
-  long iterations() const { return iterations_; }
+  // Goes on to targets that are far smaller: a velocity that is an error of the solver becomes
+  // smaller, too, and one that is none stays. The rest is as for run().
+  bool refine(const Begun &begun, double least_length);
+  long iterations() const { return iterations_; }    // of both
 
   // Exchanges the predicted velocities, the velocities and the impulses of the step with those of
   // the trial.
@@ -44,8 +47,13 @@ class RestTrial {
   // which the trial would end without contacts.
   const std::vector<double> &velocity_before() const { return before_; }
   const std::vector<double> &predicted() const { return tried_.predicted_velocity; }
+  // Whether a particle began the trial at rest.
+  bool begins_at_rest(int i) const { return begun_at_rest_[i] != 0; }
+  // 3 per slot: those with which it ends.
+  const std::vector<double> &velocity() const { return velocity_; }
 
  private:
+  bool solve(const Begun &begun, double refinement, double least_length);
   bool close_contacts(const Begun &begun);
 
   Step &step_;
@@ -55,6 +63,7 @@ class RestTrial {
   std::unique_ptr<inelastic::Solver> solver_;
   inelastic::ContactProblem tried_;
   std::vector<double> velocity_, before_;
+  std::vector<char> begun_at_rest_;
   long iterations_ = 0;
 };
 

@@ -43,7 +43,8 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
   overlap = std::max(overlap, step_.largest_overlap);
 }
 
-void RunSummary::log(long shortened_steps, long unexpected_steps) const
+void RunSummary::log(long shortened_steps, long unexpected_steps,
+                     const HardSteps::Counts &hard) const
 {
   if (comm->me == 0) {
     utils::logmesg(
@@ -53,6 +54,7 @@ void RunSummary::log(long shortened_steps, long unexpected_steps) const
         steps_, iterations_, largest_overlap_, largest_overlap_ / step_.settings.tolerance,
         shortened_steps - shortened_before_);
     log_overlaps(unexpected_steps);
+    log_hard_steps(hard);
   }
   log_times();
 }
@@ -80,6 +82,17 @@ void RunSummary::log_overlaps(long unexpected_steps) const
                    unexpected_steps);
   if (at_rest_ > 0)
     utils::logmesg(lmp, "  in {} steps the scene was at rest, and nothing moved\n", at_rest_);
+}
+
+void RunSummary::log_hard_steps(const HardSteps::Counts &hard) const
+{
+  if (hard.shortened > 0)
+    utils::logmesg(lmp, "  {} steps were shortened because they could not be solved\n",
+                   hard.shortened);
+  if (hard.inaccurate > 0)
+    utils::logmesg(
+        lmp, "  in {} steps the accuracy was not reached, only the tolerance{}\n", hard.inaccurate,
+        hard.at_maxiter > 0 ? fmt::format("; {} of them ended at maxiter", hard.at_maxiter) : "");
   if (unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
                    unconverged_);

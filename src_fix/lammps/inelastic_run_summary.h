@@ -3,6 +3,7 @@
 #ifndef INELASTIC_RUN_SUMMARY_H
 #define INELASTIC_RUN_SUMMARY_H
 
+#include "inelastic_hard_steps.h"
 #include "inelastic_phase_clock.h"
 #include "inelastic_projection.h"
 #include "inelastic_step.h"
@@ -24,10 +25,11 @@ class RunSummary : protected Pointers {
   void add_unconverged() { ++unconverged_; }
 
   // Collective.
-  void log(long shortened_steps, long unexpected_steps) const;
+  void log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard) const;
 
  private:
   void log_overlaps(long unexpected_steps) const;
+  void log_hard_steps(const HardSteps::Counts &hard) const;
   void log_times() const;
 
   const Step &step_;

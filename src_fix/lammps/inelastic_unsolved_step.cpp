@@ -2,6 +2,7 @@
 
 #include "inelastic_constraints.h"
 #include "inelastic_ghost_exchange.h"
+#include "inelastic_hard_steps.h"
 #include "inelastic_mover.h"
 
 #include "atom.h"
@@ -19,8 +20,9 @@ using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
 
 UnsolvedStep::UnsolvedStep(LAMMPS *lmp, const Step &step, const Constraints &constraints,
-                           GhostExchange &ranks, const Movers &movers) :
-    Pointers(lmp), step_(step), constraints_(constraints), ranks_(ranks), movers_(movers)
+                           const HardSteps &hard, GhostExchange &ranks, const Movers &movers) :
+    Pointers(lmp), step_(step), constraints_(constraints), hard_(hard), ranks_(ranks),
+    movers_(movers)
 {
 }
 
@@ -71,6 +73,14 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
 {
   constexpr double LONG_ARC = 1.0;    // [radians]
   std::string cause;
+  if (hard_.is_hardly_solved(result)) {
+    cause = hard_.cause();
+    error->all(
+        FLERR,
+        "Fix inelastic: step {}: no time step down to {:.3g} is solved: even there {:.2g} of "
+        "what contacts change is left. {}",
+        update->ntimestep, update->dt, result.unresolved, cause);
+  }
   const std::string message = no_room_ ? no_room(result, cause) : out_of_iterations(result, cause);
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
   const double angle = movers_.any_turns() && constraints_.relinearised() ? largest_angle() : 0.0;

@@ -15,12 +15,13 @@ namespace LAMMPS_NS::Inelastic_NS {
 
 class Constraints;
 class GhostExchange;
+class HardSteps;
 class Movers;
 
 class UnsolvedStep : protected Pointers {
  public:
   UnsolvedStep(class LAMMPS *lmp, const Step &step, const Constraints &constraints,
-               GhostExchange &ranks, const Movers &movers);
+               const HardSteps &hard, GhostExchange &ranks, const Movers &movers);
 
   // At the start of a step, and of every trial of it with another time step.
   void begin_step() { no_room_ = false; }
@@ -53,6 +54,7 @@ class UnsolvedStep : protected Pointers {
 
   const Step &step_;
   const Constraints &constraints_;
+  const HardSteps &hard_;
   GhostExchange &ranks_;
   const Movers &movers_;
   double worst_ = -1.0;    // [length] what the named one leaves
