@@ -220,8 +220,7 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     if (scales.length * packed_residual <= limits.tolerance &&
         plateau_.lasts(result.iterations, most)) {
       iterations.impulses_before(scales, impulse);
-      if (judge(problem, limits, host, result) || result.residual.largest() <= limits.tolerance)
-        return Status::CONVERGED;
+      if (judge(problem, limits, host, result) || will_do(limits, result)) return Status::CONVERGED;
     }
 
     blur = least_residual<Real>(passed.farthest);

@@ -71,6 +71,10 @@ class AcceleratedProjectedGradient : public Solver {
   bool solve_slow_modes(ContactProblem &problem, const SolverLimits &limits, Host &host,
                         SolverResult &result);
 
+  // Tells whether impulses that were judged will do where their targets are not to be had.
+  static bool will_do(const SolverLimits &limits, const SolverResult &result)
+  { return result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED; }
+
   // Returns how many impulses of all ranks are above their least ones. Collective.
   static double number_loaded(const ContactProblem &problem, Host &host);
 

@@ -185,7 +185,7 @@ ColouredSweeps::leave_plateau(const PackedSweeps<Group> &sweeps, ContactProblem 
   const long most = most_on_plateau(number_loaded(problem, host));
   if (!plateau_.lasts(result.iterations, most)) return std::nullopt;
   // Where the targets are not to be had, the tolerance will do.
-  if (judge(problem, limits, host, result) || result.residual.largest() <= limits.tolerance) {
+  if (judge(problem, limits, host, result) || will_do(limits, result)) {
     result.status = Status::CONVERGED;
     return End::SOLVED;
   }

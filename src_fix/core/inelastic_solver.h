@@ -110,6 +110,10 @@ class Plateau {
   long marked_ = 0, tried_ = 0;
 };
 
+// A contact is hardly resolved if more than this part is left of what contacts change: forces then
+// say little.
+constexpr double HARDLY_RESOLVED = 0.1;
+
 // So many iterations without progress are of no use where impulses of so many constraints are not
 // their least ones: conjugate gradients, which sweeps and accelerated gradients do not surpass,
 // would have ended.

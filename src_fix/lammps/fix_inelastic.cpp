@@ -44,8 +44,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
     solver_(inelastic::make_solver(settings_.solver)), push_apart_(step_, constraints_, movers_),
     length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_, movers_),
-    check_(lmp, this, step_, ranks_, state_, movers_),
-    hard_(lmp, step_, ranks_), unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
+    check_(lmp, this, step_, ranks_, state_, movers_), hard_(lmp, step_, ranks_),
+    unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
   movers_.add(&spheres_);
@@ -405,8 +405,8 @@ inelastic::ProjectionResult FixInelastic::solve()
       push_apart_.run(atom, result, [this](long iterations) {
         return project(iterations);
       });
-    // What can hardly be solved looks solved in a step that is short enough, in which EPS is more than
-    // anything moves.
+    // What can hardly be solved looks solved in a step that is short enough, in which EPS is more
+    // than anything moves.
     const bool hardly = hard_.has_shortened() && hard_.is_hardly_solved(result);
     if (result.status != inelastic::Status::CONVERGED || hardly) {
       const bool no_room = result.status == inelastic::Status::INFEASIBLE;

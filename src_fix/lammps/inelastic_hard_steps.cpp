@@ -16,9 +16,8 @@ using namespace Inelastic_NS;
 
 namespace {
 
-// A contact is hardly resolved if more than this part is left of what contacts change of the
-// velocities of its sides.
-constexpr double HARDLY = 0.1;
+// After maxiter iterations so many accuracies may be left.
+constexpr double MOST_AT_MAXITER = 10.0;
 // So many such steps may come one after the other.
 constexpr long MOST_IN_A_ROW = 3;
 
@@ -36,7 +35,7 @@ bool HardSteps::looks() const
 bool HardSteps::is_hardly_solved(const inelastic::ProjectionResult &result) const
 {
   return looks() && result.status == inelastic::Status::CONVERGED && !result.accurate &&
-      result.unresolved > HARDLY;
+      result.unresolved > inelastic::HARDLY_RESOLVED;
 }
 
 std::string HardSteps::cause() const
@@ -94,7 +93,9 @@ void HardSteps::end_step(const inelastic::ProjectionResult &result)
   const bool at_maxiter = inaccurate && result.iterations >= step_.settings.max_iterations;
   if (inaccurate) ++counts_.inaccurate;
   if (at_maxiter) ++counts_.at_maxiter;
-  if (!at_maxiter && !is_hardly_solved(result)) {
+  const bool at_maxiter_far_off =
+      at_maxiter && result.unresolved > MOST_AT_MAXITER * step_.settings.accuracy;
+  if (!at_maxiter_far_off && !is_hardly_solved(result)) {
     in_a_row_ = 0;
     any_at_maxiter_ = false;
     most_unresolved_ = 0.0;

@@ -73,7 +73,7 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
 {
   constexpr double LONG_ARC = 1.0;    // [radians]
   std::string cause;
-  if (hard_.is_hardly_solved(result)) {
+  if (!no_room_ && hard_.is_hardly_solved(result)) {
     cause = hard_.cause();
     error->all(
         FLERR,
@@ -112,8 +112,9 @@ std::string UnsolvedStep::no_room(const inelastic::ProjectionResult &result,
                     constraints_.walls_move() ? ". Or walls that move leave no room" : "")
       : "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
         "are too many spheres";
+  const std::string &named = named_.empty() ? named_last_ : named_;
   return fmt::format("step {}: no velocities keep the surfaces apart{}{}, where {:.4g} is allowed",
-                     update->ntimestep, shorter, named_.empty() ? "" : ": " + named_,
+                     update->ntimestep, shorter, named.empty() ? "" : ": " + named,
                      step_.settings.tolerance);
 }
 

@@ -24,9 +24,15 @@ class UnsolvedStep : protected Pointers {
                const HardSteps &hard, GhostExchange &ranks, const Movers &movers);
 
   // At the start of a step, and of every trial of it with another time step.
-  void begin_step() { no_room_ = false; }
+  void begin_step()
+  {
+    no_room_ = false;
+    named_.clear();
+    named_last_.clear();
+  }
   void begin_trial()
   {
+    if (!named_.empty()) named_last_ = named_;
     named_.clear();
     worst_ = -1.0;
   }
@@ -57,8 +63,8 @@ class UnsolvedStep : protected Pointers {
   const HardSteps &hard_;
   GhostExchange &ranks_;
   const Movers &movers_;
-  double worst_ = -1.0;    // [length] what the named one leaves
-  std::string named_;
+  double worst_ = -1.0;               // [length] what the named one leaves
+  std::string named_, named_last_;    // of the trial, and of the last one that had one
   bool no_room_ = false;
 };
 

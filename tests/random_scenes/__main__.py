@@ -3,6 +3,8 @@
 python -m tests.random_scenes --minutes 20 --seed 1000     seeds from 1000 on, for 20 minutes
 python -m tests.random_scenes --scenes 100 --sanitize      100 scenes, under the address sanitizer
 python -m tests.random_scenes --seed 17 --scenes 1         one again; its files are kept
+python -m tests.random_scenes --minutes 9 --seed 5000000 --only "mass ratio"
+                                                           drawn from that seed on, as "size ratio"
 """
 
 from __future__ import annotations

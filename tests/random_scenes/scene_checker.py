@@ -15,6 +15,12 @@ the fix. In the first frame of a run v_n has no first half: the fix then project
 What pushes a bad start apart is no momentum. Where V_(n+1/2) is more than the kicks by all forces
 and the list's contacts give, the rest is that push: there must be none unless something overlaps
 by more than 2 EPS.
+
+All forces before the fix are known, and so is what the fix adds: over a step it changes the
+momentum of a sphere by h (F - F before), and by nothing else. Of a grain that is not stopped that
+is the sum of its contacts. Of a cluster, the grains that contacts with a force connect, it is the
+sum of the contacts with walls and frozen spheres, along every direction that none of these has a
+part of, whatever is stopped in it. Along the others stopping may take momentum away.
 """
 
 from __future__ import annotations
@@ -28,6 +34,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
 from tests.random_scenes.scene_generator import BODY_COLUMNS, CONTACTS, FROZEN, OUTSIDE
@@ -48,6 +56,8 @@ HALF_A_TURN = 3.0
 ENTANGLED = 0.05
 # Of the length of a normal at a wall.
 NORMAL_AT_WALL = 1e-9
+# Contacts hold a direction if their normals have more than such a part along it.
+HOLDS = 10 * NORMAL_AT_WALL
 
 
 @dataclass
@@ -166,6 +176,62 @@ def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
     return report
 
 
+@dataclass(frozen=True, eq=False)
+class Clusters:
+    """What contacts with a force connect, through bodies, but not through walls, frozen spheres.
+
+    Attributes
+    ----------
+    of_sphere : (spheres,) number of each one's cluster; -1 of what contacts do not move
+    grain : (spheres,) of each one, the first sphere of its body, or itself
+    held : (rows,) the sphere of each contact with a force with a wall or a frozen sphere
+    normal, force : (rows, 3) of these contacts; the force is that on the sphere
+    """
+
+    of_sphere: Array
+    grain: Array
+    held: Array
+    normal: Array
+    force: Array
+
+    def __iter__(self) -> Iterator[tuple[Array, Array]]:
+        """The spheres of each cluster, and the contacts that hold it."""
+        for number in np.unique(self.of_sphere[self.of_sphere >= 0]):
+            spheres = np.flatnonzero(self.of_sphere == number)
+            yield spheres, np.flatnonzero(self.of_sphere[self.held] == number)
+
+
+def clusters_of(listed: dict[str, Array], molecule: Array, movable: Array) -> Clusters:
+    """The clusters of a list of contacts; `movable` tells which spheres contacts move."""
+    count = len(molecule)
+    grain = np.arange(count)
+    for number in np.unique(molecule[molecule > 0]):
+        mine = np.flatnonzero(molecule == number)
+        grain[mine] = mine[0]
+    acts = listed["force"] != 0
+    i, j, pair, normal = (listed[name][acts] for name in ("i", "j", "pair", "n"))
+    force = normal * listed["force"][acts][:, None]
+    one, other = movable[i], pair & movable[j]
+    both = one & other
+    edges = np.concatenate([i[both], np.arange(count)]), np.concatenate([j[both], grain])
+    graph = coo_matrix((np.ones(len(edges[0])), edges), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    first, second = one & ~other, other & ~one
+    return Clusters(
+        np.where(movable, label, -1),
+        grain,
+        np.concatenate([i[first], j[second]]),
+        np.vstack([normal[first], normal[second]]),
+        np.vstack([force[first], -force[second]]),
+    )
+
+
+def free_directions(normals: Array) -> Array:
+    """(directions, 3) Unit vectors at right angles, along which none of the normals has a part."""
+    _, sizes, directions = np.linalg.svd(np.vstack([normals, np.zeros((3, 3))]))
+    return np.asarray(directions[sizes <= HOLDS])
+
+
 @dataclass(eq=False)
 class _Frame:
     """One step: what was read, and what follows from it."""
@@ -197,6 +263,8 @@ class _Frame:
     listed: dict[str, Any] | None = None
     ends: Array = field(default_factory=lambda: np.zeros(0))
     plain: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    # (spheres,) Whether its grain is stopped, and goes on with the one velocity of its cluster.
+    stopped: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
     # No bad overlap now and in the frame before; none now; the last frame of a run.
     quiet: bool = False
     settled: bool = True
@@ -631,8 +699,9 @@ class _Part:
             last is None or last.deepest <= 1.999 * self.eps
         )
         # The velocities of bodies in a restart file of a step that pushes hold a part of the push.
+        # Without `shorten` bodies leave in good scenes, too, what the next step pushes apart.
         may_hold_push = "restart within a run" in self.facts["words"] and (
-            self.facts["bad_start"] or self.facts["warn"]
+            self.facts["bad_start"] or self.facts["warn"] or not self.facts["shorten"]
         )
         quiet = quiet and not (last is None and may_hold_push)
         # A run ends by taking the push out; and begins without.
@@ -661,36 +730,11 @@ class _Part:
             )
         )
         alone = (new.molecule == 0) & (new.kind != FROZEN) & (new.kind != OUTSIDE)
-        added = new.force - new.before
+        if new.bodies is not None:
+            self.turned(new, last)
+        new.stopped = np.zeros(len(new.x), dtype=bool)
         if quiet:
-            # Between one frame and the next nothing but forces: exact, whatever the kick was.
-            scale = (
-                np.linalg.norm(new.force, axis=1)
-                + listed["size"]
-                + np.linalg.norm(new.before, axis=1)
-            )
-            inertia = new.mass / self.to_v / kick * np.linalg.norm(after, axis=1)
-            slack = 10 * ROUND_OFF * (scale + inertia + 1e-300)[:, None]
-            held = (new.kind == FROZEN) | (new.kind == OUTSIDE)
-            wanted = np.where(held[:, None], 0.0, listed["total"])
-            # Of what is at rest the velocity is taken away, which no contact force does.
-            alike = np.linalg.norm(after, axis=1) > 10 * ROUND_OFF * sizes
-            if new.bodies is not None:
-                resting = self.resting(new)
-                for row, mine, _ in self.members(new):
-                    alike[mine] &= not resting[row]
-            if self.has_pushed and new.bodies is not None:
-                # What a push has left in bodies in a line is still being taken away.
-                for _, mine, arm in self.members(new):
-                    alike[mine] &= not self.is_in_line(arm)
-            if new.bodies is not None:
-                # The round-off of a moment, of forces as far out as the surface, over short arms.
-                for _, mine, arm in self.members(new):
-                    longest = np.linalg.norm(arm, axis=1).max()
-                    slack[mine] *= 1 + new.radius[mine].max() / max(longest, 1e-300)
-            self.close(
-                "force added to a sphere", added[alike], wanted[alike], slack[alike], new.id[alike]
-            )
+            self.added(new, listed, after, sizes, kick)
             self.report.seen["momenta"] += int(alone.sum())
         settled = new.deepest <= 1.999 * self.eps
         if settled and not quiet:
@@ -711,12 +755,95 @@ class _Part:
         if not quiet:
             self.report.seen["pushed frames"] += 1
         if new.bodies is not None:
-            self.turned(new, last)
             self.pushed(new, last, listed, settled)
         velocity = self.velocities(new)
         self.complementary(new, listed, velocity, quiet)
         if quiet:
             self.energy(new, listed, predicted, velocity, kick, alone, sizes)
+
+    def added(
+        self, new: _Frame, listed: dict[str, Array], after: Array, sizes: Array, kick: float
+    ) -> None:
+        """What the fix adds is what contacts give; stopped grains have the cluster's velocity.
+
+        Between one frame and the next are nothing but forces: that is exact, whatever the kick was.
+        In a step that pushes apart forces hold the push, too, which the list does not tell.
+        """
+        scale = (
+            np.linalg.norm(new.force, axis=1) + listed["size"] + np.linalg.norm(new.before, axis=1)
+        )
+        inertia = new.mass / self.to_v / kick * np.linalg.norm(after, axis=1)
+        slack = 10 * ROUND_OFF * (scale + inertia + 1e-300)
+        movable = (new.kind != FROZEN) & (new.kind != OUTSIDE)
+        wanted = np.where(movable[:, None], listed["total"], 0.0)
+        clusters = clusters_of(listed, new.molecule, movable)
+        given = new.force - new.before
+        self.cluster_momenta(new, clusters, given, slack)
+        # Of what is at rest the velocity is taken away, which no contact force does.
+        alike = np.linalg.norm(after, axis=1) > 10 * ROUND_OFF * sizes
+        of_grain = after.copy()
+        if new.bodies is not None:
+            resting = self.resting(new)
+            for row, mine, arm in self.members(new):
+                of_grain[mine] = new.body_v[row]
+                alike[mine] &= not resting[row]
+                # What a push has left in bodies in a line is still being taken away.
+                alike[mine] &= not (self.has_pushed and self.is_in_line(arm))
+                # The round-off of a moment, of forces as far out as the surface, over short arms.
+                longest = np.linalg.norm(arm, axis=1).max()
+                slack[mine] *= 1 + new.radius[mine].max() / max(longest, 1e-300)
+        other = (np.abs(given - wanted) > slack[:, None]).any(axis=1)
+        new.stopped = self.stopped(clusters, alike & other, of_grain, sizes)
+        self.report.seen["stopped spheres"] += int((other & (new.stopped | ~alike)).sum())
+        alike &= ~new.stopped
+        self.close(
+            "force added to a sphere",
+            given[alike],
+            wanted[alike],
+            slack[alike, None],
+            new.id[alike],
+        )
+
+    def cluster_momenta(self, new: _Frame, clusters: Clusters, given: Array, slack: Array) -> None:
+        """Where nothing from outside holds it, a cluster has its momentum, whatever is stopped.
+
+        Allowed is the round-off of all that is added up, 1e-11 of forces and of momenta / h.
+        """
+        for spheres, rows in clusters:
+            free = free_directions(clusters.normal[rows])
+            # What holds has a part along these directions that is round-off of its normals.
+            lost = free @ (given[spheres].sum(axis=0) - clusters.force[rows].sum(axis=0))
+            allowed = slack[spheres].sum()
+            self.report.seen["directions of clusters"] += len(free)
+            for direction, force in zip(free, lost, strict=True):
+                if abs(force) > allowed:
+                    self.wrong(
+                        "momentum of a cluster",
+                        f"nothing holds that of {int(new.id[spheres[0]])}, {len(spheres)} spheres, "
+                        f"along {np.round(direction, 6)}, where a force of {force:.3g} is added "
+                        f"({allowed:.3g} allowed)",
+                    )
+
+    def stopped(self, clusters: Clusters, off: Array, v: Array, sizes: Array) -> Array:
+        """(spheres,) Which grains move as their cluster does, of those with forces of no contact.
+
+        Stopped grains have one velocity, along which no wall and no frozen sphere holds them: each
+        shares it with another one, or is alone against what holds it.
+        """
+        found = np.zeros(len(off), dtype=bool)
+        for spheres, rows in clusters:
+            if not off[spheres].any():
+                continue
+            slack = 10 * ROUND_OFF * sizes[spheres].max()
+            grains = np.unique(clusters.grain[spheres])
+            for grain in np.unique(clusters.grain[spheres[off[spheres]]]):
+                others = grains[grains != grain]
+                shared = np.linalg.norm(v[others] - v[grain], axis=1) <= slack
+                own = clusters.normal[rows][clusters.grain[clusters.held[rows]] == grain]
+                moves = np.abs(own @ v[grain]) > slack
+                if not moves.any() and (shared.any() or len(own)):
+                    found |= clusters.grain == grain
+        return found
 
     def moved(self, new: _Frame, last: _Frame) -> None:
         """Positions follow from velocities and forces; and velocities from one kick."""
@@ -829,6 +956,8 @@ class _Part:
             lengths[row] = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
         # Of what is at rest the momentum is taken away.
         resting = self.resting(new)
+        for row, mine, _ in self.members(new):
+            resting[row] |= new.stopped[mine[0]]
         kept_v[resting], kept_l[resting] = new.body_v[resting], new.body_l[resting]
         was_pushed = last is not None and not last.settled
         # The last step of a run takes the push out of the whole-step velocity, not out of this one.

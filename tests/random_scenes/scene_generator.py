@@ -32,6 +32,11 @@ UNITS = {
 }
 # Of a place for a sphere or a body.
 TRIALS = 100
+# Seeds below draw no unequal grains: those that have found something stay the scenes that they are.
+UNEQUAL_FROM = 5_000_000
+# A part of the seeds from there on, and how unequal their grains are at most.
+UNEQUAL = 0.2
+MASS_RATIO, SIZE_RATIO = 1e4, 20.0
 # A fifth of the default: where there is room most steps need far fewer.
 ITERATIONS = "maxiter 20000"
 FREE, FROZEN, OUTSIDE, CREATED = 1, 2, 3, 4
@@ -154,9 +159,15 @@ class _Draw:
     shapes: list[Shape] = field(default_factory=list)
     regions: list[tuple[str, list[str]]] = field(default_factory=list)
     walls: int = 0
+    # 1 where they are not drawn.
+    mass_ratio: float = 1.0
+    size_ratio: float = 1.0
 
     def __post_init__(self) -> None:
         self.random = np.random.default_rng([self.seed, self.attempt])
+        # What makes grains unequal is drawn apart from all else, so that scenes without it do not
+        # depend on it.
+        self.unequal = np.random.default_rng([self.seed, self.attempt, 3])
 
     # --- chances
 
@@ -204,8 +215,12 @@ class _Draw:
         self.spread = self.one(1.0, 1.0, 1.05, 2.0, 5.0, 20.0)
         if self.bodies:
             self.spread = min(self.spread, 3.0)
+        self.draw_ratios()
         most = 1.3 if self.solver == "uzawa" else 2.4
         self.count = int(self.log(0.3, most)) if self.chance(0.5) else int(self.log(1, most))
+        if self.mass_ratio * self.size_ratio > 1.0:
+            # One grain alone is equal to itself.
+            self.count = max(self.count, 3)
         self.smallest = self.radius / self.spread
         self.tolerance = self.smallest * self.log(-4 if self.solver == "uzawa" else -8, -2)
         self.bad = self.chance(0.15)
@@ -224,12 +239,38 @@ class _Draw:
 
     # --- what is to be placed
 
+    def draw_ratios(self) -> None:
+        """Ratios of masses, at one size, and of diameters: of the first, of the second, or both."""
+        if self.seed < UNEQUAL_FROM or self.crowded or self.unequal.random() >= UNEQUAL:
+            return
+        of_masses, of_sizes = [(True, False), (False, True), (True, True)][self.unequal.integers(3)]
+        if of_masses:
+            self.mass_ratio = float(MASS_RATIO ** self.unequal.uniform(0.25, 1))
+        if of_sizes:
+            self.size_ratio = float(SIZE_RATIO ** self.unequal.uniform(0.25, 1))
+            self.spread = self.size_ratio
+
+    def part_of_radius(self, count: int) -> FloatArray:
+        """Radii, as parts of the largest, of units or of the spheres of one."""
+        uniform = self.random.uniform(1 / self.spread, 1.0, count)
+        if self.size_ratio == 1.0:
+            return uniform
+        # By the logarithm: as many are small as large.
+        return np.asarray(self.size_ratio ** -self.unequal.random(count))
+
+    def densities(self, count: int) -> FloatArray:
+        """Of each sphere: between two limits, or one of two substances."""
+        part = self.unequal.random(count)
+        if self.unequal.random() < 0.5:
+            part = np.round(part)
+        return np.asarray(self.density * self.mass_ratio ** (part - 0.5))
+
     def draw_units(self) -> None:
         """Spheres and bodies: radii and offsets of each."""
         self.to_place: list[tuple[FloatArray, FloatArray]] = []
         placed = 0
         while placed < self.count:
-            radius = self.radius * float(self.random.uniform(1 / self.spread, 1.0))
+            radius = self.radius * float(self.part_of_radius(1)[0])
             if self.spread > 4 and not self.to_place:
                 radius = self.radius
             shape = np.zeros((1, 3))
@@ -240,7 +281,10 @@ class _Draw:
             radii = np.full(len(shape), radius)
             offsets = 2 * radius * (shape - shape.mean(axis=0))
             if len(shape) > 1 and self.spread > 1 and self.chance(0.5):
-                radii = radius * self.random.uniform(1 / self.spread, 1.0, len(shape))
+                radii = radius * self.part_of_radius(len(shape))
+                if self.size_ratio > 1.0:
+                    # A part of a part may be smaller than the ratio tells.
+                    radii = np.maximum(radii, self.radius / self.size_ratio)
                 self.note("bodies of several radii")
             if self.inertia == "point":
                 # Each needs a group and a fix of its own.
@@ -585,6 +629,11 @@ class _Draw:
         self.has_bodies = bool(numbers_of.any())
         if self.bodies and not self.has_bodies:
             self.bodies, self.inertia = False, None
+        if self.mass_ratio > 1.0:
+            density = self.densities(len(x))
+            self.note("mass ratio")
+        if self.size_ratio > 1.0:
+            self.note("size ratio")
         speed = np.sqrt(self.gravity * self.radius) * self.log(-1, 0.7)
         if not self.shorten and not self.chance(0.05):
             speed = min(speed, 0.1 * self.skin / self.timestep)

@@ -90,6 +90,7 @@ def _may_be_slow(facts: Facts) -> bool:
         or facts["closing"]
         or facts["warn"]
         or "densities differ" in facts["words"]
+        or "mass ratio" in facts["words"]
         or facts["tightest"] < 1e-6 * facts["smallest"]
         # The part of the forces that the tolerance asks to be known.
         or facts["tightest"] < 1e-7 * facts["pull"]

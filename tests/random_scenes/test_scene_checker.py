@@ -46,11 +46,11 @@ class Good:
     screen: str
 
 
-def ran(deck: str, bodies: bool, folder: Path) -> Good:
+def ran(deck: str, bodies: bool, folder: Path, walls: int = 6) -> Good:
     """Let a deck run for 25 steps with the dumps that the checker reads."""
     (folder / "redump.in").write_text(redump(bodies))
     lines = [deck, "variable part loop 0 99 pad", f"variable eps string {EPS}"]
-    lines += [*computes(bodies, 6), "include redump.in", "run 25", 'print "@end"', ""]
+    lines += [*computes(bodies, walls), "include redump.in", "run 25", 'print "@end"', ""]
     (folder / "deck.in").write_text("\n".join(lines))
     programs = installed()
     result = answer(folder, 1, programs.program, programs.environment)
@@ -118,6 +118,23 @@ def of_bodies(tmp_path_factory: pytest.TempPathFactory) -> Good:
     velocities, spins = rigid_velocities(bodies, RADIUS, [0, -3, 0], [1, 2, 3])
     settings = {**SETTINGS, "inertia": "solid", "velocities": velocities, "spins": spins}
     return ran(body_scene(bodies, RADIUS, folder, fixes=STORED, **settings), True, folder)
+
+
+@pytest.fixture(scope="module")
+def on_a_floor(tmp_path_factory: pytest.TempPathFactory) -> Good:
+    """Spheres that nothing holds along x and z, where the box is periodic; the last one flies."""
+    folder = tmp_path_factory.mktemp("on_a_floor")
+    points = random_points(30, (ROOM[0], (RADIUS, 1.0), ROOM[2]), 2 * RADIUS, seed=5)
+    points = np.vstack([points, [0.25, 1.7, 0.25]])
+    velocities = np.random.default_rng(6).normal([0, -1, 0], 0.3, points.shape)
+    floor = "region floor plane 0 0 0 0 1 0 side in units box"
+    settings = SETTINGS | {"fixes": f"{floor}\n{STORED}", "options": "region floor"}
+    deck = scene(points, RADIUS, folder, velocities=velocities, boundary="p f p", **settings)
+    good = ran(deck, False, folder, 1)
+    shape = {"kind": "plane", "through": [0.0] * 3, "normal": [0.0, 1.0, 0.0]}
+    facts = {"walls": 1, "periodic": [True, False, True]}
+    shapes = [shape | {"inside": True, "number": 1}]
+    return Good(folder, good.facts | facts | {"shapes": shapes}, good.screen)
 
 
 def kinds(report: Report) -> set[str]:
@@ -239,6 +256,80 @@ def test_a_falsified_dump(name: str, spheres: Good, tmp_path: Path) -> None:
     change(given, tolerance(spheres))
     given.write()
     assert expected in kinds(check(folder, spheres.facts, spheres.screen))
+
+
+def largest_cluster(folder: Path) -> list[int]:
+    """Rows of the spheres that contacts connect in the last frame, by hand."""
+    given = dump(folder, "contacts", CONTACTS)
+    pairs = [{int(one), int(other)} for one, other in given.frames[-1][:, :2] if other > 0]
+    clusters: list[set[int]] = []
+    for pair in pairs:
+        joined = [cluster for cluster in clusters if cluster & pair]
+        clusters = [cluster for cluster in clusters if not cluster & pair]
+        clusters.append(pair.union(*joined))
+    # The dump is sorted by the numbers, which begin with 1.
+    largest = max(clusters, key=lambda cluster: len(cluster))
+    return [number - 1 for number in sorted(largest)]
+
+
+def stop(folder: Path, rows: list[int], part: float, apart: float = 0.0) -> None:
+    """Let spheres have one velocity in the last step: a part of their momentum along x and z.
+
+    The velocities before it stay what they are. That of a sphere without walls is larger by a part
+    `apart`.
+    """
+    given, h = dump(folder, "particles"), SETTINGS["timestep"]
+    v = [given.of(name) for name in ("vx", "vy", "vz")]
+    force = [given.of(name) for name in ("fx", "fy", "fz")]
+    outer = [given.of(f"f_before[{k}]") for k in (1, 2, 3)]
+    spheres = given.frames[-1][rows]
+    mass = spheres[:, [given.of("mass")]]
+    earlier = spheres[:, v] - 0.5 * h * spheres[:, force] / mass
+    momentum = (mass * earlier + h * spheres[:, outer]).sum(axis=0)
+    later = np.tile(part * momentum * [1, 0, 1] / mass.sum(), (len(rows), 1))
+    inside = np.flatnonzero(spheres[:, given.of("f_contact[2]")] == 0)
+    later[inside[0]] *= 1 + apart
+    spheres[:, v] = 0.5 * (earlier + later)
+    spheres[:, force] = mass * (later - earlier) / h
+    given.frames[-1][rows] = spheres
+    given.write()
+
+
+STOPPED = {
+    "a cluster goes on as it did": ((1.0,), set()),
+    "a cluster is slower by 1e-9": ((1 - 1e-9,), {"momentum of a cluster"}),
+    "a cluster stands still": ((0.0,), {"momentum of a cluster"}),
+    "a sphere is faster than its cluster": (
+        (1.0, 1e-6),
+        {"force added to a sphere", "momentum of a cluster"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STOPPED)
+def test_what_is_stopped_keeps_the_momentum_of_its_cluster(
+    name: str, on_a_floor: Good, tmp_path: Path
+) -> None:
+    """Along x and z, where no wall holds the cluster; along y its momentum may be taken away."""
+    how, expected = STOPPED[name]
+    assert check(on_a_floor.folder, on_a_floor.facts, on_a_floor.screen).problems == []
+    folder = changed(on_a_floor, tmp_path)
+    rows = largest_cluster(folder)
+    assert len(rows) > 2
+    stop(folder, rows, *how)
+    found = kinds(check(folder, on_a_floor.facts, on_a_floor.screen))
+    assert found & {"force added to a sphere", "momentum of a cluster"} == expected
+
+
+def test_a_grain_that_flies_is_stopped(on_a_floor: Good, tmp_path: Path) -> None:
+    """Only its momentum tells: what stands still may be held, and have forces of no contact."""
+    folder = changed(on_a_floor, tmp_path)
+    given = dump(folder, "particles")
+    touching = given.frames[-1][:, [given.of("f_contact[1]"), given.of("f_contact[2]")]]
+    assert touching[-1].tolist() == [0, 0]
+    stop(folder, [len(touching) - 1], 0.0)
+    found = kinds(check(folder, on_a_floor.facts, on_a_floor.screen))
+    assert found == {"momentum of a cluster"}
 
 
 def test_a_push_that_is_kept(tmp_path: Path) -> None:
