@@ -120,6 +120,17 @@ bool AcceleratedProjectedGradient::is_time_for_slow_modes(long iteration)
       plateau_.is_time_to_try(iteration, mass_ratio_ >= VERY_DIFFERENT);
 }
 
+bool AcceleratedProjectedGradient::settle_on_plateau(ContactProblem &problem,
+                                                     const SolverLimits &limits, Host &host,
+                                                     SolverResult &result)
+{
+  if (is_time_for_slow_modes(result.iterations) && solve_slow_modes(problem, limits, host, result))
+    return true;
+  const bool accurate = judge(problem, limits, host, result);
+  return accurate ||
+      (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED);
+}
+
 bool AcceleratedProjectedGradient::solve_slow_modes(ContactProblem &problem,
                                                     const SolverLimits &limits, Host &host,
                                                     SolverResult &result)
@@ -216,11 +227,10 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     result.trend.see(result.iterations, scales.length * packed_residual);
     trend_of_targets_.see(result.iterations, passed.unsolved);
     plateau_.see(result.iterations, passed.unsolved);
-    // Where the targets are not to be had, the tolerance will do.
     if (scales.length * packed_residual <= limits.tolerance &&
         plateau_.lasts(result.iterations, most)) {
       iterations.impulses_before(scales, impulse);
-      if (judge(problem, limits, host, result) || will_do(limits, result)) return Status::CONVERGED;
+      if (settle_on_plateau(problem, limits, host, result)) return Status::CONVERGED;
     }
 
     blur = least_residual<Real>(passed.farthest);

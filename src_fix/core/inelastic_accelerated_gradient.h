@@ -71,9 +71,11 @@ class AcceleratedProjectedGradient : public Solver {
   bool solve_slow_modes(ContactProblem &problem, const SolverLimits &limits, Host &host,
                         SolverResult &result);
 
-  // Tells whether impulses that were judged will do where their targets are not to be had.
-  static bool will_do(const SolverLimits &limits, const SolverResult &result)
-  { return result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED; }
+  // Ends a search whose residuals no longer come down and are within the tolerance, if it can: slow
+  // modes are solved, or little is left of what contacts change. Where the targets are not to be
+  // had, the tolerance will do. Collective.
+  bool settle_on_plateau(ContactProblem &problem, const SolverLimits &limits, Host &host,
+                         SolverResult &result);
 
   // Returns how many impulses of all ranks are above their least ones. Collective.
   static double number_loaded(const ContactProblem &problem, Host &host);

@@ -184,8 +184,7 @@ ColouredSweeps::leave_plateau(const PackedSweeps<Group> &sweeps, ContactProblem 
   if (tries && solve_slow_modes(problem, limits, host, result)) return End::SOLVED;
   const long most = most_on_plateau(number_loaded(problem, host));
   if (!plateau_.lasts(result.iterations, most)) return std::nullopt;
-  // Where the targets are not to be had, the tolerance will do.
-  if (judge(problem, limits, host, result) || will_do(limits, result)) {
+  if (settle_on_plateau(problem, limits, host, result)) {
     result.status = Status::CONVERGED;
     return End::SOLVED;
   }

@@ -38,47 +38,48 @@ bool HardSteps::is_hardly_solved(const inelastic::ProjectionResult &result) cons
       result.unresolved > inelastic::HARDLY_RESOLVED;
 }
 
-std::string HardSteps::cause() const
+std::string HardSteps::of_masses(double ratio) const
 {
-  constexpr double DIFFERENT = 1000.0;
   const inelastic::ContactProblem &problem = step_.problem;
   double heaviest = 0.0, lightest = EXTREME;
   tagint heavy = 0, light = 0;
-  double loaded = 0.0;
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     if (!problem.contacts.is_loaded(c)) continue;
-    loaded += 1.0;
     for (const int i : {problem.contacts.first[c], problem.contacts.second[c]}) {
       if (problem.is_wall(i) || !problem.is_mobile(i)) continue;
       const double mass = 1.0 / problem.inverse_mass_of(i);
-      if (mass > heaviest) {
-        heaviest = mass;
-        heavy = atom->tag[i];
-      }
-      if (mass < lightest) {
-        lightest = mass;
-        light = atom->tag[i];
-      }
+      if (mass > heaviest) heavy = atom->tag[i];
+      if (mass < lightest) light = atom->tag[i];
+      heaviest = std::max(heaviest, mass);
+      lightest = std::min(lightest, mass);
     }
   }
-  const std::string with_heavy = fmt::format("{:.4g} (atom {})", heaviest, heavy);
-  const std::string with_light = fmt::format("{:.4g} (atom {})", lightest, light);
-  const int of_heavy = ranks_.rank_of_largest(heaviest, &heaviest);
-  const std::string heavy_said = ranks_.said_by(of_heavy, with_heavy);
-  double least = -lightest;
-  const int of_light = ranks_.rank_of_largest(-lightest, &least);
-  const std::string light_said = ranks_.said_by(of_light, with_light);
-  lightest = -least;
-  double particles = 0.0;
+  const auto said = [this](double size, double mass, tagint atom_id, double *largest) {
+    const int rank = ranks_.rank_of_largest(size, largest);
+    return ranks_.said_by(rank, fmt::format("{:.4g} (atom {})", mass, atom_id));
+  };
+  double most, least;
+  const std::string of_heavy = said(heaviest, heaviest, heavy, &most);
+  const std::string of_light = said(-lightest, lightest, light, &least);
+  least = -least;
+  if (!(most >= ratio * least)) return "";
+  return fmt::format(
+      "Masses of {} and {} push one another, {:.2g} : 1: make them less different, or "
+      "lower the timestep",
+      of_heavy, of_light, most / least);
+}
+
+std::string HardSteps::cause() const
+{
+  constexpr double DIFFERENT = 1.0e3;
+  const std::string masses = of_masses(DIFFERENT);
+  double sums[2] = {0.0, 0.0};    // contacts with a force, particles
+  for (std::size_t c = 0; c < step_.problem.contacts.size(); ++c)
+    if (step_.problem.contacts.is_loaded(c)) sums[0] += 1.0;
   for (int i = 0; i < atom->nlocal; ++i)
-    if (step_.is_mobile(atom, i)) particles += 1.0;
-  double sums[2] = {loaded, particles};
+    if (step_.is_mobile(atom, i)) sums[1] += 1.0;
   ranks_.reduce(sums, 2, nullptr, 0);
-  if (heaviest >= DIFFERENT * lightest)
-    return fmt::format(
-        "Masses of {} and {} push one another, {:.2g} : 1: make them less different, "
-        "or lower the timestep",
-        heavy_said, light_said, heaviest / lightest);
+  if (!masses.empty()) return masses;
   return fmt::format(
       "{:.0f} contacts with a force are too many, or too alike, for {:.0f} particles: "
       "raise maxiter ({}), the tolerance or the accuracy, or lower the timestep",

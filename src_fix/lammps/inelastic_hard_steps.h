@@ -40,6 +40,9 @@ class HardSteps : protected Pointers {
 
   // What masses, or which network, the contacts of the step are of. Collective.
   std::string cause() const;
+  // The same where masses in contacts with a force differ by so large a ratio; empty otherwise.
+  // Collective.
+  std::string of_masses(double ratio) const;
 
   // Notes how a step ends. Errors, with `maxiter ... warn` a warning: too many in a row could
   // hardly be solved, or ended at maxiter. Collective.

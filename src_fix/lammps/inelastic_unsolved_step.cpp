@@ -85,7 +85,11 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
   const double angle = movers_.any_turns() && constraints_.relinearised() ? largest_angle() : 0.0;
   const char *const or_shorter = step_.settings.shorten ? "" : ", or use shorten yes";
-  if (angle > LONG_ARC)
+  constexpr double BEYOND_ORDINARY = 1.0e6;    // ratios of masses
+  const std::string masses = no_room_ ? "" : hard_.of_masses(BEYOND_ORDINARY);
+  if (!masses.empty())
+    cause = masses;
+  else if (angle > LONG_ARC)
     cause = fmt::format("Bodies spin by up to {:.3g} radians in this step: lower the timestep{}",
                         angle, or_shorter);
   else if (law_parts())

@@ -28,7 +28,9 @@ def crystal(cells: int) -> FloatArray:
     return np.asarray(places + np.array([0, RADIUS, 0]))
 
 
-def run_crystal(folder: Path, cells: int, temperature: float, ranks: int = 1) -> Run:
+def run_crystal(
+    folder: Path, cells: int, temperature: float, ranks: int = 1, options: str = ""
+) -> Run:
     """Run it with random velocities of this temperature; v_floor is of the weights."""
     side = cells * sqrt(2)
     points = crystal(cells)
@@ -42,7 +44,7 @@ def run_crystal(folder: Path, cells: int, temperature: float, ranks: int = 1) ->
         box=((0.0, side), (-1.0, side + 2.0), (0.0, side)),
         boundary="p f p",
         fixes=f"variable floor equal -f_contact[1][2]/{weights:.17g}\n",
-        options="region floor shorten yes",
+        options=f"region floor shorten yes {options}",
         thermo="step dt f_contact[1] f_contact[4] v_floor",
     )
     heated = f"velocity all create {temperature:g} 4711 dist gaussian\n" if temperature else ""
