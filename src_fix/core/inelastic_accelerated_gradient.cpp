@@ -70,6 +70,12 @@ namespace {
     host.choose_ghosts(chosen);
   }
 
+  Status not_finite(SolverResult &result)
+  {
+    result.residual = UNSOLVED;
+    return Status::NOT_FINITE;
+  }
+
   packed::Passed over_ranks(const packed::Passed &mine, Host &host)
   {
     double sums[3] = {mine.uphill, mine.curved, mine.steep};
@@ -198,6 +204,17 @@ void AcceleratedProjectedGradient::raise_curvature(const packed::Passed &passed)
     curvature_ = std::min(MARGIN * passed.steep / passed.curved, MOST_RAISE * curvature_);
 }
 
+double AcceleratedProjectedGradient::see(const packed::Passed &passed, const Scales &scales,
+                                         SolverResult &result)
+{
+  raise_curvature(passed);
+  const double packed_residual = std::max(-passed.least_gap, passed.most_under_force);
+  result.trend.see(result.iterations, scales.length * packed_residual);
+  trend_of_targets_.see(result.iterations, passed.unsolved);
+  plateau_.see(result.iterations, passed.unsolved);
+  return packed_residual;
+}
+
 template <typename Real>
 Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
                                              ContactProblem &problem, const SolverLimits &limits,
@@ -218,15 +235,8 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     const packed::Passed passed =
         over_ranks(iterations.advance(momentum.next(curvature_), 1.0 / curvature_, blur), host);
     ++result.iterations;
-    if (!std::isfinite(passed.steep)) {
-      result.residual = UNSOLVED;
-      return Status::NOT_FINITE;
-    }
-    raise_curvature(passed);
-    const double packed_residual = std::max(-passed.least_gap, passed.most_under_force);
-    result.trend.see(result.iterations, scales.length * packed_residual);
-    trend_of_targets_.see(result.iterations, passed.unsolved);
-    plateau_.see(result.iterations, passed.unsolved);
+    if (!std::isfinite(passed.steep)) return not_finite(result);
+    const double packed_residual = see(passed, scales, result);
     if (scales.length * packed_residual <= limits.tolerance &&
         plateau_.lasts(result.iterations, most)) {
       iterations.impulses_before(scales, impulse);

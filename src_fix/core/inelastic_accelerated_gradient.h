@@ -100,6 +100,9 @@ class AcceleratedProjectedGradient : public Solver {
                  const SolverLimits &limits, const Scales &scales, Host &host,
                  SolverResult &result);
 
+  // Takes note of how an iteration went. Returns its largest residual, in packed units.
+  double see(const packed::Passed &passed, const Scales &scales, SolverResult &result);
+
   // Raises L if the last change of the impulses shows it too small.
   void raise_curvature(const packed::Passed &passed);
 

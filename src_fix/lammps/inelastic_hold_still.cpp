@@ -5,6 +5,7 @@
 #include "inelastic_mover.h"
 
 #include <algorithm>
+#include <utility>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
@@ -53,6 +54,7 @@ bool HoldStill::run(const Held &held, const Constraints &constraints)
   // Moving particles may meet stopped ones that they would not have met, and then come upon others.
   constexpr int MOST_ROUNDS = 20;
   std::vector<double> &impulse = step_.problem.contacts.impulse;
+  solved_ = step_.velocity;
   for (int round = 0; round < MOST_ROUNDS; ++round) {
     const inelastic::SolverResult result = project(held);
     iterations_ += result.iterations;
@@ -117,17 +119,24 @@ inelastic::SolverResult HoldStill::project(const Held &held)
     const double *const n = &problem.contacts.normal[3 * c];
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
     if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
-    // A contact that counts as closed, and overlaps, is to end within the tolerance, the residual
-    // included.
+    // An obstacle counts as if it went on as it was solved for: what is not known of its velocity
+    // takes no force away from what it touches. But a contact that counts as closed, and overlaps,
+    // is to end within the tolerance, the residual included.
+    double along = 0.0;
+    for (const auto &[slot, sign] : {std::pair{i, 1.0}, std::pair{j, -1.0}}) {
+      if (problem.is_wall(slot) || !held.particles[slot]) continue;
+      for (std::size_t d = 0; d < 3; ++d) {
+        const std::size_t k = 3 * static_cast<std::size_t>(slot) + d;
+        along += sign * n[d] * (solved_[k] - held.velocity[k]);
+      }
+    }
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
         (1.0 - DEEPER) * step_.settings.tolerance;
     contacts.add_of(problem.contacts, c);
-    contacts.gap.back() = std::min(problem.contacts.gap[c], ends_within);
-    // With the step's own impulse a contact that may pull still does so by no more than it may. One
-    // that pushes keeps its impulse: where an obstacle seems to stay behind it was only slower, by
-    // less than what is known of its velocity.
+    contacts.gap.back() = std::min(problem.contacts.gap[c] + problem.timestep * along, ends_within);
+    // With the step's own impulse the contact still pushes, or pulls by no more than it may.
     const auto changes = problem.contacts.set[c].changes_of(problem.contacts.impulse[c]);
-    contacts.set.back() = {step_.may_hold(c) ? std::min(0.0, changes.least) : 0.0};
+    contacts.set.back() = {std::min(0.0, changes.least)};
     source.push_back(c);
   }
   inelastic::SolverLimits limits;

@@ -67,7 +67,7 @@ class HoldStill {
   // Not the solver of the steps, which learns from them.
   std::unique_ptr<inelastic::Solver> solver_;
   inelastic::ContactProblem moving_;
-  std::vector<double> velocity_before_, impulse_before_, by_contacts_;
+  std::vector<double> velocity_before_, impulse_before_, solved_, by_contacts_;
   double excess_before_ = 0.0;
   long iterations_ = 0;
 };

@@ -377,8 +377,31 @@ void Rest::find_common_velocities(const std::vector<double> &by_contacts, HoldSt
   }
 }
 
-// Lets clusters go, or fails them, in which the forces on a held particle do not balance. Sets the
-// velocities that the others keep. Returns whether there are such clusters. Collective.
+// Returns the constraints with a force whose gaps would end open by more than the tolerance,
+// because what is held stays behind what moves.
+std::vector<std::size_t> Rest::opened_under_force(const HoldStill::Held &held) const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  std::vector<std::size_t> opened;
+  const auto velocity_of = [&](int slot) {
+    const bool is_held = !step_.problem.is_wall(slot) && held.particles[slot];
+    return (is_held ? held.velocity : step_.velocity).data() + 3 * static_cast<std::size_t>(slot);
+  };
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    if (!(contacts.impulse[c] > 0.0)) continue;
+    const double *const one = velocity_of(contacts.first[c]);
+    const double *const other = velocity_of(contacts.second[c]);
+    const double between[3] = {one[0] - other[0], one[1] - other[1], one[2] - other[2]};
+    const double at_end = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
+        step_.problem.timestep * dot(&contacts.normal[3 * c], between);
+    if (at_end > step_.settings.tolerance) opened.push_back(c);
+  }
+  return opened;
+}
+
+// Lets clusters go, or fails them, in which the forces on a held particle do not balance, or keep a
+// gap open. Sets the velocities that the others keep. Returns whether there are such clusters.
+// Collective.
 bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held)
 {
   find_common_velocities(by_contacts, held);
@@ -391,6 +414,11 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
     const bool had = fates_[k] == Fate::PASSES && trial_.begins_at_rest(i);
     const std::vector<double> &balanced = had ? trial_.velocity_before() : held.velocity;
     if (motions_.speed_between(i, by_contacts, balanced) > limit() * unit_[i]) unbalanced[k] = 1.0;
+  }
+  for (const std::size_t c : opened_under_force(held)) {
+    const inelastic::ContactSet &contacts = step_.problem.contacts;
+    for (const int i : {contacts.first[c], contacts.second[c]})
+      if (is_stopped(i)) unbalanced[static_cast<std::size_t>(clusters.of(i))] = 1.0;
   }
   clusters.over_ranks(1, none, 1, unbalanced);
   double any = 0.0;

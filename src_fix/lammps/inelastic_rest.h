@@ -103,6 +103,7 @@ class Rest : protected Pointers {
   HoldStill::Held held_now() const;
   void take_trial();
   bool let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held);
+  std::vector<std::size_t> opened_under_force(const HoldStill::Held &held) const;
   void find_common_velocities(const std::vector<double> &by_contacts, HoldStill::Held &held);
   void end_step(const HoldStill::Held &held);
 

@@ -742,8 +742,9 @@ class _Part:
             kept = last.momentum_size if last is not None else 0.0
             new.momentum_size = np.maximum(sizes, kept)
             slack = 10 * ROUND_OFF * (new.momentum_size + 1e-300)[:, None]
-            names = new.id[alone]
-            self.close("push kept", after[alone], momentum[alone], slack[alone], names)
+            # What comes to rest in the step keeps none, either.
+            moves = alone & (np.linalg.norm(after, axis=1) > 10 * ROUND_OFF * sizes)
+            self.close("push kept", after[moves], momentum[moves], slack[moves], new.id[moves])
             self.report.seen["ends of pushing"] += 1
         elif not settled and last is not None:
             new.momentum_size = np.maximum(sizes, last.momentum_size)
