@@ -34,16 +34,11 @@ void HoldStill::begin()
   iterations_ = 0;
 }
 
-void HoldStill::take_back_impulses()
-{
-  // Constraints that were added since had none.
-  impulse_before_.resize(step_.problem.contacts.size(), 0.0);
-  step_.problem.contacts.impulse = impulse_before_;
-}
-
 void HoldStill::go_back()
 {
-  take_back_impulses();
+  // Constraints that were added since had no impulse.
+  impulse_before_.resize(step_.problem.contacts.size(), 0.0);
+  step_.problem.contacts.impulse = impulse_before_;
   step_.velocity = velocity_before_;
   step_.excess = excess_before_;
   turn_bodies();

@@ -48,9 +48,7 @@ class HoldStill {
   // Takes the velocities of what is held from these on, and tells the movers. Collective.
   void stop(const Held &held);
 
-  // Gives the step its impulses again as they were kept; with go_back() its velocities and excess,
-  // too.
-  void take_back_impulses();
+  // Gives the step again what was kept of it.
   void go_back();
 
   long iterations() const { return iterations_; }    // since begin()

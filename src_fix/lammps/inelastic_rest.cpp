@@ -166,12 +166,9 @@ long Rest::hold(const HoldStill::Constraints &constraints, double least_length)
       break;
     }
     hold_still_.go_back();
-    if (!has_room) {
-      // What rests does so again in the next step, perhaps.
-      held = HoldStill::Held{};
-      break;
-    }
     held = HoldStill::Held{};
+    // Without room nothing is stopped in this step; what rests does so again in the next, perhaps.
+    if (!has_room) break;
   }
   end_step(held);
   return iterations + hold_still_.iterations();
@@ -461,7 +458,6 @@ void Rest::end_step(const HoldStill::Held &held)
       own = std::min(cluster.quiet_steps, PATIENCE - 1.0) + 1.0;
     else
       own = std::min(cluster.quiet_steps, 0.0);
-    if (fate == Fate::LET_GO) own = std::min(own, 0.0);
   }
   ranks_.reduce(nullptr, 0, maxima, 2);
   any_stopped_ = maxima[0] > 0.0;
