@@ -123,6 +123,7 @@ void ClusterMotions::measure_resistance()
       double *const of_particle = &resistance_[3 * static_cast<std::size_t>(i)];
       of_particle[0] += impulse * along * along;
       if (open) of_particle[1] += 1.0;
+      of_particle[2] += 1.0;
     }
   }
   ranks_.sum_over_ghosts(resistance_.data());
@@ -144,6 +145,7 @@ Motion ClusterMotions::motion_of(int i) const
     taken += m * dot(change, change);
     resisted += resistance_[3 * static_cast<std::size_t>(k)];
     if (resistance_[3 * static_cast<std::size_t>(k) + 1] > 0.0) motion.closes = true;
+    if (resistance_[3 * static_cast<std::size_t>(k) + 2] > 0.0) motion.touched = true;
   };
   if (step_.is_member(i)) {
     const inelastic::RigidBodies &bodies = problem.bodies;
@@ -184,7 +186,10 @@ double ClusterMotions::unit(int i, const Motion &motion) const
 { return std::min(motion.taken, motions_[clusters_.of(i)].without_contacts); }
 
 bool ClusterMotions::is_held(int i, const Motion &motion) const
-{ return !motion.closes && (motion.speed == 0.0 || motion.resisted >= HELD * unit(i, motion)); }
+{
+  return motion.touched && !motion.closes &&
+      (motion.speed == 0.0 || motion.resisted >= HELD * unit(i, motion));
+}
 
 void ClusterMotions::measure_clusters()
 {

@@ -41,6 +41,7 @@ struct Motion {
   double speed = 0.0;       // [length / time] root mean square by mass
   double taken = 0.0;       // [length / time] what contacts change of its velocity
   double resisted = 0.0;    // [length / time] sum of lambda (n . v)^2 / (m v^2)
+  bool touched = false;     // a contact has a force
   bool closes = false;      // a contact with a force is open by more than the tolerance
 };
 
@@ -94,8 +95,8 @@ class ClusterMotions : protected Pointers {
                        const std::vector<double> &other) const;
   // What a speed of a particle is compared with [length / time] (inelastic_rest.h).
   double unit(int i, const Motion &motion) const;
-  // Tells whether a particle is held, as one without motion is. One that still has a gap to close
-  // is not: its force would stay across the gap.
+  // Tells whether a particle is held, as one without motion is that something touches. One that
+  // still has a gap to close is not: its force would stay across the gap.
   bool is_held(int i, const Motion &motion) const;
 
  private:
@@ -129,7 +130,8 @@ class ClusterMotions : protected Pointers {
   GhostExchange &ranks_;
   AtomState &state_;
   Clusters clusters_;
-  // 3 per particle: the sum of lambda (n . v)^2, the number of gaps to close, and nothing
+  // 3 per particle: the sum of lambda (n . v)^2, the number of gaps to close, and of contacts with
+  // a force
   std::vector<double> resistance_;
   std::vector<ClusterMotion> motions_;
 };

@@ -234,12 +234,9 @@ RestTrial::Begun Rest::begin_trial() const
   };
   RestTrial::Begun begun;
   begun.particles.assign(held_.size(), 0);
-  begun.common.assign(3 * held_.size(), 0.0);
-  for (std::size_t i = 0; i < held_.size(); ++i) {
-    if (!held_[i] || !is_tried(static_cast<int>(i))) continue;
-    begun.particles[i] = 1;
-    std::copy_n(motions_.of(static_cast<int>(i)).common.begin(), 3, &begun.common[3 * i]);
-  }
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    begun.particles[i] = held_[i] && is_tried(static_cast<int>(i));
+  begun.common = common_velocities(trial_.velocity_before(), begun.particles);
   for (std::size_t c = 0; c < contacts.size(); ++c)
     begun.constraints.push_back(is_tried(contacts.first[c]) || is_tried(contacts.second[c]));
   return begun;
@@ -255,7 +252,9 @@ long Rest::try_clusters(double least_length)
   };
   if (!any_has(Fate::FAILS)) return 0;
   mark_held(Fate::FAILS);
-  const RestTrial::Begun begun = begin_trial();
+  trial_.begin();
+  begun_ = begin_trial();
+  const RestTrial::Begun &begun = begun_;
   for (std::size_t i = 0; i < held_.size(); ++i)
     if (begun.particles[i]) held_[i] = 0;
   if (!trial_.run(begun, least_length)) return trial_.iterations();
@@ -295,6 +294,20 @@ void Rest::judge_trial(std::vector<ClusterMotion> &of_trial,
   mark_held(Fate::PASSES);
   trial_.exchange();
   motions_.swap(of_step);
+  fail_what_is_not_held();
+}
+
+// Fails clusters with a particle that began the trial at rest and is not held when it ends: it
+// would lose what it had.
+void Rest::fail_what_is_not_held()
+{
+  const Clusters &clusters = motions_.clusters();
+  std::vector<double> none(clusters.size(), 0.0), lost(clusters.size(), 0.0);
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (begun_.particles[i] && !held_[i]) lost[clusters.of(i)] = 1.0;
+  clusters.over_ranks(1, none, 1, lost);
+  for (std::size_t k = 0; k < fates_.size(); ++k)
+    if (fates_[k] == Fate::PASSES && lost[k] > 0.0) fates_[k] = Fate::FAILS;
 }
 
 bool Rest::is_stopped(int slot) const
@@ -347,31 +360,55 @@ void Rest::take_trial()
    whether forces balance
 ------------------------------------------------------------------------- */
 
-// The velocity that the held particles of a cluster keep is that with which the forces of all
-// contacts leave its momentum what it is, along directions in which nothing outside holds it.
-void Rest::find_common_velocities(const std::vector<double> &by_contacts, HoldStill::Held &held)
+// Returns for each marked particle the mean of these velocities (3 per particle) over those of its
+// cluster, by mass, along directions in which nothing outside holds the cluster. Collective.
+std::vector<double> Rest::common_velocities(const std::vector<double> &velocity,
+                                            const std::vector<char> &marked) const
 {
   const Clusters &clusters = motions_.clusters();
   enum { MASS, MOMENTUM, SUMS = MOMENTUM + 3 };
   std::vector<double> sums(SUMS * clusters.size(), 0.0), none(clusters.size(), 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
-    if (!held.particles[i]) continue;
+    if (!marked[i]) continue;
     double *const s = &sums[SUMS * static_cast<std::size_t>(clusters.of(i))];
     const double mass = mass_of(atom, i);
     s[MASS] += mass;
     for (int d = 0; d < 3; ++d)
-      s[MOMENTUM + d] += mass * by_contacts[3 * static_cast<std::size_t>(i) + d];
+      s[MOMENTUM + d] += mass * velocity[3 * static_cast<std::size_t>(i) + d];
   }
   clusters.over_ranks(SUMS, sums, 1, none);
-  for (std::size_t i = 0; i < held.particles.size(); ++i) {
-    if (!held.particles[i]) continue;
+  std::vector<double> common(3 * marked.size(), 0.0);
+  for (std::size_t i = 0; i < marked.size(); ++i) {
+    if (!marked[i]) continue;
     const auto k = static_cast<std::size_t>(clusters.of(static_cast<int>(i)));
     const double *const s = &sums[SUMS * k];
     const std::array<double, 3> mean = {s[MOMENTUM] / s[MASS], s[MOMENTUM + 1] / s[MASS],
                                         s[MOMENTUM + 2] / s[MASS]};
-    const std::array<double, 3> common = motions_[k].held.without(mean);
-    std::copy_n(common.begin(), 3, &held.velocity[3 * i]);
+    const std::array<double, 3> of_cluster = motions_[k].held.without(mean);
+    std::copy_n(of_cluster.begin(), 3, &common[3 * i]);
   }
+  return common;
+}
+
+// Marks what contacts with a force touch, or touch its body, owned or not. Collective.
+std::vector<char> Rest::touched_particles() const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  std::vector<double> touches(3 * held_.size(), 0.0);
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    for (const int i : {contacts.first[c], contacts.second[c]})
+      if (contacts.impulse[c] != 0.0 && !step_.problem.is_wall(i))
+        touches[3 * static_cast<std::size_t>(i)] = 1.0;
+  ranks_.sum_over_ghosts(touches.data());
+  std::vector<char> touched(held_.size());
+  for (std::size_t i = 0; i < touched.size(); ++i) touched[i] = touches[3 * i] > 0.0;
+  const inelastic::RigidBodies &bodies = step_.problem.bodies;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    char any = 0;
+    for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) any |= touched[bodies.member[k]];
+    for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) touched[bodies.member[k]] = any;
+  }
+  return touched;
 }
 
 // Returns the constraints with a force whose gaps would end open by more than the tolerance,
@@ -396,22 +433,31 @@ std::vector<std::size_t> Rest::opened_under_force(const HoldStill::Held &held) c
   return opened;
 }
 
-// Lets clusters go, or fails them, in which the forces on a held particle do not balance, or keep a
-// gap open. Sets the velocities that the others keep. Returns whether there are such clusters.
-// Collective.
+// Lets clusters go, or fails them, in which the forces on a held particle do not balance, or are
+// none, or keep a gap open. Sets the velocities that the others keep. Returns whether there are
+// such clusters. Collective.
 bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held)
 {
-  find_common_velocities(by_contacts, held);
+  // With it the forces of all contacts leave the momentum of a cluster what it is.
+  held.velocity = common_velocities(by_contacts, held.particles);
   const Clusters &clusters = motions_.clusters();
+  // What begins its rest in this step loses what it had beyond the common velocity, too.
+  std::vector<double> balanced = held.velocity;
+  for (std::size_t i = 0; i < held.particles.size(); ++i) {
+    const int k = clusters.of(static_cast<int>(i));
+    if (!held.particles[i] || fates_[k] != Fate::PASSES || !begun_.particles[i]) continue;
+    for (std::size_t n = 3 * i; n < 3 * i + 3; ++n)
+      balanced[n] += trial_.velocity_before()[n] - begun_.common[n];
+  }
   std::vector<double> none(clusters.size(), 0.0), unbalanced(clusters.size(), 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!held.particles[i]) continue;
     const int k = clusters.of(i);
-    // A particle that is stopped in this step loses what it had before, too.
-    const bool had = fates_[k] == Fate::PASSES && trial_.begins_at_rest(i);
-    const std::vector<double> &balanced = had ? trial_.velocity_before() : held.velocity;
     if (motions_.speed_between(i, by_contacts, balanced) > limit() * unit_[i]) unbalanced[k] = 1.0;
   }
+  const std::vector<char> touched = touched_particles();
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (held.particles[i] && !touched[i]) unbalanced[clusters.of(i)] = 1.0;
   for (const std::size_t c : opened_under_force(held)) {
     const inelastic::ContactSet &contacts = step_.problem.contacts;
     for (const int i : {contacts.first[c], contacts.second[c]})

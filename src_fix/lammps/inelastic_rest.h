@@ -98,13 +98,16 @@ class Rest : protected Pointers {
                    const std::function<bool(std::size_t)> &passes);
   RestTrial::Begun begin_trial() const;
   void mark_held(Fate fate);
+  void fail_what_is_not_held();
   bool is_stopped(int slot) const;
   bool any_stopped() const;
   HoldStill::Held held_now() const;
   void take_trial();
   bool let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held);
+  std::vector<char> touched_particles() const;
   std::vector<std::size_t> opened_under_force(const HoldStill::Held &held) const;
-  void find_common_velocities(const std::vector<double> &by_contacts, HoldStill::Held &held);
+  std::vector<double> common_velocities(const std::vector<double> &velocity,
+                                        const std::vector<char> &marked) const;
   void end_step(const HoldStill::Held &held);
 
   Step &step_;
@@ -112,6 +115,7 @@ class Rest : protected Pointers {
   AtomState &state_;
   ClusterMotions motions_;
   RestTrial trial_;
+  RestTrial::Begun begun_;    // of the trial
   HoldStill hold_still_;
   std::vector<Fate> fates_;    // by cluster
   // By particle, ghosts included: whether it is stopped if its cluster rests or passes; and by

@@ -24,15 +24,18 @@ RestTrial::RestTrial(Step &step, GhostExchange &ranks, Movers &movers) :
 {
 }
 
-bool RestTrial::run(const Begun &begun, double least_length)
+void RestTrial::begin()
 {
   const inelastic::ContactProblem &problem = step_.problem;
   before_.assign(problem.predicted_velocity.size(), 0.0);
   movers_.find_velocity_before(before_);
   movers_.predict();
   movers_.turn(problem, step_.velocity, step_.motion_of_bodies);
-  tried_ = problem;
-  begun_at_rest_ = begun.particles;
+}
+
+bool RestTrial::run(const Begun &begun, double least_length)
+{
+  tried_ = step_.problem;
   for (std::size_t i = 0; i < begun.particles.size(); ++i)
     if (begun.particles[i])
       for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)

@@ -29,6 +29,9 @@ class RestTrial {
     std::vector<char> constraints;
   };
 
+  // Finds the velocities before the forces of the step. Collective.
+  void begin();
+
   // Solves the step so, from its impulses, with this length as the least target
   // (SolverLimits::least_length). Returns whether the targets were reached. Collective.
   bool run(const Begun &begun, double least_length);
@@ -47,8 +50,6 @@ class RestTrial {
   // which the trial would end without contacts.
   const std::vector<double> &velocity_before() const { return before_; }
   const std::vector<double> &predicted() const { return tried_.predicted_velocity; }
-  // Whether a particle began the trial at rest.
-  bool begins_at_rest(int i) const { return begun_at_rest_[i] != 0; }
   // 3 per slot: those with which it ends.
   const std::vector<double> &velocity() const { return velocity_; }
 
@@ -63,7 +64,6 @@ class RestTrial {
   std::unique_ptr<inelastic::Solver> solver_;
   inelastic::ContactProblem tried_;
   std::vector<double> velocity_, before_;
-  std::vector<char> begun_at_rest_;
   long iterations_ = 0;
 };
 
