@@ -30,6 +30,8 @@ constexpr double RESTS = PATIENCE + 1.0;
 // The part of the accuracy to which contacts are solved before a cluster at rest is let go. The
 // residuals of a bed, which is isostatic, make velocities of some fifty times their size.
 constexpr double REFINED = 1.0 / 4.0;
+// So often a trial begins anew without particles that it does not find held.
+constexpr int MOST_TRIALS = 3;
 // After a trial in which something held moved the next one comes so many quiet steps later.
 constexpr double PAUSE = 50.0;
 // A particle at rest is no faster than so many accuracies; a coarser accuracy counts as the one
@@ -257,24 +259,30 @@ long Rest::try_clusters(double least_length)
   const RestTrial::Begun &begun = begun_;
   for (std::size_t i = 0; i < held_.size(); ++i)
     if (begun.particles[i]) held_[i] = 0;
-  if (!trial_.run(begun, least_length)) return trial_.iterations();
   std::vector<ClusterMotion> of_trial(motions_.size());
-  judge_trial(of_trial, [this](std::size_t k) {
-    return is_quiet(motions_[k]) && !moves(motions_[k]);
-  });
+  bool solved = trial_.run(begun, least_length);
+  for (int k = 0; solved && k < MOST_TRIALS; ++k) {
+    if (k > 0) solved = trial_.run_again(begun, least_length);
+    judge_trial(of_trial, [&](std::size_t c) {
+      return solved && is_quiet(motions_[c]) && !moves(motions_[c]);
+    });
+    if (!drop_what_is_not_held()) break;
+  }
+  if (!solved) return trial_.iterations();
   double any_slip = 0.0;
   for (std::size_t k = 0; k < fates_.size(); ++k)
     if (fates_[k] == Fate::PASSES && of_trial[k].slip > LEAST_SLIP * of_trial[k].without_contacts)
       any_slip = 1.0;
   ranks_.reduce(nullptr, 0, &any_slip, 1);
   if (any_slip == 0.0) return trial_.iterations();
-  const bool solved = trial_.refine(begun, least_length);
+  solved = trial_.refine(begun, least_length);
   const std::vector<ClusterMotion> coarse = of_trial;
   judge_trial(of_trial, [&](std::size_t k) {
     const double least = LEAST_SLIP * motions_[k].without_contacts;
     return solved && fates_[k] == Fate::PASSES && is_quiet(motions_[k]) && !moves(motions_[k]) &&
         !slips(motions_[k]) && motions_[k].slip <= std::max(least, ERRORS_LEFT * coarse[k].slip);
   });
+  drop_what_is_not_held();
   return trial_.iterations();
 }
 
@@ -294,20 +302,30 @@ void Rest::judge_trial(std::vector<ClusterMotion> &of_trial,
   mark_held(Fate::PASSES);
   trial_.exchange();
   motions_.swap(of_step);
-  fail_what_is_not_held();
 }
 
-// Fails clusters with a particle that began the trial at rest and is not held when it ends: it
-// would lose what it had.
-void Rest::fail_what_is_not_held()
+// A particle that began the trial at rest and is not held when it ends would lose what it had: its
+// cluster fails, and the particle is left out of what begins at rest. Returns whether there is one.
+// Collective.
+bool Rest::drop_what_is_not_held()
 {
   const Clusters &clusters = motions_.clusters();
   std::vector<double> none(clusters.size(), 0.0), lost(clusters.size(), 0.0);
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (begun_.particles[i] && !held_[i]) lost[clusters.of(i)] = 1.0;
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    const int k = clusters.of(static_cast<int>(i));
+    if (!begun_.particles[i] || held_[i] || fates_[k] != Fate::PASSES) continue;
+    begun_.particles[i] = 0;
+    lost[k] = 1.0;
+  }
   clusters.over_ranks(1, none, 1, lost);
-  for (std::size_t k = 0; k < fates_.size(); ++k)
-    if (fates_[k] == Fate::PASSES && lost[k] > 0.0) fates_[k] = Fate::FAILS;
+  double any = 0.0;
+  for (std::size_t k = 0; k < fates_.size(); ++k) {
+    if (fates_[k] != Fate::PASSES || lost[k] == 0.0) continue;
+    fates_[k] = Fate::FAILS;
+    any = 1.0;
+  }
+  ranks_.reduce(nullptr, 0, &any, 1);
+  return any > 0.0;
 }
 
 bool Rest::is_stopped(int slot) const

@@ -98,7 +98,7 @@ class Rest : protected Pointers {
                    const std::function<bool(std::size_t)> &passes);
   RestTrial::Begun begin_trial() const;
   void mark_held(Fate fate);
-  void fail_what_is_not_held();
+  bool drop_what_is_not_held();
   bool is_stopped(int slot) const;
   bool any_stopped() const;
   HoldStill::Held held_now() const;

@@ -33,14 +33,27 @@ void RestTrial::begin()
   movers_.turn(problem, step_.velocity, step_.motion_of_bodies);
 }
 
-bool RestTrial::run(const Begun &begun, double least_length)
+void RestTrial::set_up(const Begun &begun)
 {
   tried_ = step_.problem;
   for (std::size_t i = 0; i < begun.particles.size(); ++i)
     if (begun.particles[i])
       for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
         tried_.predicted_velocity[k] += begun.common[k] - before_[k];
+}
+
+bool RestTrial::run(const Begun &begun, double least_length)
+{
+  set_up(begun);
   iterations_ = 0;
+  return solve(begun, REFINED, least_length);
+}
+
+bool RestTrial::run_again(const Begun &begun, double least_length)
+{
+  const std::vector<double> reached = tried_.contacts.impulse;
+  set_up(begun);
+  tried_.contacts.impulse = reached;
   return solve(begun, REFINED, least_length);
 }
 

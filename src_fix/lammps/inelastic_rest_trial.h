@@ -35,6 +35,8 @@ class RestTrial {
   // Solves the step so, from its impulses, with this length as the least target
   // (SolverLimits::least_length). Returns whether the targets were reached. Collective.
   bool run(const Begun &begun, double least_length);
+  // Does the same from the impulses of the last trial of the step.
+  bool run_again(const Begun &begun, double least_length);
   // Goes on to targets that are far smaller: a velocity that is an error of the solver becomes
   // smaller, too, and one that is none stays. The rest is as for run().
   bool refine(const Begun &begun, double least_length);
@@ -54,6 +56,7 @@ class RestTrial {
   const std::vector<double> &velocity() const { return velocity_; }
 
  private:
+  void set_up(const Begun &begun);
   bool solve(const Begun &begun, double refinement, double least_length);
   bool close_contacts(const Begun &begun);
 
