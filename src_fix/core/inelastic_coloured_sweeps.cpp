@@ -31,7 +31,7 @@ namespace {
   constexpr long REFRESH_EVERY = 50;
 
   // The residual is looked at in every so many sweeps at least, to see whether it comes down.
-  constexpr long PLATEAU_EVERY = 50;
+  constexpr long PLATEAU_EVERY = 50, LEAST_PLATEAU = 150;
 
   // Sweeps diverge if their largest change of an impulse grows to so many times that of the first.
   constexpr double DIVERGED = 1.0e3;
@@ -179,7 +179,7 @@ ColouredSweeps::leave_plateau(const PackedSweeps<Group> &sweeps, ContactProblem 
 {
   plateau_.see(result.iterations, find_unsolved(sweeps, blur, host));
   const bool tries = is_time_for_slow_modes(result.iterations);
-  if (!tries && !plateau_.lasts(result.iterations, most_on_plateau(0.0))) return std::nullopt;
+  if (!tries && !plateau_.lasts(result.iterations, LEAST_PLATEAU)) return std::nullopt;
   sweeps.impulses(scales, problem.contacts.impulse);
   if (tries && solve_slow_modes(problem, limits, host, result)) return End::SOLVED;
   const long most = most_on_plateau(number_loaded(problem, host));
@@ -189,7 +189,8 @@ ColouredSweeps::leave_plateau(const PackedSweeps<Group> &sweeps, ContactProblem 
     return End::SOLVED;
   }
   constexpr long TIMES = 2;
-  if (!plateau_.lasts(result.iterations, TIMES * most)) return std::nullopt;
+  if (!plateau_.lasts(result.iterations, most > result.iterations ? most : TIMES * most))
+    return std::nullopt;
   return End::NO_PROGRESS;
 }
 
