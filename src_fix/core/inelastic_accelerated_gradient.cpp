@@ -31,6 +31,8 @@ namespace {
   // until the end. (With tolerances alone a bed at rest moved up to four times as fast, measured:
   // contacts that closed in the step came in late.)
   constexpr long LOOK_EVERY = 20;
+  // In every so many iterations it is looked at whether the residual has stayed on a plateau.
+  constexpr long PLATEAU_EVERY = 10;
   constexpr double IDLE_GAP = 5.0;
 
   // The weights of inelastic_accelerated_gradient.h.
@@ -109,15 +111,6 @@ bool AcceleratedProjectedGradient::judge(const ContactProblem &problem, const So
   return result.accurate;
 }
 
-double AcceleratedProjectedGradient::number_loaded(const ContactProblem &problem, Host &host)
-{
-  double loaded = 0.0;
-  for (std::size_t c = 0; c < problem.contacts.size(); ++c)
-    if (problem.contacts.is_loaded(c)) loaded += 1.0;
-  host.reduce(&loaded, 1, nullptr, 0);
-  return loaded;
-}
-
 bool AcceleratedProjectedGradient::is_time_for_slow_modes(long iteration)
 {
   // With a ratio of n the smallest eigenvalues of A fall to about its n-th part.
@@ -126,12 +119,13 @@ bool AcceleratedProjectedGradient::is_time_for_slow_modes(long iteration)
       plateau_.is_time_to_try(iteration, mass_ratio_ >= VERY_DIFFERENT);
 }
 
-bool AcceleratedProjectedGradient::settle_on_plateau(ContactProblem &problem,
-                                                     const SolverLimits &limits, Host &host,
-                                                     SolverResult &result)
+bool AcceleratedProjectedGradient::end_on_plateau(bool tries, ContactProblem &problem,
+                                                  const SolverLimits &limits, Host &host,
+                                                  SolverResult &result)
 {
-  if (is_time_for_slow_modes(result.iterations) && solve_slow_modes(problem, limits, host, result))
-    return true;
+  if (tries && solve_slow_modes(problem, limits, host, result)) return true;
+  if (!plateau_.lasts(result.iterations, find_network(problem, host).most_on_plateau()))
+    return false;
   const bool accurate = judge(problem, limits, host, result);
   return accurate ||
       (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED);
@@ -228,7 +222,6 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
   Momentum momentum;
   Settling settling(iterations, limits.accuracy > 0.0 && limits.coarseness == 1.0,
                     result.iterations);
-  const long most = most_on_plateau(number_loaded(problem, host));
   long next_check = 0, failures = 0;
   double blur = 0.0;
   while (result.iterations < limits.max_iterations) {
@@ -237,10 +230,11 @@ Status AcceleratedProjectedGradient::iterate(PackedIterations<Real> &iterations,
     ++result.iterations;
     if (!std::isfinite(passed.steep)) return not_finite(result);
     const double packed_residual = see(passed, scales, result);
-    if (scales.length * packed_residual <= limits.tolerance &&
-        plateau_.lasts(result.iterations, most)) {
+    if (result.iterations % PLATEAU_EVERY == 0 && is_on_plateau(result.iterations) &&
+        scales.length * packed_residual <= limits.tolerance) {
       iterations.impulses_before(scales, impulse);
-      if (settle_on_plateau(problem, limits, host, result)) return Status::CONVERGED;
+      const bool tries = is_time_for_slow_modes(result.iterations);
+      if (end_on_plateau(tries, problem, limits, host, result)) return Status::CONVERGED;
     }
 
     blur = least_residual<Real>(passed.farthest);

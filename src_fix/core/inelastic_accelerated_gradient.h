@@ -71,14 +71,16 @@ class AcceleratedProjectedGradient : public Solver {
   bool solve_slow_modes(ContactProblem &problem, const SolverLimits &limits, Host &host,
                         SolverResult &result);
 
-  // Ends a search whose residuals no longer come down and are within the tolerance, if it can: slow
-  // modes are solved, or little is left of what contacts change. Where the targets are not to be
-  // had, the tolerance will do. Collective.
-  bool settle_on_plateau(ContactProblem &problem, const SolverLimits &limits, Host &host,
-                         SolverResult &result);
+  // Tells whether the residual has not come down for so long that it is worth to look why.
+  bool is_on_plateau(long iteration) const
+  { return plateau_.lasts(iteration, Network::LEAST_ON_PLATEAU); }
 
-  // Returns how many impulses of all ranks are above their least ones. Collective.
-  static double number_loaded(const ContactProblem &problem, Host &host);
+  // Ends a search on a plateau, if it can: with `tries` slow modes are tried first. Otherwise the
+  // impulses in `problem`, which are judged here, will do if their residual has not come down for
+  // long and is within the tolerance, and little is left of what contacts change: the targets are
+  // not to be had. Collective.
+  bool end_on_plateau(bool tries, ContactProblem &problem, const SolverLimits &limits, Host &host,
+                      SolverResult &result);
 
   // Returns how the search ends if more iterations from the impulses in `problem` are of no use, in
   // the precision that it has.

@@ -31,7 +31,7 @@ namespace {
   constexpr long REFRESH_EVERY = 50;
 
   // The residual is looked at in every so many sweeps at least, to see whether it comes down.
-  constexpr long PLATEAU_EVERY = 50, LEAST_PLATEAU = 150;
+  constexpr long PLATEAU_EVERY = 50;
 
   // Sweeps diverge if their largest change of an impulse grows to so many times that of the first.
   constexpr double DIVERGED = 1.0e3;
@@ -179,19 +179,16 @@ ColouredSweeps::leave_plateau(const PackedSweeps<Group> &sweeps, ContactProblem 
 {
   plateau_.see(result.iterations, find_unsolved(sweeps, blur, host));
   const bool tries = is_time_for_slow_modes(result.iterations);
-  if (!tries && !plateau_.lasts(result.iterations, LEAST_PLATEAU)) return std::nullopt;
+  if (!tries && !is_on_plateau(result.iterations)) return std::nullopt;
   sweeps.impulses(scales, problem.contacts.impulse);
-  if (tries && solve_slow_modes(problem, limits, host, result)) return End::SOLVED;
-  const long most = most_on_plateau(number_loaded(problem, host));
-  if (!plateau_.lasts(result.iterations, most)) return std::nullopt;
-  if (settle_on_plateau(problem, limits, host, result)) {
+  if (end_on_plateau(tries, problem, limits, host, result)) {
     result.status = Status::CONVERGED;
     return End::SOLVED;
   }
-  constexpr long TIMES = 2;
-  if (!plateau_.lasts(result.iterations, most > result.iterations ? most : TIMES * most))
-    return std::nullopt;
-  return End::NO_PROGRESS;
+  // Above the tolerance the other solver goes on, after twice as long.
+  const long most = find_network(problem, host).most_on_plateau();
+  const bool ends = most < result.iterations && plateau_.lasts(result.iterations, 2 * most);
+  return ends ? std::optional(End::NO_PROGRESS) : std::nullopt;
 }
 
 template <typename Group>

@@ -1,6 +1,7 @@
 #include "inelastic_solver.h"
 
 #include <cmath>
+#include <cstddef>
 
 namespace inelastic {
 
@@ -21,6 +22,30 @@ Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contact
   double maxima[2] = {mine.feasibility, mine.complementarity};
   host.reduce(nullptr, 0, maxima, 2);
   return {maxima[0], maxima[1]};
+}
+
+Network find_network(const ContactProblem &problem, Host &host)
+{
+  const ContactSet &contacts = problem.contacts;
+  // 3 per slot: 1, how many contacts act on it, and nothing. Summed up over its images the first is
+  // the number of these.
+  std::vector<double> of_slot(3 * static_cast<std::size_t>(problem.slots()), 0.0);
+  for (std::size_t i = 0; i < of_slot.size(); i += 3) of_slot[i] = 1.0;
+  Network network;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    if (!contacts.is_loaded(c)) continue;
+    network.contacts += 1.0;
+    for (const int slot : {contacts.first[c], contacts.second[c]})
+      of_slot[3 * static_cast<std::size_t>(slot) + 1] += 1.0;
+  }
+  host.sum_over_ghosts(of_slot.data());
+  for (int i = 0; i < problem.particles; ++i) {
+    const double *const of_particle = &of_slot[3 * static_cast<std::size_t>(i)];
+    if (problem.is_mobile(i) && of_particle[1] > 0.0) network.particles += 1.0 / of_particle[0];
+  }
+  double sums[2] = {network.contacts, network.particles};
+  host.reduce(sums, 2, nullptr, 0);
+  return {sums[0], sums[1]};
 }
 
 Guess Solver::judge_first_guess(ContactProblem &problem, Host &host)

@@ -114,16 +114,26 @@ class Plateau {
 // say little.
 constexpr double HARDLY_RESOLVED = 0.1;
 
-// So many iterations without progress are of no use where impulses of so many constraints are not
-// their least ones: conjugate gradients, which sweeps and accelerated gradients do not surpass,
-// would have ended. Few contacts, such as those of grains between walls that close at an angle, are
-// no network, and are solved to the end.
-inline long most_on_plateau(double loaded)
-{
-  constexpr double LEAST = 150.0, EACH = 0.75, NETWORK = 60.0;
-  if (loaded < NETWORK) return std::numeric_limits<long>::max();
-  return static_cast<long>(std::max(LEAST, EACH * loaded));
-}
+// The constraints with impulses above their least ones, and the particles that they act on and can
+// move; over all ranks.
+struct Network {
+  double contacts = 0.0, particles = 0.0;
+
+  // Returns after how many iterations without progress a search ends: conjugate gradients, which
+  // sweeps and accelerated gradients do not surpass, would have ended. Chains, and a few contacts
+  // such as those of grains between walls that close at an angle, are no network, and are solved to
+  // the end, however long that takes.
+  long most_on_plateau() const
+  {
+    constexpr double FEW = 60.0, CHAIN = 1.5, EACH = 0.75;
+    if (contacts < std::max(FEW, CHAIN * particles)) return std::numeric_limits<long>::max();
+    return std::max(LEAST_ON_PLATEAU, static_cast<long>(EACH * contacts));
+  }
+  static constexpr long LEAST_ON_PLATEAU = 150;
+};
+
+// Collective.
+Network find_network(const ContactProblem &problem, Host &host);
 
 // What is known before the iterations, from the first guess of the impulses; over all ranks.
 struct Guess {
