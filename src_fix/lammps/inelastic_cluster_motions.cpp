@@ -88,11 +88,11 @@ ClusterMotions::ClusterMotions(LAMMPS *lmp, const Step &step, GhostExchange &ran
 {
 }
 
-void ClusterMotions::measure(double limit, double quiet_steps)
+void ClusterMotions::measure(double quiet_steps)
 {
   measure_clusters();
   measure_resistance();
-  measure_by_motion(limit);
+  measure_by_motion();
   measure_slip(quiet_steps);
 }
 
@@ -300,11 +300,11 @@ ClusterMotion ClusterMotions::motion_of_cluster(const double *s, const double *m
 
 // Measures what needs the motion of the clusters: the resistance to it, and the speeds of held
 // particles.
-void ClusterMotions::measure_by_motion(double limit)
+void ClusterMotions::measure_by_motion()
 {
   const inelastic::ContactProblem &problem = step_.problem;
   enum { RESISTED, SQUARES, HELD_NUMBER, SUMS };
-  enum { MOVES, MAXIMA };
+  enum { FASTEST, MAXIMA };
   std::vector<double> sums(SUMS * clusters_.size(), 0.0);
   std::vector<double> maxima(MAXIMA * clusters_.size(), 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -314,7 +314,8 @@ void ClusterMotions::measure_by_motion(double limit)
     double *const s = &sums[SUMS * static_cast<std::size_t>(clusters_.of(i))];
     s[SQUARES] += motion.speed * motion.speed;
     s[HELD_NUMBER] += 1.0;
-    if (motion.speed > limit * unit(i, motion)) maxima[MAXIMA * clusters_.of(i) + MOVES] = 1.0;
+    double &fastest = maxima[MAXIMA * static_cast<std::size_t>(clusters_.of(i)) + FASTEST];
+    if (motion.speed > 0.0) fastest = std::max(fastest, motion.speed / unit(i, motion));
   }
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
@@ -340,7 +341,7 @@ void ClusterMotions::measure_by_motion(double limit)
     if (cluster.speed > 0.0)
       cluster.resisted = s[RESISTED] / (cluster.mass * cluster.speed * cluster.speed);
     if (s[HELD_NUMBER] > 0.0) cluster.held_speed = std::sqrt(s[SQUARES] / s[HELD_NUMBER]);
-    cluster.held_moves = maxima[MAXIMA * k + MOVES] > 0.0;
+    cluster.fastest = maxima[MAXIMA * k + FASTEST];
   }
 }
 

@@ -60,7 +60,7 @@ struct ClusterMotion {
   // Measured with the help of the above:
   double resisted = 0.0;      // [length / time] of the motion as a rigid body, as in Motion
   double held_speed = 0.0;    // [length / time] root mean square of the held particles
-  bool held_moves = false;
+  double fastest = 0.0;    // the most of their speeds, as a part of the particle's unit()
   // Where held particles touch others with a force: their speed along the normal, which is no
   // other's if they are at rest; root mean square [length / time], and the most as a part of the
   // particle's unit. Of clusters that were quiet for long enough alone.
@@ -73,9 +73,9 @@ class ClusterMotions : protected Pointers {
 
   // Finds the clusters of the step. Collective.
   void find() { clusters_.find(); }
-  // Measures the motions in the step as it is now. A held particle moves if it is faster than this
-  // part of its unit(). The slip is that of clusters with so many quiet steps. Collective.
-  void measure(double limit, double quiet_steps);
+  // Measures the motions in the step as it is now. The slip is that of clusters with so many quiet
+  // steps. Collective.
+  void measure(double quiet_steps);
 
   const Clusters &clusters() const { return clusters_; }
   std::size_t size() const { return motions_.size(); }
@@ -121,7 +121,7 @@ class ClusterMotions : protected Pointers {
   void add_outer_contact(std::size_t c, double *sums, double *maxima) const;
   ClusterMotion motion_of_cluster(const double *sums, const double *maxima) const;
   void measure_resistance();
-  void measure_by_motion(double limit);
+  void measure_by_motion();
   void measure_slip(double quiet_steps);
   const double *velocity(int i) const { return &step_.velocity[3 * static_cast<std::size_t>(i)]; }
   std::array<double, 3> own_velocity(int i) const;

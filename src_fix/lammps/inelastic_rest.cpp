@@ -22,7 +22,7 @@ namespace {
 constexpr double QUIET = 0.1;
 // A trial comes where this speed is at most so large a part, or some accuracies where these are
 // more: what is faster still moves when it has begun at rest.
-constexpr double SLOW = 0.005;
+constexpr double SLOW = 0.02;
 // So many quiet steps come before a trial: a force that nothing balances would show.
 constexpr double PATIENCE = 8.0;
 // The count of a cluster at rest.
@@ -30,10 +30,14 @@ constexpr double RESTS = PATIENCE + 1.0;
 // The part of the accuracy to which contacts are solved before a cluster at rest is let go. The
 // residuals of a bed, which is isostatic, make velocities of some fifty times their size.
 constexpr double REFINED = 1.0 / 4.0;
-// So often a trial begins anew without particles that it does not find held.
-constexpr int MOST_TRIALS = 3;
+// A trial is solved to this part, too. One that does not tell motion from errors is solved again to
+// a smaller part, down to the finest.
+constexpr double FINER = 1.0 / 4.0, FINEST = 1.0 / 64.0;
+// So often a step is solved on trial: more accurately, or without particles that it does not find
+// held.
+constexpr int MOST_TRIALS = 12;
 // After a trial in which something held moved the next one comes so many quiet steps later.
-constexpr double PAUSE = 50.0;
+constexpr double PAUSE = 20.0;
 // A particle at rest is no faster than so many accuracies; a coarser accuracy counts as the one
 // below.
 constexpr double AT_REST = 5.0;
@@ -101,7 +105,7 @@ bool Rest::look(const inelastic::ProjectionResult &result)
 }
 
 void Rest::look_again()
-{ motions_.measure(limit(), PATIENCE); }
+{ motions_.measure(PATIENCE); }
 
 bool Rest::is_quiet(const ClusterMotion &cluster) const
 {
@@ -111,11 +115,13 @@ bool Rest::is_quiet(const ClusterMotion &cluster) const
       cluster.speed <= std::max(QUIET * cluster.resisted, round_off);
 }
 
-// Tells whether something in a quiet cluster moves that contacts are to hold.
-bool Rest::moves(const ClusterMotion &cluster) const
+// Tells whether something in a quiet cluster that contacts are to hold moves by more than so many
+// times the limit.
+bool Rest::moves(const ClusterMotion &cluster, double times) const
 {
+  const double most = times * limit();
   const double round_off = ROUND_OFF * cluster.without_contacts;
-  return cluster.held_moves || cluster.speed > std::max(limit() * cluster.resisted, round_off);
+  return cluster.fastest > most || cluster.speed > std::max(most * cluster.resisted, round_off);
 }
 
 // Tells whether a quiet cluster is so slow that a trial may pass.
@@ -125,11 +131,13 @@ bool Rest::is_slow(const ClusterMotion &cluster) const
   return cluster.held_speed <= part * cluster.without_contacts;
 }
 
-// Tells whether something held gives way to, or follows, what is not held.
-bool Rest::slips(const ClusterMotion &cluster) const
+// Tells whether something held gives way to, or follows, what is not held, in a trial after a less
+// accurate one in which the cluster moved so.
+bool Rest::slips(const ClusterMotion &cluster, const ClusterMotion &less_accurate) const
 {
-  return cluster.slip > LEAST_SLIP * cluster.without_contacts &&
-      cluster.most_slip > SLIP / AT_REST * limit();
+  if (cluster.slip <= LEAST_SLIP * cluster.without_contacts) return false;
+  return cluster.most_slip > SLIP / AT_REST * limit() ||
+      cluster.slip > ERRORS_LEFT * less_accurate.slip;
 }
 
 bool Rest::is_at_rest(const ClusterMotion &cluster) const
@@ -247,61 +255,56 @@ RestTrial::Begun Rest::begin_trial() const
 // Tries the clusters that fail as long as no trial shows that they rest.
 long Rest::try_clusters(double least_length)
 {
-  const auto any_has = [this](Fate fate) {
-    double any = std::count(fates_.begin(), fates_.end(), fate) > 0 ? 1.0 : 0.0;
-    ranks_.reduce(nullptr, 0, &any, 1);
-    return any > 0.0;
-  };
-  if (!any_has(Fate::FAILS)) return 0;
+  double any = std::count(fates_.begin(), fates_.end(), Fate::FAILS) > 0 ? 1.0 : 0.0;
+  ranks_.reduce(nullptr, 0, &any, 1);
+  if (any == 0.0) return 0;
   mark_held(Fate::FAILS);
   trial_.begin();
   begun_ = begin_trial();
-  const RestTrial::Begun &begun = begun_;
   for (std::size_t i = 0; i < held_.size(); ++i)
-    if (begun.particles[i]) held_[i] = 0;
-  std::vector<ClusterMotion> of_trial(motions_.size());
-  bool solved = trial_.run(begun, least_length);
-  for (int k = 0; solved && k < MOST_TRIALS; ++k) {
-    if (k > 0) solved = trial_.run_again(begun, least_length);
-    judge_trial(of_trial, [&](std::size_t c) {
-      return solved && is_quiet(motions_[c]) && !moves(motions_[c]);
-    });
-    if (!drop_what_is_not_held()) break;
+    if (begun_.particles[i]) held_[i] = 0;
+  std::vector<ClusterMotion> of_trial(motions_.size()), of_coarser(motions_.size());
+  double refinement = REFINED;
+  for (int k = 0; k < MOST_TRIALS; ++k) {
+    const bool solved = trial_.run(begun_, refinement, least_length);
+    const bool undecided = judge_trial(solved, refinement, of_coarser, of_trial);
+    if (!solved) break;
+    if (drop_what_is_not_held()) continue;
+    if (!undecided || refinement <= FINEST) break;
+    refinement *= FINER;
+    of_coarser.swap(of_trial);
   }
-  if (!solved) return trial_.iterations();
-  double any_slip = 0.0;
-  for (std::size_t k = 0; k < fates_.size(); ++k)
-    if (fates_[k] == Fate::PASSES && of_trial[k].slip > LEAST_SLIP * of_trial[k].without_contacts)
-      any_slip = 1.0;
-  ranks_.reduce(nullptr, 0, &any_slip, 1);
-  if (any_slip == 0.0) return trial_.iterations();
-  solved = trial_.refine(begun, least_length);
-  const std::vector<ClusterMotion> coarse = of_trial;
-  judge_trial(of_trial, [&](std::size_t k) {
-    const double least = LEAST_SLIP * motions_[k].without_contacts;
-    return solved && fates_[k] == Fate::PASSES && is_quiet(motions_[k]) && !moves(motions_[k]) &&
-        !slips(motions_[k]) && motions_[k].slip <= std::max(least, ERRORS_LEFT * coarse[k].slip);
-  });
-  drop_what_is_not_held();
   return trial_.iterations();
 }
 
-// Lets the clusters that are tried pass or fail by their motions in the trial, which it sets.
-void Rest::judge_trial(std::vector<ClusterMotion> &of_trial,
-                       const std::function<bool(std::size_t)> &passes)
+// Lets the clusters that are tried pass or fail by their motions in the trial, which it sets, and
+// those in the last less accurate one. Returns whether a more accurate one may let more of them
+// pass. Collective.
+bool Rest::judge_trial(bool solved, double refinement,
+                       const std::vector<ClusterMotion> &of_coarser,
+                       std::vector<ClusterMotion> &of_trial)
 {
   std::vector<ClusterMotion> of_step(motions_.size());
   for (std::size_t k = 0; k < of_step.size(); ++k) of_step[k] = motions_[k];
   trial_.exchange();
   look_again();
+  double undecided = 0.0;
   for (std::size_t k = 0; k < fates_.size(); ++k) {
-    of_trial[k] = motions_[k];
+    const ClusterMotion &cluster = of_trial[k] = motions_[k];
     if (fates_[k] != Fate::FAILS && fates_[k] != Fate::PASSES) continue;
-    fates_[k] = passes(k) ? Fate::PASSES : Fate::FAILS;
+    fates_[k] = Fate::FAILS;
+    const double errors = std::max(1.0, refinement / (REFINED * FINER));
+    if (!solved || !is_quiet(cluster) || moves(cluster, errors)) continue;
+    if (!moves(cluster) && !slips(cluster, of_coarser[k]))
+      fates_[k] = Fate::PASSES;
+    else
+      undecided = 1.0;
   }
   mark_held(Fate::PASSES);
   trial_.exchange();
   motions_.swap(of_step);
+  ranks_.reduce(nullptr, 0, &undecided, 1);
+  return undecided > 0.0;
 }
 
 // A particle that began the trial at rest and is not held when it ends would lose what it had: its
@@ -485,7 +488,7 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
   double any = 0.0;
   for (std::size_t k = 0; k < fates_.size(); ++k) {
     if (unbalanced[k] == 0.0) continue;
-    fates_[k] = fates_[k] == Fate::PASSES ? Fate::FAILS : Fate::LET_GO;
+    fates_[k] = fates_[k] == Fate::PASSES ? Fate::FAILS : Fate::UNBALANCED;
     any = 1.0;
   }
   ranks_.reduce(nullptr, 0, &any, 1);
@@ -504,18 +507,21 @@ void Rest::end_step(const HoldStill::Held &held)
     const bool stopped = !held.particles.empty() && held.particles[i];
     const std::vector<double> &predicted = fate == Fate::PASSES ? trial_.predicted()
                                                                 : step_.problem.predicted_velocity;
-    const bool stays = norm(cluster.common.data()) <= ROUND_OFF * cluster.without_contacts;
+    const double drift = norm(cluster.common.data());
+    const bool stays = drift <= ROUND_OFF * cluster.without_contacts;
     if (stopped) maxima[0] = 1.0;
     if (stopped && stays)
       state_.load_at_rest(i) =
           norm(&predicted[3 * static_cast<std::size_t>(i)]) / step_.impulse_per_force;
-    const bool slow = motions_.motion_of(i).speed <= limit() * cluster.without_contacts;
-    if (!stays || (!stopped && !slow)) maxima[1] = 1.0;
+    const double own_speed = stopped ? 0.0 : motions_.motion_of(i).speed;
+    if (std::max(drift, own_speed) > limit() * cluster.without_contacts) maxima[1] = 1.0;
     // No time passes in the half kick with which a run starts.
     if (step_.kick == Kick::HALF) continue;
     double &own = state_.quiet_steps(i);
     if (fate == Fate::RESTS || (fate == Fate::PASSES && !held.particles.empty()))
       own = RESTS;
+    else if (fate == Fate::UNBALANCED)
+      own = PATIENCE;
     else if (fate == Fate::FAILS || fate == Fate::PASSES)
       own = -PAUSE;
     else if (fate == Fate::MOVES && is_quiet(cluster))

@@ -47,7 +47,6 @@
 
 #include "pointers.h"
 
-#include <functional>
 #include <vector>
 
 namespace LAMMPS_NS::Inelastic_NS {
@@ -77,16 +76,17 @@ class Rest : protected Pointers {
   // What becomes of a cluster in the step.
   enum class Fate {
     MOVES,
-    FAILS,     // its trial
-    LET_GO,    // it was at rest
-    PASSES,    // its trial
+    FAILS,         // its trial
+    LET_GO,        // it was at rest
+    UNBALANCED,    // it was at rest, and is tried in the next step
+    PASSES,        // its trial
     RESTS
   };
 
   bool is_quiet(const ClusterMotion &cluster) const;
-  bool moves(const ClusterMotion &cluster) const;
+  bool moves(const ClusterMotion &cluster, double times = 1.0) const;
   bool is_slow(const ClusterMotion &cluster) const;
-  bool slips(const ClusterMotion &cluster) const;
+  bool slips(const ClusterMotion &cluster, const ClusterMotion &less_accurate) const;
   bool is_at_rest(const ClusterMotion &cluster) const;
   bool needs_refinement(const ClusterMotion &cluster) const;
   void forget();
@@ -94,8 +94,8 @@ class Rest : protected Pointers {
 
   void decide();
   long try_clusters(double least_length);
-  void judge_trial(std::vector<ClusterMotion> &of_trial,
-                   const std::function<bool(std::size_t)> &passes);
+  bool judge_trial(bool solved, double refinement, const std::vector<ClusterMotion> &of_coarser,
+                   std::vector<ClusterMotion> &of_trial);
   RestTrial::Begun begin_trial() const;
   void mark_held(Fate fate);
   bool drop_what_is_not_held();

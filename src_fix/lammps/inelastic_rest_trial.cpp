@@ -11,9 +11,6 @@ using namespace Inelastic_NS;
 
 namespace {
 
-// The part of the accuracy to which contacts are solved in a trial. The residuals of a bed, which
-// is isostatic, make velocities of some fifty times their size.
-constexpr double REFINED = 1.0 / 4.0, REFINED_AGAIN = 1.0 / 16.0;
 // Contacts that get a force in the trial count as closed in a further round of it.
 constexpr int MOST_ROUNDS = 4;
 
@@ -27,44 +24,31 @@ RestTrial::RestTrial(Step &step, GhostExchange &ranks, Movers &movers) :
 void RestTrial::begin()
 {
   const inelastic::ContactProblem &problem = step_.problem;
+  tried_.contacts.impulse = problem.contacts.impulse;
+  iterations_ = 0;
   before_.assign(problem.predicted_velocity.size(), 0.0);
   movers_.find_velocity_before(before_);
   movers_.predict();
   movers_.turn(problem, step_.velocity, step_.motion_of_bodies);
 }
 
-void RestTrial::set_up(const Begun &begun)
+void RestTrial::set_up(const Begun &begun, double refinement)
 {
+  const std::vector<double> reached = tried_.contacts.impulse;
   tried_ = step_.problem;
+  inelastic::ContactSet &contacts = tried_.contacts;
+  contacts.impulse = reached;
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    if (begun.constraints[c]) contacts.refinement[c] = std::min(contacts.refinement[c], refinement);
   for (std::size_t i = 0; i < begun.particles.size(); ++i)
     if (begun.particles[i])
       for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
         tried_.predicted_velocity[k] += begun.common[k] - before_[k];
 }
 
-bool RestTrial::run(const Begun &begun, double least_length)
+bool RestTrial::run(const Begun &begun, double refinement, double least_length)
 {
-  set_up(begun);
-  iterations_ = 0;
-  return solve(begun, REFINED, least_length);
-}
-
-bool RestTrial::run_again(const Begun &begun, double least_length)
-{
-  const std::vector<double> reached = tried_.contacts.impulse;
-  set_up(begun);
-  tried_.contacts.impulse = reached;
-  return solve(begun, REFINED, least_length);
-}
-
-bool RestTrial::refine(const Begun &begun, double least_length)
-{ return solve(begun, REFINED_AGAIN, least_length); }
-
-bool RestTrial::solve(const Begun &begun, double refinement, double least_length)
-{
-  inelastic::ContactSet &contacts = tried_.contacts;
-  for (std::size_t c = 0; c < contacts.size(); ++c)
-    if (begun.constraints[c]) contacts.refinement[c] = std::min(contacts.refinement[c], refinement);
+  set_up(begun, refinement);
   inelastic::SolverLimits limits;
   limits.tolerance = step_.settings.tolerance;
   limits.max_iterations = step_.settings.max_iterations;

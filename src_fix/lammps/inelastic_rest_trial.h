@@ -29,18 +29,14 @@ class RestTrial {
     std::vector<char> constraints;
   };
 
-  // Finds the velocities before the forces of the step. Collective.
+  // Begins the trials of a step: finds the velocities before its forces. Collective.
   void begin();
 
-  // Solves the step so, from its impulses, with this length as the least target
-  // (SolverLimits::least_length). Returns whether the targets were reached. Collective.
-  bool run(const Begun &begun, double least_length);
-  // Does the same from the impulses of the last trial of the step.
-  bool run_again(const Begun &begun, double least_length);
-  // Goes on to targets that are far smaller: a velocity that is an error of the solver becomes
-  // smaller, too, and one that is none stays. The rest is as for run().
-  bool refine(const Begun &begun, double least_length);
-  long iterations() const { return iterations_; }    // of both
+  // Solves the step so, to this part of the accuracy, from the impulses of its last trial, or from
+  // its own. `least_length` is the least target (SolverLimits). Returns whether the targets were
+  // reached. Collective.
+  bool run(const Begun &begun, double refinement, double least_length);
+  long iterations() const { return iterations_; }    // since begin()
 
   // Exchanges the predicted velocities, the velocities and the impulses of the step with those of
   // the trial.
@@ -56,8 +52,7 @@ class RestTrial {
   const std::vector<double> &velocity() const { return velocity_; }
 
  private:
-  void set_up(const Begun &begun);
-  bool solve(const Begun &begun, double refinement, double least_length);
+  void set_up(const Begun &begun, double refinement);
   bool close_contacts(const Begun &begun);
 
   Step &step_;
