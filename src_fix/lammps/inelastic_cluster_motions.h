@@ -60,7 +60,7 @@ struct ClusterMotion {
   // Measured with the help of the above:
   double resisted = 0.0;      // [length / time] of the motion as a rigid body, as in Motion
   double held_speed = 0.0;    // [length / time] root mean square of the held particles
-  double fastest = 0.0;    // the most of their speeds, as a part of the particle's unit()
+  double fastest = 0.0;       // the most of their speeds, as a part of the particle's unit()
   // Where held particles touch others with a force: their speed along the normal, which is no
   // other's if they are at rest; root mean square [length / time], and the most as a part of the
   // particle's unit. Of clusters that were quiet for long enough alone.

@@ -17,7 +17,7 @@ namespace {
 constexpr double DEEPER = 0.1;
 // Where more iterations would be needed, moving particles have no room beside those at rest:
 // nothing is stopped in the step.
-constexpr long MOST_ITERATIONS = 2000;
+constexpr long MOST_ITERATIONS = 300;
 
 }    // namespace
 

@@ -22,21 +22,25 @@ namespace {
 constexpr double QUIET = 0.1;
 // A trial comes where this speed is at most so large a part, or some accuracies where these are
 // more: what is faster still moves when it has begun at rest.
-constexpr double SLOW = 0.02;
+constexpr double SLOW = 0.005;
 // So many quiet steps come before a trial: a force that nothing balances would show.
 constexpr double PATIENCE = 8.0;
-// The count of a cluster at rest.
-constexpr double RESTS = PATIENCE + 1.0;
-// The part of the accuracy to which contacts are solved before a cluster at rest is let go. The
-// residuals of a bed, which is isostatic, make velocities of some fifty times their size.
+// The count of a cluster at rest, and of one that was and did not balance in the last step.
+constexpr double RESTS = PATIENCE + 1.0, RESTED = RESTS + 1.0;
+// The part of the accuracy to which contacts are solved in a trial, and before a cluster at rest is
+// let go. The residuals of a bed, which is isostatic, make velocities of some fifty times their
+// size.
 constexpr double REFINED = 1.0 / 4.0;
-// A trial is solved to this part, too. One that does not tell motion from errors is solved again to
-// a smaller part, down to the finest.
+// A trial that does not tell motion from errors is solved again to this part of it, down to the
+// finest.
 constexpr double FINER = 1.0 / 4.0, FINEST = 1.0 / 64.0;
 // So often a step is solved on trial: more accurately, or without particles that it does not find
 // held.
 constexpr int MOST_TRIALS = 12;
-// After a trial in which something held moved the next one comes so many quiet steps later.
+// One takes no more iterations than this, or so many times those of the step.
+constexpr long MOST_ITERATIONS = 1000, MORE_ITERATIONS = 4;
+// After a trial in which something held moved so many quiet steps more come before the next one;
+// none more if the cluster was at rest just before.
 constexpr double PAUSE = 20.0;
 // A particle at rest is no faster than so many accuracies; a coarser accuracy counts as the one
 // below.
@@ -88,6 +92,7 @@ bool Rest::look(const inelastic::ProjectionResult &result)
     forget();
     return false;
   }
+  iterations_ = result.iterations;
   motions_.find();
   look_again();
   inelastic::ContactSet &contacts = step_.problem.contacts;
@@ -141,7 +146,10 @@ bool Rest::slips(const ClusterMotion &cluster, const ClusterMotion &less_accurat
 }
 
 bool Rest::is_at_rest(const ClusterMotion &cluster) const
-{ return cluster.quiet_steps >= RESTS; }
+{ return cluster.quiet_steps == RESTS; }
+
+bool Rest::was_at_rest(const ClusterMotion &cluster) const
+{ return cluster.quiet_steps == RESTED; }
 
 bool Rest::needs_refinement(const ClusterMotion &cluster) const
 { return is_at_rest(cluster) && is_quiet(cluster) && moves(cluster); }
@@ -195,8 +203,8 @@ void Rest::decide()
     if (is_at_rest(cluster))
       fates_[k] = is_quiet(cluster) && !moves(cluster) ? Fate::RESTS : Fate::LET_GO;
     // In the half kick of a run nothing is tried: velocities may have been given.
-    else if (cluster.quiet_steps == PATIENCE && is_quiet(cluster) && is_slow(cluster) &&
-             step_.kick == Kick::WHOLE)
+    else if ((cluster.quiet_steps == PATIENCE || was_at_rest(cluster)) && is_quiet(cluster) &&
+             is_slow(cluster) && step_.kick == Kick::WHOLE)
       fates_[k] = Fate::FAILS;
   }
   mark_held(Fate::RESTS);
@@ -264,9 +272,10 @@ long Rest::try_clusters(double least_length)
   for (std::size_t i = 0; i < held_.size(); ++i)
     if (begun_.particles[i]) held_[i] = 0;
   std::vector<ClusterMotion> of_trial(motions_.size()), of_coarser(motions_.size());
+  const long most = std::max(MOST_ITERATIONS, MORE_ITERATIONS * iterations_);
   double refinement = REFINED;
   for (int k = 0; k < MOST_TRIALS; ++k) {
-    const bool solved = trial_.run(begun_, refinement, least_length);
+    const bool solved = trial_.run(begun_, refinement, least_length, most);
     const bool undecided = judge_trial(solved, refinement, of_coarser, of_trial);
     if (!solved) break;
     if (drop_what_is_not_held()) continue;
@@ -280,8 +289,7 @@ long Rest::try_clusters(double least_length)
 // Lets the clusters that are tried pass or fail by their motions in the trial, which it sets, and
 // those in the last less accurate one. Returns whether a more accurate one may let more of them
 // pass. Collective.
-bool Rest::judge_trial(bool solved, double refinement,
-                       const std::vector<ClusterMotion> &of_coarser,
+bool Rest::judge_trial(bool solved, double refinement, const std::vector<ClusterMotion> &of_coarser,
                        std::vector<ClusterMotion> &of_trial)
 {
   std::vector<ClusterMotion> of_step(motions_.size());
@@ -293,9 +301,11 @@ bool Rest::judge_trial(bool solved, double refinement,
     const ClusterMotion &cluster = of_trial[k] = motions_[k];
     if (fates_[k] != Fate::FAILS && fates_[k] != Fate::PASSES) continue;
     fates_[k] = Fate::FAILS;
+    // In the first trial errors may be that many times what they are in the next.
     const double errors = std::max(1.0, refinement / (REFINED * FINER));
     if (!solved || !is_quiet(cluster) || moves(cluster, errors)) continue;
-    if (!moves(cluster) && !slips(cluster, of_coarser[k]))
+    // What was at rest before the last step did not slip then.
+    if (!moves(cluster) && (was_at_rest(cluster) || !slips(cluster, of_coarser[k])))
       fates_[k] = Fate::PASSES;
     else
       undecided = 1.0;
@@ -521,9 +531,9 @@ void Rest::end_step(const HoldStill::Held &held)
     if (fate == Fate::RESTS || (fate == Fate::PASSES && !held.particles.empty()))
       own = RESTS;
     else if (fate == Fate::UNBALANCED)
-      own = PATIENCE;
+      own = RESTED;
     else if (fate == Fate::FAILS || fate == Fate::PASSES)
-      own = -PAUSE;
+      own = was_at_rest(cluster) ? 0.0 : -PAUSE;
     else if (fate == Fate::MOVES && is_quiet(cluster))
       own = std::min(cluster.quiet_steps, PATIENCE - 1.0) + 1.0;
     else

@@ -24,14 +24,14 @@
 //
 // Slow motion looks like an error of the solver: that of a light particle, for instance, which
 // follows two heavy ones that it drives apart. Where held particles touch others that are not held,
-// the trial is therefore solved once more, far more accurately: their velocities there must become
-// smaller, as errors do.
+// the trial is therefore solved again, more accurately: their velocities there must become smaller,
+// as errors do.
 //
 // In a cluster at rest the held particles are stopped, in every step. Moving particles beside them
 // are projected once more, with these as obstacles (inelastic_hold_still.h). Where that changes the
 // forces on a held particle so that they no longer balance, the step stays as it was solved, and
-// the cluster is let go. So what moves loses no momentum, and what is stopped no more than errors
-// of the solver are.
+// the cluster is tried anew in the next one. So what moves loses no momentum, and what is stopped
+// no more than errors of the solver are.
 //
 // A cluster at rest in which something would move is solved more accurately before it is let go.
 // Where the loads of a cluster at rest all change by one factor, its contact forces do.
@@ -88,6 +88,7 @@ class Rest : protected Pointers {
   bool is_slow(const ClusterMotion &cluster) const;
   bool slips(const ClusterMotion &cluster, const ClusterMotion &less_accurate) const;
   bool is_at_rest(const ClusterMotion &cluster) const;
+  bool was_at_rest(const ClusterMotion &cluster) const;
   bool needs_refinement(const ClusterMotion &cluster) const;
   void forget();
   double limit() const;
@@ -123,6 +124,7 @@ class Rest : protected Pointers {
   std::vector<char> held_;
   std::vector<double> unit_;
   bool looks_ = false;          // in this step
+  long iterations_ = 0;         // of its solution
   bool any_stopped_ = false;    // in the last step, on any rank
 };
 

@@ -46,12 +46,13 @@ void RestTrial::set_up(const Begun &begun, double refinement)
         tried_.predicted_velocity[k] += begun.common[k] - before_[k];
 }
 
-bool RestTrial::run(const Begun &begun, double refinement, double least_length)
+bool RestTrial::run(const Begun &begun, double refinement, double least_length,
+                    long most_iterations)
 {
   set_up(begun, refinement);
   inelastic::SolverLimits limits;
   limits.tolerance = step_.settings.tolerance;
-  limits.max_iterations = step_.settings.max_iterations;
+  limits.max_iterations = std::min(most_iterations, step_.settings.max_iterations);
   limits.accuracy = step_.settings.accuracy;
   limits.least_length = least_length;
   velocity_.resize(step_.velocity.size());

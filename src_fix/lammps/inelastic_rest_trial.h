@@ -34,8 +34,8 @@ class RestTrial {
 
   // Solves the step so, to this part of the accuracy, from the impulses of its last trial, or from
   // its own. `least_length` is the least target (SolverLimits). Returns whether the targets were
-  // reached. Collective.
-  bool run(const Begun &begun, double refinement, double least_length);
+  // reached in so many iterations. Collective.
+  bool run(const Begun &begun, double refinement, double least_length, long most_iterations);
   long iterations() const { return iterations_; }    // since begin()
 
   // Exchanges the predicted velocities, the velocities and the impulses of the step with those of
