@@ -60,7 +60,7 @@ bool HoldStill::run(const Held &held, const Constraints &constraints)
       std::fill(impulse.begin() + static_cast<std::ptrdiff_t>(known), impulse.end(), 0.0);
       continue;
     }
-    double lacking = has_room(held) ? 0.0 : 1.0;
+    double lacking = has_room(held) && !opens_under_force(held) ? 0.0 : 1.0;
     ranks_.reduce(nullptr, 0, &lacking, 1);
     return lacking == 0.0 && constraints.excess() <= excess_before_;
   }
@@ -89,6 +89,25 @@ bool HoldStill::has_room(const Held &held) const
       return false;
   }
   return true;
+}
+
+// Tells whether moving particles end apart by more than the tolerance under a force, and did not:
+// what this room leaves of its residual may come on top of a gap that counted as closed.
+bool HoldStill::opens_under_force(const Held &held) const
+{
+  const std::vector<double> &impulse = step_.problem.contacts.impulse;
+  const double tolerance = step_.settings.tolerance;
+  for (std::size_t c = 0; c < impulse.size(); ++c) {
+    const int i = step_.problem.contacts.first[c], j = step_.problem.contacts.second[c];
+    const auto is_held = [&](int slot) {
+      return !step_.problem.is_wall(slot) && held.particles[slot];
+    };
+    if (!(impulse[c] > 0.0) || is_held(i) || is_held(j)) continue;
+    const bool pushed = c < impulse_before_.size() && impulse_before_[c] > 0.0;
+    const bool was_open = pushed && step_.linear_gap_at_end(c, velocity_before_) > tolerance;
+    if (!was_open && step_.linear_gap_at_end(c, step_.velocity) > tolerance) return true;
+  }
+  return false;
 }
 
 // Projects the velocities of the step with the held particles as obstacles.

@@ -56,6 +56,7 @@ class HoldStill {
  private:
   inelastic::SolverResult project(const Held &held);
   bool has_room(const Held &held) const;
+  bool opens_under_force(const Held &held) const;
   bool is_still(const Held &held, int slot) const;
   void turn_bodies();
 

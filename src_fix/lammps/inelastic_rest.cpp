@@ -442,25 +442,14 @@ std::vector<char> Rest::touched_particles() const
   return touched;
 }
 
-// Returns the constraints with a force whose gaps would end open by more than the tolerance,
-// because what is held stays behind what moves.
-std::vector<std::size_t> Rest::opened_under_force(const HoldStill::Held &held) const
+// Returns the constraints with a force whose gaps end open by more than the tolerance.
+std::vector<std::size_t> Rest::opened_under_force() const
 {
-  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const std::vector<double> &impulse = step_.problem.contacts.impulse;
   std::vector<std::size_t> opened;
-  const auto velocity_of = [&](int slot) {
-    const bool is_held = !step_.problem.is_wall(slot) && held.particles[slot];
-    return (is_held ? held.velocity : step_.velocity).data() + 3 * static_cast<std::size_t>(slot);
-  };
-  for (std::size_t c = 0; c < contacts.size(); ++c) {
-    if (!(contacts.impulse[c] > 0.0)) continue;
-    const double *const one = velocity_of(contacts.first[c]);
-    const double *const other = velocity_of(contacts.second[c]);
-    const double between[3] = {one[0] - other[0], one[1] - other[1], one[2] - other[2]};
-    const double at_end = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
-        step_.problem.timestep * dot(&contacts.normal[3 * c], between);
-    if (at_end > step_.settings.tolerance) opened.push_back(c);
-  }
+  for (std::size_t c = 0; c < impulse.size(); ++c)
+    if (impulse[c] > 0.0 && step_.linear_gap_at_end(c, step_.velocity) > step_.settings.tolerance)
+      opened.push_back(c);
   return opened;
 }
 
@@ -489,7 +478,7 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
   const std::vector<char> touched = touched_particles();
   for (int i = 0; i < atom->nlocal; ++i)
     if (held.particles[i] && !touched[i]) unbalanced[clusters.of(i)] = 1.0;
-  for (const std::size_t c : opened_under_force(held)) {
+  for (const std::size_t c : opened_under_force()) {
     const inelastic::ContactSet &contacts = step_.problem.contacts;
     for (const int i : {contacts.first[c], contacts.second[c]})
       if (is_stopped(i)) unbalanced[static_cast<std::size_t>(clusters.of(i))] = 1.0;

@@ -144,6 +144,18 @@ struct Step : RunState, StepState {
     return set.may_pull() && set.is_loaded(problem.contacts.impulse[c]);
   }
 
+  // The gap of a row at the end of the step with velocities (3 per slot), along its normal
+  // [length]. A bad overlap may stay, and counts as touching.
+  double linear_gap_at_end(std::size_t c, const std::vector<double> &v) const
+  {
+    const double gap = contact_of(c).gap_now;
+    const std::size_t i = 3 * static_cast<std::size_t>(problem.contacts.first[c]);
+    const std::size_t j = 3 * static_cast<std::size_t>(problem.contacts.second[c]);
+    const double between[3] = {v[i] - v[j], v[i + 1] - v[j + 1], v[i + 2] - v[j + 2]};
+    return (gap < -REGULAR_OVERLAP * settings.tolerance ? 0.0 : gap) - rows[c].wall_motion +
+        problem.timestep * inelastic::dot(&problem.contacts.normal[3 * c], between);
+  }
+
   // Tells whether a particle belongs to a body.
   bool is_member(int i) const { return problem.is_member(i); }
 

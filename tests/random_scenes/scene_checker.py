@@ -744,6 +744,10 @@ class _Part:
             slack = 10 * ROUND_OFF * (new.momentum_size + 1e-300)[:, None]
             # What comes to rest in the step keeps none, either.
             moves = alone & (np.linalg.norm(after, axis=1) > 10 * ROUND_OFF * sizes)
+            off = moves & (np.abs(after - momentum) > slack).any(axis=1)
+            movable = (new.kind != FROZEN) & (new.kind != OUTSIDE)
+            clusters = clusters_of(listed, new.molecule, movable)
+            moves &= ~self.stopped(clusters, off, after, sizes)
             self.close("push kept", after[moves], momentum[moves], slack[moves], new.id[moves])
             self.report.seen["ends of pushing"] += 1
         elif not settled and last is not None:
