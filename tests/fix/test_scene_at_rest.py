@@ -193,6 +193,17 @@ def test_a_sphere_that_slides_goes_on(tmp_path: Path, lmp: Runner) -> None:
     assert frames[-1].velocities[0, 0] == pytest.approx(speed, rel=1e-9)
 
 
+def test_a_sphere_that_drifts_keeps_its_velocity(tmp_path: Path, lmp: Runner) -> None:
+    """At a fifth of what may be at rest the scene counts as at rest; it goes on, all the same."""
+    speed = 0.2 * UNNOTICED * GRAVITY * STEP
+    deck = one_on_the_floor(tmp_path, velocities=[[speed, 0, 0]])
+    result = lmp(deck + DUMP_PARTICLES + "run 200\n")
+    assert until_rest(result) <= PATIENCE
+    frames = read_dump(tmp_path / "particles.dump")
+    # Nothing acts along the floor.
+    assert frames[-1].velocities[0, 0] == pytest.approx(speed, rel=1e-9)
+
+
 def test_a_heavy_load_elsewhere_hides_nothing(tmp_path: Path, lmp: Runner) -> None:
     """One of two spheres carries ten thousand weights; the other slides."""
     speed = 4 * UNNOTICED * GRAVITY * STEP
