@@ -443,12 +443,15 @@ std::vector<char> Rest::touched_particles() const
 }
 
 // Returns the constraints with a force whose gaps end open by more than the tolerance.
-std::vector<std::size_t> Rest::opened_under_force() const
+std::vector<std::size_t> Rest::opened_under_force(const HoldStill::Held &held) const
 {
+  std::vector<double> ends_with = step_.velocity;
+  for (std::size_t i = 0; i < held.particles.size(); ++i)
+    if (held.particles[i]) std::copy_n(&held.velocity[3 * i], 3, &ends_with[3 * i]);
   const std::vector<double> &impulse = step_.problem.contacts.impulse;
   std::vector<std::size_t> opened;
   for (std::size_t c = 0; c < impulse.size(); ++c)
-    if (impulse[c] > 0.0 && step_.linear_gap_at_end(c, step_.velocity) > step_.settings.tolerance)
+    if (impulse[c] > 0.0 && step_.linear_gap_at_end(c, ends_with) > step_.settings.tolerance)
       opened.push_back(c);
   return opened;
 }
@@ -478,7 +481,7 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
   const std::vector<char> touched = touched_particles();
   for (int i = 0; i < atom->nlocal; ++i)
     if (held.particles[i] && !touched[i]) unbalanced[clusters.of(i)] = 1.0;
-  for (const std::size_t c : opened_under_force()) {
+  for (const std::size_t c : opened_under_force(held)) {
     const inelastic::ContactSet &contacts = step_.problem.contacts;
     for (const int i : {contacts.first[c], contacts.second[c]})
       if (is_stopped(i)) unbalanced[static_cast<std::size_t>(clusters.of(i))] = 1.0;
