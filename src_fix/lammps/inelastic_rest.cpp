@@ -37,11 +37,12 @@ constexpr double FINER = 1.0 / 4.0, FINEST = 1.0 / 64.0;
 // So often a step is solved on trial: more accurately, or without particles that it does not find
 // held.
 constexpr int MOST_TRIALS = 12;
-// One takes no more iterations than this, or so many times those of the step.
-constexpr long MOST_ITERATIONS = 1000, MORE_ITERATIONS = 4;
+// What is at rest shows it in few iterations, since its forces are known: the first trial takes as
+// many as the step, or this number, and more accurate ones so many times that.
+constexpr long MOST_ITERATIONS = 250, MORE_ITERATIONS = 4;
 // After a trial in which something held moved so many quiet steps more come before the next one;
 // none more if the cluster was at rest just before.
-constexpr double PAUSE = 20.0;
+constexpr double PAUSE = 8.0;
 // A particle at rest is no faster than so many accuracies; a coarser accuracy counts as the one
 // below.
 constexpr double AT_REST = 5.0;
@@ -120,13 +121,12 @@ bool Rest::is_quiet(const ClusterMotion &cluster) const
       cluster.speed <= std::max(QUIET * cluster.resisted, round_off);
 }
 
-// Tells whether something in a quiet cluster that contacts are to hold moves by more than so many
-// times the limit.
-bool Rest::moves(const ClusterMotion &cluster, double times) const
+// Tells whether something in a quiet cluster moves that contacts are to hold.
+bool Rest::moves(const ClusterMotion &cluster) const
 {
-  const double most = times * limit();
   const double round_off = ROUND_OFF * cluster.without_contacts;
-  return cluster.fastest > most || cluster.speed > std::max(most * cluster.resisted, round_off);
+  return cluster.fastest > limit() ||
+      cluster.speed > std::max(limit() * cluster.resisted, round_off);
 }
 
 // Tells whether a quiet cluster is so slow that a trial may pass.
@@ -272,11 +272,12 @@ long Rest::try_clusters(double least_length)
   for (std::size_t i = 0; i < held_.size(); ++i)
     if (begun_.particles[i]) held_[i] = 0;
   std::vector<ClusterMotion> of_trial(motions_.size()), of_coarser(motions_.size());
-  const long most = std::max(MOST_ITERATIONS, MORE_ITERATIONS * iterations_);
+  const long most = std::max(MOST_ITERATIONS, iterations_);
   double refinement = REFINED;
   for (int k = 0; k < MOST_TRIALS; ++k) {
-    const bool solved = trial_.run(begun_, refinement, least_length, most);
-    const bool undecided = judge_trial(solved, refinement, of_coarser, of_trial);
+    const long iterations = refinement < REFINED ? MORE_ITERATIONS * most : most;
+    const bool solved = trial_.run(begun_, refinement, least_length, iterations);
+    const bool undecided = judge_trial(solved, of_coarser, of_trial);
     if (!solved) break;
     if (drop_what_is_not_held()) continue;
     if (!undecided || refinement <= FINEST) break;
@@ -289,7 +290,7 @@ long Rest::try_clusters(double least_length)
 // Lets the clusters that are tried pass or fail by their motions in the trial, which it sets, and
 // those in the last less accurate one. Returns whether a more accurate one may let more of them
 // pass. Collective.
-bool Rest::judge_trial(bool solved, double refinement, const std::vector<ClusterMotion> &of_coarser,
+bool Rest::judge_trial(bool solved, const std::vector<ClusterMotion> &of_coarser,
                        std::vector<ClusterMotion> &of_trial)
 {
   std::vector<ClusterMotion> of_step(motions_.size());
@@ -301,11 +302,9 @@ bool Rest::judge_trial(bool solved, double refinement, const std::vector<Cluster
     const ClusterMotion &cluster = of_trial[k] = motions_[k];
     if (fates_[k] != Fate::FAILS && fates_[k] != Fate::PASSES) continue;
     fates_[k] = Fate::FAILS;
-    // In the first trial errors may be that many times what they are in the next.
-    const double errors = std::max(1.0, refinement / (REFINED * FINER));
-    if (!solved || !is_quiet(cluster) || moves(cluster, errors)) continue;
+    if (!solved || !is_quiet(cluster) || moves(cluster)) continue;
     // What was at rest before the last step did not slip then.
-    if (!moves(cluster) && (was_at_rest(cluster) || !slips(cluster, of_coarser[k])))
+    if (was_at_rest(cluster) || !slips(cluster, of_coarser[k]))
       fates_[k] = Fate::PASSES;
     else
       undecided = 1.0;

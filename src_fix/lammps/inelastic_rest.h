@@ -84,7 +84,7 @@ class Rest : protected Pointers {
   };
 
   bool is_quiet(const ClusterMotion &cluster) const;
-  bool moves(const ClusterMotion &cluster, double times = 1.0) const;
+  bool moves(const ClusterMotion &cluster) const;
   bool is_slow(const ClusterMotion &cluster) const;
   bool slips(const ClusterMotion &cluster, const ClusterMotion &less_accurate) const;
   bool is_at_rest(const ClusterMotion &cluster) const;
@@ -95,7 +95,7 @@ class Rest : protected Pointers {
 
   void decide();
   long try_clusters(double least_length);
-  bool judge_trial(bool solved, double refinement, const std::vector<ClusterMotion> &of_coarser,
+  bool judge_trial(bool solved, const std::vector<ClusterMotion> &of_coarser,
                    std::vector<ClusterMotion> &of_trial);
   RestTrial::Begun begin_trial() const;
   void mark_held(Fate fate);
