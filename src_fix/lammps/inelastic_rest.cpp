@@ -360,12 +360,9 @@ HoldStill::Held Rest::held_now() const
 {
   HoldStill::Held held;
   held.particles.assign(held_.size(), 0);
-  held.velocity.assign(3 * held_.size(), 0.0);
-  for (std::size_t i = 0; i < held_.size(); ++i) {
-    if (!is_stopped(static_cast<int>(i))) continue;
-    held.particles[i] = held_[i];
-    std::copy_n(motions_.of(static_cast<int>(i)).common.begin(), 3, &held.velocity[3 * i]);
-  }
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    if (is_stopped(static_cast<int>(i))) held.particles[i] = held_[i];
+  held.velocity = common_velocities(step_.velocity, held.particles);
   return held;
 }
 
@@ -441,23 +438,28 @@ std::vector<char> Rest::touched_particles() const
   return touched;
 }
 
-// Returns the constraints with a force whose gaps end open by more than the tolerance.
-std::vector<std::size_t> Rest::opened_under_force(const HoldStill::Held &held) const
+// Returns the constraints whose gaps end open by more than the tolerance under a force, or deeper
+// than the tolerance because of the velocities that held particles are to have.
+std::vector<std::size_t> Rest::ends_wrong(const HoldStill::Held &held) const
 {
   std::vector<double> ends_with = step_.velocity;
   for (std::size_t i = 0; i < held.particles.size(); ++i)
     if (held.particles[i]) std::copy_n(&held.velocity[3 * i], 3, &ends_with[3 * i]);
   const std::vector<double> &impulse = step_.problem.contacts.impulse;
-  std::vector<std::size_t> opened;
-  for (std::size_t c = 0; c < impulse.size(); ++c)
-    if (impulse[c] > 0.0 && step_.linear_gap_at_end(c, ends_with) > step_.settings.tolerance)
-      opened.push_back(c);
-  return opened;
+  const double tolerance = step_.settings.tolerance;
+  std::vector<std::size_t> wrong;
+  for (std::size_t c = 0; c < impulse.size(); ++c) {
+    const double gap = step_.linear_gap_at_end(c, ends_with);
+    const bool opened = impulse[c] > 0.0 && gap > tolerance;
+    if (opened || gap < std::min(-tolerance, step_.linear_gap_at_end(c, step_.velocity)))
+      wrong.push_back(c);
+  }
+  return wrong;
 }
 
 // Lets clusters go, or fails them, in which the forces on a held particle do not balance, or are
-// none, or keep a gap open. Sets the velocities that the others keep. Returns whether there are
-// such clusters. Collective.
+// none, or whose gaps end wrong. Sets the velocities that the others keep. Returns whether there
+// are such clusters. Collective.
 bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held)
 {
   // With it the forces of all contacts leave the momentum of a cluster what it is.
@@ -480,7 +482,7 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
   const std::vector<char> touched = touched_particles();
   for (int i = 0; i < atom->nlocal; ++i)
     if (held.particles[i] && !touched[i]) unbalanced[clusters.of(i)] = 1.0;
-  for (const std::size_t c : opened_under_force(held)) {
+  for (const std::size_t c : ends_wrong(held)) {
     const inelastic::ContactSet &contacts = step_.problem.contacts;
     for (const int i : {contacts.first[c], contacts.second[c]})
       if (is_stopped(i)) unbalanced[static_cast<std::size_t>(clusters.of(i))] = 1.0;

@@ -106,7 +106,7 @@ class Rest : protected Pointers {
   void take_trial();
   bool let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held);
   std::vector<char> touched_particles() const;
-  std::vector<std::size_t> opened_under_force(const HoldStill::Held &held) const;
+  std::vector<std::size_t> ends_wrong(const HoldStill::Held &held) const;
   std::vector<double> common_velocities(const std::vector<double> &velocity,
                                         const std::vector<char> &marked) const;
   void end_step(const HoldStill::Held &held);

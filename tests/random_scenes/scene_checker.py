@@ -984,6 +984,9 @@ class _Part:
             in_line = np.zeros(len(names), dtype=bool)
             if was_pushed:
                 allowed += 2 * self.eps / new.h
+            # What comes to rest in the step keeps none.
+            stopped = self.stopped_bodies(new, listed, np.abs(new.body_v - kept_v), allowed)
+            kept_v[stopped], kept_l[stopped] = new.body_v[stopped], new.body_l[stopped]
             for row, mine, arm in self.members(new):
                 in_line[row] = self.is_in_line(arm)
                 if not (was_pushed or in_line[row]) or (in_line[row] and self.lines_unknown):
@@ -1010,6 +1013,24 @@ class _Part:
             kept_v = new.body_v
             kept_l = np.where(in_line[:, None], kept_l, new.body_l)
         new.kept_v, new.kept_l, new.settled = kept_v, kept_l, settled
+
+    def stopped_bodies(
+        self, frame: _Frame, listed: dict[str, Array], off: Array, allowed: Array
+    ) -> Array:
+        """(bodies,) Which bodies, of those whose velocity is off, move as their cluster does."""
+        accelerate = self.to_v / frame.mass[:, None]
+        velocity = frame.v + 0.5 * frame.h * accelerate * frame.force
+        asked = np.zeros(len(frame.x), dtype=bool)
+        for row, mine, _ in self.members(frame):
+            velocity[mine] = frame.body_v[row]
+            asked[mine] = (off[row] > allowed[row]).any()
+        movable = (frame.kind != FROZEN) & (frame.kind != OUTSIDE)
+        clusters = clusters_of(listed, frame.molecule, movable)
+        found = self.stopped(clusters, asked, velocity, frame.momentum_size)
+        stopped = np.zeros(len(off), dtype=bool)
+        for row, mine, _ in self.members(frame):
+            stopped[row] = found[mine[0]]
+        return stopped
 
     def resting(self, frame: _Frame) -> Array:
         """(bodies,) Whether a body has no velocity in the step, beside the forces on all."""
