@@ -87,6 +87,12 @@ void Clusters::find()
     if (connected && (i >= atom->nlocal || root(i) >= atom->nlocal))
       labels[3 * static_cast<std::size_t>(i) + 1] = -1.0;
   }
+  // What holds a particle from outside, a frozen one, may be on another rank than its own.
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    for (const int i : {contacts.first[c], contacts.second[c]})
+      if (contacts.impulse[c] != 0.0 && is_mobile(i) && i >= atom->nlocal)
+        labels[3 * static_cast<std::size_t>(i) + 1] = -1.0;
   agree_on_labels(labels);
 
   label_.clear();
