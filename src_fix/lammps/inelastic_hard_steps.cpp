@@ -108,8 +108,7 @@ void HardSteps::end_step(const inelastic::ProjectionResult &result)
   if (in_a_row_ <= MOST_IN_A_ROW) return;
   const std::string message = fmt::format(
       "Fix inelastic: step {}: {} steps in a row were solved to the tolerance, but up to {:.2g} of "
-      "what "
-      "contacts change is left{}. {}",
+      "what contacts change is left{}. {}",
       update->ntimestep, in_a_row_, most_unresolved_,
       any_at_maxiter_ ? fmt::format(" after {} iterations", step_.settings.max_iterations) : "",
       cause());

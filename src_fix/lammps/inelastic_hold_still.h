@@ -51,6 +51,9 @@ class HoldStill {
   // Gives the step again what was kept of it.
   void go_back();
 
+  // The velocities of the step when run() began, 3 per slot [length / time].
+  const std::vector<double> &solved() const { return solved_; }
+
   long iterations() const { return iterations_; }    // since begin()
 
  private:

@@ -451,7 +451,7 @@ std::vector<std::size_t> Rest::ends_wrong(const HoldStill::Held &held) const
   for (std::size_t c = 0; c < impulse.size(); ++c) {
     const double gap = step_.linear_gap_at_end(c, ends_with);
     const bool opened = impulse[c] > 0.0 && gap > tolerance;
-    if (opened || gap < std::min(-tolerance, step_.linear_gap_at_end(c, step_.velocity)))
+    if (opened || gap < std::min(-tolerance, step_.linear_gap_at_end(c, hold_still_.solved())))
       wrong.push_back(c);
   }
   return wrong;

@@ -156,6 +156,23 @@ def test_a_restarted_run_comes_to_rest_again(tmp_path: Path, lmp: Runner) -> Non
     assert after.thermo["f_contact[1]"][at_rest].min() == 0
 
 
+def test_a_smaller_tolerance_holds_at_once(tmp_path: Path, lmp: Runner) -> None:
+    """What rests ends the next step within it, too, however slowly it then rises."""
+    # An overlap of half a tolerance stays, and is more than one of those to come. It is given back
+    # at a hundredth of what may be at rest.
+    loose = 1e-3 * GRAVITY * STEP**2
+    tight = loose / 2.8
+    deck = spheres([[0.5, RADIUS - 0.5 * loose, 0.5]], tmp_path, tolerance=loose)
+    lower = f"fix_modify contact tolerance {tight:.17g}\n"
+    result = lmp(deck + "run 200\n" + lower + DUMP_PARTICLES + "run 40\n")
+    assert result.runs[0]["f_contact[13]"][-1] == 1
+    height = [frame.positions[0, 1] for frame in read_dump(tmp_path / "particles.dump")]
+    # Round-off of positions.
+    assert min(height[1:]) >= RADIUS - tight - 1e-15
+    # It rests again.
+    assert result.runs[1]["f_contact[13]"][-1] == 1
+
+
 @pytest.mark.parametrize(
     ("slope", "settings"), [(0.02, ""), (0.002, ""), (0.002, " accuracy 1e-4")]
 )
