@@ -127,6 +127,7 @@ bool AcceleratedProjectedGradient::end_on_plateau(bool tries, ContactProblem &pr
   if (!plateau_.lasts(result.iterations, find_network(problem, host).most_on_plateau()))
     return false;
   const bool accurate = judge(problem, limits, host, result);
+  if (limits.to_targets) return accurate;
   return accurate ||
       (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED);
 }
@@ -180,7 +181,7 @@ std::optional<Status> AcceleratedProjectedGradient::judge_prospects(ContactProbl
   if (judge(problem, limits, host, result)) return Status::CONVERGED;
   if (infeasible) return Status::INFEASIBLE;
   if (blurred) return Status::ROUND_OFF;
-  if (result.residual.largest() <= limits.tolerance) return Status::CONVERGED;
+  if (result.residual.largest() <= limits.tolerance && !limits.to_targets) return Status::CONVERGED;
   // Round-off of single precision may keep the residual up; double precision then goes on.
   if (!single_precision) return std::nullopt;
   is_stuck_ = true;

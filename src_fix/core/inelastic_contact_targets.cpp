@@ -113,10 +113,11 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
   }
   // The largest part of a target, the largest target, and the largest part that is unresolved.
   double maxima[3] = {0.0, 0.0, 0.0};
+  resolved_.resize(contacts.size());
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double by_velocity =
         part_[c] * std::min(of_slot[contacts.first[c]], of_slot[contacts.second[c]]);
-    const double resolved = std::max(least_[c], by_velocity);
+    const double resolved = resolved_[c] = std::max(least_[c], by_velocity);
     const double target = std::min(limits.tolerance, resolved);
     const Residual residual = contacts.residual(c, gap.data());
     const double left = counts == Counts::ALL ? residual.largest() : residual.feasibility;

@@ -68,6 +68,8 @@ class ContactTargets {
   const std::vector<double> &part() const { return part_; }
   // [length / time] The changes of velocity by the first guess, 3 per slot.
   const std::vector<double> &change_by_guess() const { return change_by_guess_; }
+  // [length] The targets, without the tolerance as their upper bound.
+  const std::vector<double> &resolved() const { return resolved_; }
   // [length] The largest target of a constraint with impulse, or near it, on all ranks.
   double largest() const { return largest_; }
   // The largest residual, over all ranks, as a part of the lengths v_c, r_c and l_c of its
@@ -86,7 +88,7 @@ class ContactTargets {
   std::vector<double> diagonal_;
   std::vector<double> of_guess_;    // [length] max(r_c, l_c / 50000)
   std::vector<double> change_by_guess_;
-  std::vector<double> least_, part_;
+  std::vector<double> least_, part_, resolved_;
   // [length] per slot: the impulses on it, and with its own motion, for the round-off
   std::vector<double> carried_, length_;
   double largest_ = 0.0, unresolved_ = 0.0;

@@ -170,6 +170,8 @@ class Solver {
   // Returns the operator, prepared for the problem of the last solve. If that solve has converged,
   // the operator was last applied to its result.
   GapOperator &gap_operator() { return gap_operator_; }
+  // Those of the last solve.
+  const ContactTargets &targets() const { return targets_; }
 
  protected:
   // Makes the impulses of the problem admissible and judges them as the first guess. Sets the

@@ -18,6 +18,8 @@ struct SolverLimits {
   // At least 1: targets are larger by this factor. Above 1 velocities need not settle, either; such
   // a solution is good enough to tell which constraints change (inelastic_projection.h).
   double coarseness = 1.0;
+  // A search goes on to its targets, also where that takes many iterations more than the tolerance.
+  bool to_targets = false;
   // [length] Shorter lengths are round-off of positions: no target is below it, unless it is the
   // tolerance.
   double least_length = 0.0;

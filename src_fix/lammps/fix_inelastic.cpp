@@ -42,10 +42,11 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
     spheres_(lmp, step_, ranks_, state_), walls_(lmp, settings_.regions),
     constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
-    solver_(inelastic::make_solver(settings_.solver)), push_apart_(step_, constraints_, movers_),
+    solver_(inelastic::make_solver(settings_.solver)), push_apart_(lmp, step_, constraints_, ranks_, movers_),
     length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_, movers_),
     check_(lmp, this, step_, ranks_, state_, movers_), hard_(lmp, step_, ranks_),
-    unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
+    energy_(lmp, step_, ranks_), unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_),
+    squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
   movers_.add(&spheres_);
@@ -318,6 +319,7 @@ void FixInelastic::begin_summary()
 {
   summary_.begin(length_.shortened_steps());
   hard_.begin_run();
+  energy_.begin_run();
   constraints_.overlaps().begin_count();
 }
 
@@ -384,6 +386,7 @@ inelastic::ProjectionResult FixInelastic::solve()
   hard_.begin_step();
   step_.keeps_overlaps = constraints_.overlaps().pushed_before();
   while (true) {
+    step_.keeps_overlaps = step_.keeps_overlaps || step_.waits;
     unsolved_.begin_trial();
     length_.fit_to_list();
     predict();
@@ -393,7 +396,7 @@ inelastic::ProjectionResult FixInelastic::solve()
     constraints_.overlaps().share();
     // Beside bad overlaps regular ones are kept, once they cannot all be given back in one step.
     const bool unsolved = result.status != inelastic::Status::CONVERGED;
-    const bool keeps = step_.bad_start && (step_.keeps_overlaps || unsolved);
+    const bool keeps = step_.waits || (step_.bad_start && (step_.keeps_overlaps || unsolved));
     if (keeps != step_.keeps_overlaps) {
       step_.keeps_overlaps = keeps;
       continue;
@@ -402,9 +405,12 @@ inelastic::ProjectionResult FixInelastic::solve()
         update->ntimestep % settings_.record_every == 0)
       record_.write(result);
     if (step_.bad_start)
-      push_apart_.run(atom, result, [this](long iterations) {
+      push_apart_.run(result, [this](long iterations) {
         return project(iterations);
       });
+    else
+      push_apart_.skip();
+    if (push_apart_.in_vain()) unsolved_.report_jam(push_apart_.left());
     // What can hardly be solved looks solved in a step that is short enough, in which EPS is more
     // than anything moves.
     const bool hardly = hard_.has_shortened() && hard_.is_hardly_solved(result);
@@ -426,12 +432,35 @@ inelastic::ProjectionResult FixInelastic::solve()
     }
     // A step that is not solved, or pushes a bad start apart, says so itself.
     const bool solved = result.status == inelastic::Status::CONVERGED;
+    if (solved && !step_.bad_start && adds_too_much(result)) {
+      step_.waits = true;
+      continue;
+    }
     if (solved && !step_.bad_start && walls_.any_moves())
       squeezed_.look();
     else
       squeezed_.skip();
     if (length_.accepts(solved, unsolved_.named(), squeezed_.said())) return result;
   }
+}
+
+// Tells whether the step is to be solved again without what it gives back of overlaps, since its
+// contacts add too much energy. Where they do so without that, they are not solved as far as they
+// have to be: the step is then solved to its targets here.
+bool FixInelastic::adds_too_much(inelastic::ProjectionResult &result)
+{
+  if (!energy_.adds_too_much(solver_->targets().resolved())) return false;
+  if (!step_.waits) return true;
+  if (!result.accurate) {
+    const inelastic::ProjectionResult better = project(settings_.max_iterations, true);
+    result.iterations += better.iterations;
+    result.status = better.status;
+    result.residual = better.residual;
+    result.accurate = better.accurate;
+    result.unresolved = better.unresolved;
+    energy_.adds_too_much(solver_->targets().resolved());
+  }
+  return false;
 }
 
 // Every other fix and force has done its work: sets the velocities that the step would end with.
@@ -456,7 +485,7 @@ void FixInelastic::predict()
 double FixInelastic::least_length() const
 { return std::numeric_limits<double>::epsilon() * length_.smallest_radius(); }
 
-inelastic::ProjectionResult FixInelastic::project(long max_iterations)
+inelastic::ProjectionResult FixInelastic::project(long max_iterations, bool to_targets)
 {
   const PhaseClock::Within within(clock_, PhaseClock::SOLVE);
   // No step goes further than the list reaches: it is shortened, or it is an error.
@@ -470,6 +499,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
     // ones matter.
     constexpr double COARSE = 32.0;
     limits.accuracy = settings_.accuracy;
+    limits.to_targets = to_targets;
     if (step_.has_bodies) limits.coarseness = COARSE;
   }
   const inelastic::ProjectionResult result = inelastic::project(
@@ -483,6 +513,7 @@ inelastic::ProjectionResult FixInelastic::project(long max_iterations)
 void FixInelastic::finish(const inelastic::ProjectionResult &result)
 {
   hard_.end_step(result);
+  energy_.end_step();
   OverlapWatch &overlaps = constraints_.overlaps();
   overlaps.warn_of_unexpected();
   squeezed_.warn();
@@ -498,7 +529,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
     check_.after_step(output_.largest_change());
   }
   const bool solved = result.status == inelastic::Status::CONVERGED;
-  overlaps.end_step(solved && constraints_.entangled().empty());
+  overlaps.end_step(solved && constraints_.entangled().empty(), push_apart_.left().largest);
   restart_peratom = overlaps.pushes_in_velocity() || laws_.has_law();
   restart_global = length_.is_shortened() || laws_.has_law();
   {
@@ -521,7 +552,7 @@ void FixInelastic::post_run()
   state_.take_out_pushes();
   restart_peratom = laws_.has_law();
   summary_.log(length_.shortened_steps(), constraints_.overlaps().unexpected_steps(),
-               hard_.counts());
+               hard_.counts(), push_apart_.left(), energy_.most());
   begin_summary();
 }
 

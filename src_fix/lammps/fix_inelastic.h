@@ -20,6 +20,7 @@ FixStyle(inelastic,FixInelastic);
 #include "inelastic_constraints.h"
 #include "inelastic_contact_output.h"
 #include "inelastic_ghost_exchange.h"
+#include "inelastic_energy_watch.h"
 #include "inelastic_hard_steps.h"
 #include "inelastic_law_contacts.h"
 #include "inelastic_motion_check.h"
@@ -102,6 +103,7 @@ class FixInelastic : public Fix {
   Inelastic_NS::Rest rest_;
   Inelastic_NS::MotionCheck check_;
   Inelastic_NS::HardSteps hard_;
+  Inelastic_NS::EnergyWatch energy_;
   Inelastic_NS::UnsolvedStep unsolved_;
   Inelastic_NS::SqueezedGrains squeezed_;
   Inelastic_NS::ContactOutput output_;
@@ -124,7 +126,8 @@ class FixInelastic : public Fix {
   void refine(inelastic::ProjectionResult &result);
   void predict();
   double least_length() const;
-  inelastic::ProjectionResult project(long max_iterations);
+  inelastic::ProjectionResult project(long max_iterations, bool to_targets = false);
+  bool adds_too_much(inelastic::ProjectionResult &result);
   void finish(const inelastic::ProjectionResult &result);
 };
 

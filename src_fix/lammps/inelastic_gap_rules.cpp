@@ -10,7 +10,7 @@ using namespace Inelastic_NS;
 namespace {
 
 // In tolerances: a smaller overlap at the end of the step changes no constraint.
-constexpr double RELINEARISE_BEYOND = 1.1;
+constexpr double RELINEARISE_BEYOND = 1.0;
 // In tolerances: a contact is closed, whatever its exact gap, within this distance from touching.
 constexpr double CLOSED = 0.5;
 // Beyond that a contact closes in a step by at most this part of what it has to stop.
@@ -93,8 +93,22 @@ double GapRules::given_back(const Contact &contact) const
   if (beyond <= 0.0 || step_.keeps_overlaps) return 0.0;
   const double x = beyond / ((FULL - CLOSED) * tolerance);
   const double softly = step_.settings.accuracy * contact.to_stop * x * std::max(1.0, x * x);
-  return std::min(beyond, std::max(softly, -contact.gap_now - tolerance));
+  return std::min({beyond, std::max(softly, -contact.gap_now - tolerance), most_given_back()});
 }
+
+// Returns the most of an overlap that is given back in the step [length]: at a speed that does not
+// grow where the step becomes shorter.
+double GapRules::most_given_back() const
+{
+  if (step_.keeps_overlaps) return 0.0;
+  return REGULAR_OVERLAP * step_.settings.tolerance * step_.problem.timestep /
+      step_.regular_timestep;
+}
+
+// Returns the gap that is wanted at the end of the step [length], or where it gives back more of an
+// overlap than most_given_back() the one that does not.
+double GapRules::limited(const Contact &contact, double wanted) const
+{ return contact.gap_now < 0.0 ? std::min(wanted, contact.gap_now + most_given_back()) : wanted; }
 
 // Does the same for a contact that may pull, which counts as under a force whatever its last one
 // was.
@@ -134,7 +148,7 @@ double GapRules::wanted_gap(const Contact &contact) const
   const double wanted = contact.gap_now - effective_gap(contact);
   return overlaps_.is_bad(contact.gap_now)
       ? wanted
-      : std::max(wanted, -MOST_LEFT * step_.settings.tolerance);
+      : limited(contact, std::max(wanted, -MOST_LEFT * step_.settings.tolerance));
 }
 
 bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
@@ -144,7 +158,7 @@ bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
   const double allowed = bad ? contact.gap_now : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
   const double wanted = bad ? wanted_gap(contact) : 0.0;
-  return wanted - gap_at_end > RELINEARISE_BEYOND * tolerance;
+  return wanted - gap_at_end > (step_.waits ? REGULAR_OVERLAP : RELINEARISE_BEYOND) * tolerance;
 }
 
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
@@ -159,8 +173,9 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     Row &row = step_.rows[c];
     const Contact &contact = step_.contact_of(c);
-    const double linear_gap = contact.gap_now - row.wall_motion;
-    const double lessened = linear_gap + LEFT * tolerance;
+    const double linear_gap = contact.gap_now - limited(contact, 0.0) - row.wall_motion;
+    const double lessened =
+        contact.gap_now - limited(contact, -LEFT * tolerance) - row.wall_motion;
     // Gaps that were set by the end of the step are kept there by follow().
     if (!row.as_at_start && contacts.gap[c] != lessened) continue;
     if (contacts.gap[c] == linear_gap || overlaps_.is_bad(contact.gap_now)) continue;

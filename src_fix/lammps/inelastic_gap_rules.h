@@ -76,6 +76,8 @@ class GapRules {
   double closed_gap(const Contact &contact, double last, double most_closing) const;
   double contact_gap(const Contact &contact) const;
   double given_back(const Contact &contact) const;
+  double most_given_back() const;
+  double limited(const Contact &contact, double wanted) const;
   double held_gap(const Contact &contact) const;
   double most_closed(const Contact &contact) const;
   // [length] of constraint c with these velocities, along a straight line.

@@ -67,13 +67,13 @@ void OverlapWatch::warn_of_unexpected()
         update->ntimestep, who, depth, depth / step_.settings.tolerance);
 }
 
-void OverlapWatch::end_step(bool certain)
+void OverlapWatch::end_step(bool certain, double pushed)
 {
   pushes_in_velocity_ = step_.bad_start || pushed_before_;
   pushed_before_ = step_.bad_start;
   // In tolerances: the next start knows an overlap by other sums than this end.
   constexpr double ROUND_OFF = 0.1;
   left_ = certain ? (REGULAR_OVERLAP + ROUND_OFF) * step_.settings.tolerance +
-          (step_.bad_start ? step_.largest_overlap : 0.0) + step_.excess
+          (step_.bad_start ? std::max(step_.largest_overlap, pushed) : 0.0) + step_.excess
                   : EXTREME;
 }

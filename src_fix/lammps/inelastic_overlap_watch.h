@@ -36,8 +36,8 @@ class OverlapWatch : protected Pointers {
   void warn_of_unexpected();
 
   // Notes after a step which overlaps it may have left behind. `certain` says that it was solved,
-  // and that every bad start in it was treated.
-  void end_step(bool certain);
+  // and that every bad start in it was treated; a push has left them as deep as `pushed` [length].
+  void end_step(bool certain, double pushed);
 
   // Steps of this run in which an unexpected overlap was there.
   long unexpected_steps() const { return unexpected_steps_; }

@@ -1,6 +1,7 @@
 #include "inelastic_run_summary.h"
 
 #include "comm.h"
+#include "error.h"
 #include "utils.h"
 
 #include "fmt/format.h"
@@ -18,7 +19,7 @@ RunSummary::RunSummary(LAMMPS *lmp, const Step &step, PhaseClock &clock) :
 
 void RunSummary::begin(long shortened_steps)
 {
-  steps_ = at_rest_ = unconverged_ = pushed_at_start_ = pushed_later_ = 0;
+  steps_ = at_rest_ = waited_ = unconverged_ = pushed_at_start_ = pushed_later_ = 0;
   shortened_before_ = shortened_steps;
   iterations_ = constraint_iterations_ = 0.0;
   overlap_of_start_ = largest_overlap_ = largest_excess_ = 0.0;
@@ -35,6 +36,7 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
 {
   ++steps_;
   if (step_.at_rest) ++at_rest_;
+  if (step_.waits) ++waited_;
   iterations_ += static_cast<double>(result.iterations);
   largest_excess_ = std::max(largest_excess_, step_.excess);
   const bool of_start = step_.bad_start && pushed_at_start_ == steps_ - 1;
@@ -44,27 +46,40 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
 }
 
 void RunSummary::log(long shortened_steps, long unexpected_steps,
-                     const HardSteps::Counts &hard) const
+                     const HardSteps::Counts &hard, const PushApart::Left &left,
+                     double most_added) const
 {
+  const bool all_pushed = pushed_at_start_ == steps_;
+  const double overlap = all_pushed ? overlap_of_start_ : largest_overlap_;
   if (comm->me == 0) {
     utils::logmesg(
         lmp,
         "Fix inelastic: {} projections, {:.0f} iterations, largest overlap {:.6g} = {:.4g} "
         "tolerances, {} shortened steps\n",
-        steps_, iterations_, largest_overlap_, largest_overlap_ / step_.settings.tolerance,
+        steps_, iterations_, overlap, overlap / step_.settings.tolerance,
         shortened_steps - shortened_before_);
-    log_overlaps(unexpected_steps);
+    log_overlaps(unexpected_steps, left);
+    log_given_back(most_added);
     log_hard_steps(hard);
   }
   log_times();
 }
 
-void RunSummary::log_overlaps(long unexpected_steps) const
+void RunSummary::log_overlaps(long unexpected_steps, const PushApart::Left &left) const
 {
-  if (pushed_at_start_ > 0)
+  if (pushed_at_start_ > 0 && pushed_at_start_ < steps_)
     utils::logmesg(
         lmp, "  before that, {} steps pushed the overlaps of the start, up to {:.6g}, apart\n",
         pushed_at_start_, overlap_of_start_);
+  else if (pushed_at_start_ > 0 && left.number == 0.0)
+    utils::logmesg(lmp, "  all steps pushed the overlaps of the start apart\n");
+  if (left.number > 0.0)
+    error->warning(FLERR,
+                   "Fix inelastic: {:.0f} overlaps of more than 2 tolerances, up to {:.4g} ({:.3g} "
+                   "tolerances; {}), are left after {} steps that pushed them apart: let more steps "
+                   "pass, or make more room",
+                   left.number, left.largest, left.largest / step_.settings.tolerance, left.named,
+                   pushed_at_start_ + pushed_later_);
   if (largest_excess_ > 0.0)
     utils::logmesg(
         lmp,
@@ -82,6 +97,18 @@ void RunSummary::log_overlaps(long unexpected_steps) const
                    unexpected_steps);
   if (at_rest_ > 0)
     utils::logmesg(lmp, "  in {} steps the scene was at rest, and nothing moved\n", at_rest_);
+}
+
+void RunSummary::log_given_back(double most_added) const
+{
+  if (waited_ > 0)
+    utils::logmesg(
+        lmp, "  in {} steps overlaps stayed, since there was no room to give them back\n", waited_);
+  if (most_added > 0.0)
+    utils::logmesg(lmp,
+                   "  contacts added at most {:.3g} to the kinetic energy in a step, by overlaps "
+                   "that they gave back\n",
+                   most_added);
 }
 
 void RunSummary::log_hard_steps(const HardSteps::Counts &hard) const

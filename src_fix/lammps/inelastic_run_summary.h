@@ -4,6 +4,7 @@
 #define INELASTIC_RUN_SUMMARY_H
 
 #include "inelastic_hard_steps.h"
+#include "inelastic_push_apart.h"
 #include "inelastic_phase_clock.h"
 #include "inelastic_projection.h"
 #include "inelastic_step.h"
@@ -25,10 +26,12 @@ class RunSummary : protected Pointers {
   void add_unconverged() { ++unconverged_; }
 
   // Collective.
-  void log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard) const;
+  void log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard,
+           const PushApart::Left &left, double most_added) const;
 
  private:
-  void log_overlaps(long unexpected_steps) const;
+  void log_overlaps(long unexpected_steps, const PushApart::Left &left) const;
+  void log_given_back(double most_added) const;
   void log_hard_steps(const HardSteps::Counts &hard) const;
   void log_times() const;
 
@@ -38,7 +41,7 @@ class RunSummary : protected Pointers {
   // Bad starts were pushed apart in so many steps: in those with which the run began, and in later
   // ones.
   long pushed_at_start_ = 0, pushed_later_ = 0;
-  long at_rest_ = 0;
+  long at_rest_ = 0, waited_ = 0;
   double iterations_ = 0.0;
   double constraint_iterations_ = 0.0;    // constraints of this rank, once for each iteration
   double overlap_of_start_ = 0.0;         // [length] the largest of those steps

@@ -78,6 +78,8 @@ struct StepState {
   bool bad_start = false;    // some overlap at the start is beyond the regular ones (overlap_watch)
   // Regular overlaps are given back by the push out of bad ones alone. (fix_inelastic)
   bool keeps_overlaps = false;
+  // Nor are they in a step in which the network has no room for it. (fix_inelastic)
+  bool waits = false;
   double largest_overlap = 0.0;    // [length] at the start (overlap_watch)
   // [length] the overlap at the end beyond the regular ones (constraints; gap_rules,
   // wall_constraints)

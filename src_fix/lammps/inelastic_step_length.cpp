@@ -127,18 +127,45 @@ void StepLength::list_built()
                "Fix inelastic: the tolerance {:.4g} is below the round-off of positions: with "
                "coordinates of up to {:.4g} give at least {:.2g}",
                tolerance, largest, 1.05 * resolution);
-  check_reach();
+  const std::vector<double> radius = radii_of_types();
+  check_reach(radius);
   // With neighbor multi pairs are looked for as far as the pair style reaches for their types.
   if (neighbor->style == Neighbor::MULTI || neighbor->style == Neighbor::MULTI_OLD)
-    check_reach_of_types();
+    check_reach_of_types(radius);
   measure_farthest();
-  list_reach_ = one_cutoff_ ? neighbor->cutneighmin - 2.0 * step_.largest_radius : neighbor->skin;
+  list_reach_ =
+      one_cutoff_ ? least_listed(radius) - 2.0 * step_.largest_radius : neighbor->skin;
 }
 
-void StepLength::check_reach() const
+// Returns the largest radius of each atom type in the group, from type 1 on at place 1; 0 for a
+// type without spheres [length]. Collective.
+std::vector<double> StepLength::radii_of_types() const
+{
+  std::vector<double> mine(atom->ntypes + 1, 0.0), radius(mine.size());
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (step_.in_group(atom, i))
+      mine[atom->type[i]] = std::max(mine[atom->type[i]], atom->radius[i]);
+  MPI_Allreduce(mine.data(), radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE, MPI_MAX,
+                world);
+  return radius;
+}
+
+// Returns how far a list by cutoffs reaches between spheres of any types that have some; of all
+// types where none has [length].
+double StepLength::least_listed(const std::vector<double> &radius) const
+{
+  double least = EXTREME;
+  for (int one = 1; one <= atom->ntypes; ++one)
+    for (int other = one; other <= atom->ntypes; ++other)
+      if (radius[one] > 0.0 && radius[other] > 0.0)
+        least = std::min(least, std::sqrt(neighbor->cutneighsq[one][other]));
+  return least < EXTREME ? least : neighbor->cutneighmin;
+}
+
+void StepLength::check_reach(const std::vector<double> &radius) const
 {
   const double widest = 2.0 * step_.largest_radius + neighbor->skin;
-  const double listed = one_cutoff_ ? neighbor->cutneighmin : neighbor->cutneighmax;
+  const double listed = one_cutoff_ ? least_listed(radius) : neighbor->cutneighmax;
   if (listed >= widest * BELOW_ONE) return;
   // As LAMMPS creates them.
   constexpr double DEFAULT_DIAMETER = 1.0;
@@ -153,14 +180,8 @@ void StepLength::check_reach() const
           : "");
 }
 
-void StepLength::check_reach_of_types() const
+void StepLength::check_reach_of_types(const std::vector<double> &radius) const
 {
-  std::vector<double> mine(atom->ntypes + 1, 0.0), radius(mine.size());
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (step_.in_group(atom, i))
-      mine[atom->type[i]] = std::max(mine[atom->type[i]], atom->radius[i]);
-  MPI_Allreduce(mine.data(), radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE, MPI_MAX,
-                world);
   for (int one = 1; one <= atom->ntypes; ++one)
     for (int other = one; other <= atom->ntypes; ++other) {
       if (radius[one] == 0.0 || radius[other] == 0.0) continue;

@@ -73,8 +73,10 @@ class StepLength : protected Pointers {
  private:
   const char *name_of_group() const;
   void warn_of_tolerance() const;
-  void check_reach() const;
-  void check_reach_of_types() const;
+  std::vector<double> radii_of_types() const;
+  double least_listed(const std::vector<double> &radius) const;
+  void check_reach(const std::vector<double> &radius) const;
+  void check_reach_of_types(const std::vector<double> &radius) const;
   void set_timestep(double timestep);
   void measure_farthest();
   double part_of_farthest();

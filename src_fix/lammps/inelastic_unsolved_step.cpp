@@ -100,6 +100,19 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
 }
 
+void UnsolvedStep::report_jam(const PushApart::Left &left)
+{
+  const double tolerance = step_.settings.tolerance;
+  const std::string message = fmt::format(
+      "step {}: {:.0f} overlaps of up to {:.4g} ({:.3g} tolerances; {}) do not open any more where "
+      "all give way to one another",
+      update->ntimestep, left.number, left.largest, left.largest / tolerance, left.named);
+  constexpr const char *CAUSE = "The scene leaves no room for the spheres: make the box or the "
+                                "container larger, or the spheres smaller or fewer";
+  if (!step_.settings.warn_only) error->all(FLERR, "Fix inelastic: {}. {}", message, CAUSE);
+  if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
+}
+
 std::string UnsolvedStep::no_room(const inelastic::ProjectionResult &result,
                                   std::string &cause) const
 {

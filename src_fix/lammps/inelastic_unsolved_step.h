@@ -5,6 +5,7 @@
 #define INELASTIC_UNSOLVED_STEP_H
 
 #include "inelastic_projection.h"
+#include "inelastic_push_apart.h"
 #include "inelastic_step.h"
 
 #include "pointers.h"
@@ -51,6 +52,8 @@ class UnsolvedStep : protected Pointers {
 
   // Stops the run, or warns where the keyword maxiter allows it. Collective.
   void report(const inelastic::ProjectionResult &result);
+  // The same for overlaps that a push no longer opens.
+  void report_jam(const PushApart::Left &left);
 
  private:
   std::string no_room(const inelastic::ProjectionResult &result, std::string &cause) const;

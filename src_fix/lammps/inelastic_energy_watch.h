@@ -1,0 +1,50 @@
+// The kinetic energy that contacts add in a step. A projection takes energy away, but for what it
+// gives back of overlaps, what a law or a moving wall adds, and what its residuals leave. Where a
+// network has no room for what it is to give back, the force that this takes, and the energy, have
+// no bound: such a step is to be solved again, with overlaps as deep as they are.
+//
+// For a cluster of mass M (inelastic_clusters.h), of whose overlaps none is given back faster than
+// b [length / time], a step may add
+//
+//   1/2 M (10 b)^2 + sum over contacts of |lambda| t / h
+//
+// t is the target of the contact [length] (inelastic_contact_targets.h).
+
+#ifndef INELASTIC_ENERGY_WATCH_H
+#define INELASTIC_ENERGY_WATCH_H
+
+#include "inelastic_clusters.h"
+#include "inelastic_step.h"
+
+#include "pointers.h"
+
+#include <vector>
+
+namespace LAMMPS_NS::Inelastic_NS {
+
+class GhostExchange;
+
+class EnergyWatch : protected Pointers {
+ public:
+  EnergyWatch(class LAMMPS *lmp, const Step &step, GhostExchange &ranks);
+
+  void begin_run() { most_ = 0.0; }
+  // Tells whether the contacts of a cluster that gives back overlaps add more than they may in the
+  // step, which is solved; `target` [length] has one number per constraint. Collective.
+  bool adds_too_much(const std::vector<double> &target);
+  // Notes that the step is taken as adds_too_much() has seen it.
+  void end_step();
+  // The most that the contacts of a cluster have added in a step of the run beside what laws and
+  // walls that move do [energy, in the units of mass velocity^2].
+  double most() const { return most_; }
+
+ private:
+  const Step &step_;
+  GhostExchange &ranks_;
+  Clusters clusters_;
+  double added_ = 0.0, most_ = 0.0;
+};
+
+}    // namespace LAMMPS_NS::Inelastic_NS
+
+#endif
