@@ -173,9 +173,8 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     Row &row = step_.rows[c];
     const Contact &contact = step_.contact_of(c);
-    const double linear_gap = contact.gap_now - limited(contact, 0.0) - row.wall_motion;
-    const double lessened =
-        contact.gap_now - limited(contact, -LEFT * tolerance) - row.wall_motion;
+    const double linear_gap = contact.gap_now - row.wall_motion;
+    const double lessened = linear_gap + LEFT * tolerance;
     // Gaps that were set by the end of the step are kept there by follow().
     if (!row.as_at_start && contacts.gap[c] != lessened) continue;
     if (contacts.gap[c] == linear_gap || overlaps_.is_bad(contact.gap_now)) continue;

@@ -78,35 +78,42 @@ void PushApart::ask_for_all(bool gives_way)
     if (contact.gap_now <= step_.settings.tolerance)
       contacts.gap[c] =
           constraints_.rules().effective_gap(contact) - step_.rows[c].wall_motion;
-    if (gives_way && contact.gap_now < 0.0)
+    if (gives_way && constraints_.overlaps().is_bad(contact.gap_now))
       contacts.compliance[c] =
           GIVES_WAY * contacts.diagonal(c, step_.problem, step_.problem.timestep);
+    else if (gives_way && contact.gap_now < 0.0)
+      contacts.gap[c] = -step_.rows[c].wall_motion;
     contacts.impulse[c] = 0.0;
   }
   if (movers_.any_turns()) constraints_.entangled().disentangle(atom, constraints_.overlaps());
 }
 
-// Looks how far bad overlaps open, and at what is left of them at the end of the step.
-void PushApart::look_at_opening()
+// Looks how far bad overlaps open, and at what is left of them at the end of the step. Returns
+// whether none becomes deeper by more than a push may open it: walls that close would drive spheres
+// into one another where these give way. Collective.
+bool PushApart::look_at_opening()
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const double h = step_.problem.timestep, tolerance = step_.settings.tolerance;
   enum { NUMBER, OPENED, ASKED, SUMS };
   double sums[SUMS] = {0.0, 0.0, 0.0};
+  double driven = 0.0;
   double deepest = 0.0;
   std::string named;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const Contact &contact = step_.contact_of(c);
-    if (!constraints_.overlaps().is_bad(contact.gap_now)) continue;
+    if (contact.gap_now >= 0.0) continue;
     const int i = contacts.first[c], j = contacts.second[c];
     const double *const n = &contacts.normal[3 * c];
     const double *const one = &step_.velocity[3 * static_cast<std::size_t>(i)];
     const double *const other = &step_.velocity[3 * static_cast<std::size_t>(j)];
-    const double opens = h * (dot(n, one) - dot(n, other));
-    const double asked = -contacts.gap[c];
+    const double opens = h * (dot(n, one) - dot(n, other)) - step_.rows[c].wall_motion;
+    if (opens < -PUSH_LIMIT * contact.size * h / step_.regular_timestep) driven = 1.0;
+    if (!constraints_.overlaps().is_bad(contact.gap_now)) continue;
+    const double asked = -contacts.gap[c] - step_.rows[c].wall_motion;
     sums[OPENED] += asked * std::min(opens, asked);
     sums[ASKED] += asked * asked;
-    const double depth = step_.rows[c].wall_motion - contact.gap_now - opens;
+    const double depth = -contact.gap_now - opens;
     if (depth > REGULAR_OVERLAP * tolerance) sums[NUMBER] += 1.0;
     if (depth <= deepest) continue;
     deepest = depth;
@@ -114,7 +121,7 @@ void PushApart::look_at_opening()
         ? fmt::format("atom {} and wall {}", atom->tag[i], contact.wall())
         : fmt::format("atoms {} and {}", atom->tag[i], contact.partner);
   }
-  ranks_.reduce(sums, SUMS, nullptr, 0);
+  ranks_.reduce(sums, SUMS, &driven, 1);
   left_.number = sums[NUMBER];
   const int rank = ranks_.rank_of_largest(deepest, &left_.largest);
   left_.named = ranks_.said_by(rank, named);
@@ -124,6 +131,7 @@ void PushApart::look_at_opening()
   else if (looked_at_ != update->ntimestep)
     ++in_vain_;
   looked_at_ = update->ntimestep;
+  return driven == 0.0;
 }
 
 void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
@@ -151,7 +159,8 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
       result.iterations += pushed.iterations;
     gives_way_ = gives_way_ || !solved;
   }
-  look_at_opening();
+  if (!look_at_opening() && gives_way_)
+    result.status = inelastic::worse(result.status, inelastic::Status::INFEASIBLE);
 
   problem.contacts = contacts;
   step_.rows.resize(contacts.size());

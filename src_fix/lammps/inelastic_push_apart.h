@@ -52,7 +52,7 @@ class PushApart : protected Pointers {
  private:
   void begin_trial(const inelastic::ContactSet &contacts);
   void ask_for_all(bool gives_way);
-  void look_at_opening();
+  bool look_at_opening();
 
   Step &step_;
   Constraints &constraints_;
