@@ -45,7 +45,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     solver_(inelastic::make_solver(settings_.solver)), push_apart_(lmp, step_, constraints_, ranks_, movers_),
     length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_, movers_),
     check_(lmp, this, step_, ranks_, state_, movers_), hard_(lmp, step_, ranks_),
-    energy_(lmp, step_, ranks_), unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_),
+    energy_(lmp, step_, constraints_.rules(), ranks_), unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_),
     squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {

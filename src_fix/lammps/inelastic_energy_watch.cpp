@@ -1,5 +1,6 @@
 #include "inelastic_energy_watch.h"
 
+#include "inelastic_gap_rules.h"
 #include "inelastic_ghost_exchange.h"
 
 #include "atom.h"
@@ -11,8 +12,9 @@ using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
 using inelastic::dot;
 
-EnergyWatch::EnergyWatch(LAMMPS *lmp, const Step &step, GhostExchange &ranks) :
-    Pointers(lmp), step_(step), ranks_(ranks), clusters_(lmp, step, ranks)
+EnergyWatch::EnergyWatch(LAMMPS *lmp, const Step &step, const GapRules &rules,
+                         GhostExchange &ranks) :
+    Pointers(lmp), step_(step), rules_(rules), ranks_(ranks), clusters_(lmp, step, ranks)
 {
 }
 
@@ -56,8 +58,12 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
     double *const s = &sums[SUMS * k];
     s[ADDED] += added;
     s[SIZE] += 0.5 * std::abs(impulse) * (std::abs(after) + std::abs(before));
-    if (c < target.size()) s[TARGETS] += std::abs(impulse) * target[c] / h;
     const Contact &contact = step_.contact_of(c);
+    const Row &row = step_.rows[c];
+    const double turns = row.as_at_start
+        ? 0.0
+        : contact.gap_now - rules_.wanted_gap(contact) - row.wall_motion - contacts.gap[c];
+    s[TARGETS] += std::abs(impulse) * (target[c] + std::max(0.0, turns)) / h;
     if (contact.asked.parts || contact.asked.set.may_pull()) s[BY_LAW] += std::max(0.0, added);
     if (impulse > 0.0 && contact.gap_now < 0.0 && after > 0.0) gives[k] = 1.0;
   }

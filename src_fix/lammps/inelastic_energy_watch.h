@@ -6,9 +6,10 @@
 // For a cluster of mass M (inelastic_clusters.h), of whose overlaps none is given back faster than
 // b [length / time], a step may add
 //
-//   1/2 M (10 b)^2 + sum over contacts of |lambda| t / h
+//   1/2 M (10 b)^2 + sum over contacts of |lambda| (t + s) / h
 //
-// t is the target of the contact [length] (inelastic_contact_targets.h).
+// t is the target of the contact [length] (inelastic_contact_targets.h), s the length by which its
+// gap closes because bodies turn, or walls curve, in the step: velocities open it by as much more.
 
 #ifndef INELASTIC_ENERGY_WATCH_H
 #define INELASTIC_ENERGY_WATCH_H
@@ -22,11 +23,12 @@
 
 namespace LAMMPS_NS::Inelastic_NS {
 
+class GapRules;
 class GhostExchange;
 
 class EnergyWatch : protected Pointers {
  public:
-  EnergyWatch(class LAMMPS *lmp, const Step &step, GhostExchange &ranks);
+  EnergyWatch(class LAMMPS *lmp, const Step &step, const GapRules &rules, GhostExchange &ranks);
 
   void begin_run() { most_ = 0.0; }
   // Tells whether the contacts of a cluster that gives back overlaps add more than they may in the
@@ -40,6 +42,7 @@ class EnergyWatch : protected Pointers {
 
  private:
   const Step &step_;
+  const GapRules &rules_;
   GhostExchange &ranks_;
   Clusters clusters_;
   double added_ = 0.0, most_ = 0.0;

@@ -234,6 +234,31 @@ def free_directions(normals: Array) -> Array:
     return np.asarray(directions[sizes <= HOLDS])
 
 
+@dataclass(frozen=True, eq=False)
+class _Gained:
+    """What a step adds to kinetic energies.
+
+    Attributes
+    ----------
+    clusters : what contacts with a force connect
+    sphere : (rows,) of each contact, one that contacts move
+    gained, size : (spheres,) of each one, or of its body in the first of its spheres; and what
+        round-off is a part of
+    speed : the largest at which an overlap is given back
+    allowed : (rows,) what each contact may add
+    impulse, end : (rows,) of each contact, and its linearised gap at the end
+    """
+
+    clusters: Clusters
+    sphere: Array
+    gained: Array
+    size: Array
+    speed: float
+    allowed: Array
+    impulse: Array
+    end: Array
+
+
 @dataclass(eq=False)
 class _Frame:
     """One step: what was read, and what follows from it."""
@@ -261,6 +286,9 @@ class _Frame:
     # By how much these may be off.
     body_slack: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
     bodies: Table | None = None
+    # What the step adds to energies, and the list of its contacts.
+    gained: _Gained | None = None
+    listed_all: dict[str, Any] | None = None
     # The list, the linearised gaps at the end of the step, and where these are exact.
     listed: dict[str, Any] | None = None
     ends: Array = field(default_factory=lambda: np.zeros(0))
@@ -348,6 +376,7 @@ class _Part:
         self.motion(new, last, listed)
         if last is not None:
             self.followed(new, last)
+            self.energy_gained(new, last)
         return new
 
     def wrong(self, kind: str, what: str) -> None:
@@ -1213,6 +1242,7 @@ class _Part:
         """
         if self.facts["warn"]:
             return
+        new.listed_all = listed
         # The velocities at the start of a run may be half way through a collision, and slow there.
         if "law restitution" in self.facts["words"] and kick < new.h:
             return
@@ -1265,19 +1295,49 @@ class _Part:
             frozen = new.kind[side] == FROZEN
             work = sign * (n[frozen] * velocity[side[frozen]]).sum(axis=1)
             allowed[frozen] += np.maximum(0, impulse[frozen] * work)
-        clusters = clusters_of(listed, new.molecule, movable)
-        one = np.where(movable[i], clusters.of_sphere[i], clusters.of_sphere[other])
-        for spheres, _ in clusters:
-            mine = one == clusters.of_sphere[spheres[0]]
+        new.gained = _Gained(
+            clusters_of(listed, new.molecule, movable),
+            np.where(movable[i], i, other),
+            gained,
+            size,
+            speed,
+            allowed,
+            impulse,
+            listed["gap"] + new.h * u,
+        )
+
+    def energy_gained(self, new: _Frame, last: _Frame) -> None:
+        """(c) What the step before gained; its end tells by how much turning has closed gaps.
+
+        Where bodies turn, or walls curve, velocities have to part surfaces by as much more.
+        """
+        if last.gained is None or last.listed_all is None:
+            return
+        of, listed = last.gained, last.listed_all
+        acts = of.impulse > 0
+        closed = np.zeros(len(acts))
+        i, j, pair = listed["i"], listed["j"], listed["pair"]
+        end = np.linalg.norm(self.apart(new, i, j), axis=1) - new.radius[i] - new.radius[j]
+        closed[pair] = of.end[pair] - end[pair]
+        for row in np.flatnonzero(acts & ~pair).tolist():
+            wall, k = int(listed["wall"][row]), i[row]
+            seen = [self.seen_by(s, wall, new.x[k : k + 1], new.time) for s in self.shapes]
+            distances = [float(view.distance[0]) for view in seen if view is not None]
+            if distances:
+                closed[row] = of.end[row] - min(distances) + new.radius[k]
+        turning = np.maximum(0, of.impulse) * np.maximum(0, closed) / last.h
+        cluster = of.clusters.of_sphere[of.sphere]
+        for spheres, _ in of.clusters:
+            mine = cluster == of.clusters.of_sphere[spheres[0]]
             if not mine.any():
                 continue
             self.report.seen["energies"] += 1
-            mass = new.mass[spheres].sum()
-            most = 0.5 * mass * (10 * speed) ** 2 + allowed[mine].sum()
-            more = gained[spheres].sum()
-            if more > most * (1 + 1e-9) + 10 * ROUND_OFF * size[spheres].sum():
+            mass = last.mass[spheres].sum()
+            most = 0.5 * mass * (10 * of.speed) ** 2 + (of.allowed + turning)[mine].sum()
+            more = of.gained[spheres].sum()
+            if more > most * (1 + 1e-9) + 10 * ROUND_OFF * of.size[spheres].sum():
                 self.wrong(
                     "energy",
-                    f"the cluster of {int(new.id[spheres[0]])}, {len(spheres)} spheres, gained "
-                    f"{more:.6g}, {most:.6g} allowed",
+                    f"in the step before the cluster of {int(last.id[spheres[0]])}, {len(spheres)} "
+                    f"spheres, gained {more:.6g}, {most:.6g} allowed",
                 )
