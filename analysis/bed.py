@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .cell import ROUND_OFF
 from .geometry import BoolArray, FloatArray, as_box, as_walls
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # Width of a column [largest diameters]. In narrower ones the gap between two spheres of a dense bed
 # would be its end; wider ones hide a pit of the surface.
@@ -64,6 +64,7 @@ class BoxInBed:
         return ", ".join(found) or "a gap in the box"
 
 
+@takes_spheres
 def box_in_bed(spheres: Spheres, box: ArrayLike, walls: ArrayLike | None = None) -> BoxInBed:
     """Find how much of a box lies inside a bed of spheres, and where the bed ends.
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from .coordination import contact_sides
 from .errors import InputError
 from .geometry import FloatArray, IntArray, as_floats
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,7 @@ class ContactLines:
     ends: FloatArray
 
 
+@takes_spheres
 def contact_lines(
     contact_ids: ArrayLike, sphere_ids: ArrayLike, spheres: Spheres, points: ArrayLike
 ) -> ContactLines:

@@ -18,7 +18,7 @@ from .contact_lines import ContactLines, contact_lines
 from .contacts import STORED, ContactFrame
 from .export_files import named, whole_file, write_table
 from .geometry import FloatArray, IntArray, as_box, inside_of
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # A force of the mean strength is drawn so thick, in mean radii of the spheres; the largest at most
 # four times as thick, the weakest so that they are still seen. `draw_network` shows the same range.
@@ -26,6 +26,7 @@ MEAN_RADIUS = 0.1
 THICKEST, THINNEST = 4.0, 0.15
 
 
+@takes_spheres
 def write_contacts_vtk(
     path: str | PathLike[str],
     contacts: ContactFrame,
@@ -83,6 +84,7 @@ def write_contacts_vtk(
     return len(owner)
 
 
+@takes_spheres
 def write_contacts_csv(
     path: str | PathLike[str],
     contacts: ContactFrame,
@@ -124,6 +126,7 @@ def write_contacts_csv(
     return len(kept)
 
 
+@takes_spheres
 def write_bonds(
     path: str | PathLike[str],
     contacts: ContactFrame,

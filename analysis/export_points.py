@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .export_files import given, named, numbers, whole_file, write_table
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # meshio is imported by the function that needs it: those who only measure shall not wait for it.
 
 
+@takes_spheres
 def write_xyz(
     path: str | PathLike[str],
     spheres: Spheres,
@@ -60,6 +61,7 @@ def write_xyz(
         np.savetxt(file, table, layout, header=f"{len(spheres)}\n{' '.join(words)}", comments="")
 
 
+@takes_spheres
 def write_vtk(
     path: str | PathLike[str],
     spheres: Spheres,
@@ -98,6 +100,7 @@ def write_vtk(
         meshio.write(file, mesh, file_format="vtu")
 
 
+@takes_spheres
 def write_csv(
     path: str | PathLike[str],
     spheres: Spheres,
@@ -132,6 +135,7 @@ def write_csv(
     write_table(target, columns)
 
 
+@takes_spheres
 def write_json(
     path: str | PathLike[str],
     spheres: Spheres,
@@ -180,6 +184,7 @@ def write_json(
         file.write_text(text, encoding="utf-8")
 
 
+@takes_spheres
 def write_pqr(
     path: str | PathLike[str],
     spheres: Spheres,

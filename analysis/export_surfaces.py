@@ -9,7 +9,7 @@ import numpy as np
 from .errors import InputError
 from .export_files import named, whole_file
 from .geometry import FloatArray, as_count
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # trimesh is imported by the function that needs it: it takes a second, and those who only measure
 # shall not wait for it.
@@ -22,6 +22,7 @@ FACES_AT_ONCE = 200_000
 _FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
+@takes_spheres
 def write_stl(
     path: str | PathLike[str],
     spheres: Spheres,

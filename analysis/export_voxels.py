@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InputError
 from .export_files import named, numbers, whole_file
 from .geometry import FloatArray, IntArray, as_box
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # tifffile is imported by the function that needs it: those who only measure shall not wait for it.
 
@@ -88,6 +88,7 @@ def voxel_shape(box: ArrayLike, voxel: float) -> tuple[int, int, int]:
     return slices, rows, columns
 
 
+@takes_spheres
 def voxel_slices(spheres: Spheres, box: ArrayLike, voxel: float) -> Iterator[ByteArray]:
     """Compute the voxel image of spheres in a box slice by slice, from zlo to zhi.
 
@@ -116,6 +117,7 @@ def voxel_slices(spheres: Spheres, box: ArrayLike, voxel: float) -> Iterator[Byt
     return _slices((drawn.positions - bounds[:, 0]) / voxel - 0.5, drawn.radii / voxel, shape)
 
 
+@takes_spheres
 def write_tiff(
     path: str | PathLike[str],
     spheres: Spheres,
@@ -175,6 +177,7 @@ def write_tiff(
     return VoxelImage(computed.shape, voxel, computed.solid)
 
 
+@takes_spheres
 def write_raw(
     path: str | PathLike[str],
     spheres: Spheres,

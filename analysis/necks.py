@@ -18,7 +18,7 @@ from .bodies import dimer_spheres
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray
 from .packing import Cover, PackingFraction, Region, as_points
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 from .volumes import require_balls, require_dimers
 
 # Positions in a dump are rounded: two spheres that touch may seem apart by this share of a radius,
@@ -63,6 +63,7 @@ def neck_volume(radius: float, distance: float) -> float:
     return float(4 * math.pi * radius**3 * angle**2 * scipy.special.spherical_jn(1, angle))
 
 
+@takes_spheres
 def packing_fraction_with_necks(
     spheres: Spheres,
     box: ArrayLike | None = None,

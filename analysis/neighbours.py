@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray, as_integers, as_walls
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # One reach for all spheres is the fastest up to this ratio of the largest to the smallest radius.
 SIMILAR_RADII = 1.5
@@ -64,6 +64,7 @@ class DistanceContacts:
         )
 
 
+@takes_spheres
 def contacts_by_distance(
     spheres: Spheres, criterion: float, walls: ArrayLike | None = None
 ) -> DistanceContacts:

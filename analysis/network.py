@@ -12,7 +12,7 @@ from .contact_lines import ContactLines, contact_lines
 from .coordination import contact_sides
 from .errors import InputError
 from .geometry import FloatArray, IntArray, as_floats, as_integers, as_positions
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 if TYPE_CHECKING:
     import networkx
@@ -87,6 +87,7 @@ def _shares(contact_ids: ArrayLike, forces: ArrayLike) -> dict[tuple[int, int], 
     return shares
 
 
+@takes_spheres
 def contact_graph(
     contact_ids: ArrayLike,
     sphere_ids: ArrayLike,

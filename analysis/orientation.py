@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .bodies import dimer_spheres
 from .errors import InputError
 from .geometry import FloatArray
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,7 @@ class Orientation:
         return math.sqrt(float((self.components[: self.dimensions] ** 2).mean()))
 
 
+@takes_spheres
 def dimer_orientation(spheres: Spheres, box: ArrayLike | None = None) -> Orientation:
     """Measure the orientation of the dimers whose centres lie in a box.
 

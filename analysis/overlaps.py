@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .geometry import as_walls
 from .neighbours import near_pairs
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 FACES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
@@ -47,6 +47,7 @@ class WallOverlap:
     face: str | None
 
 
+@takes_spheres
 def largest_pair_overlap(spheres: Spheres) -> PairOverlap:
     """Find the two spheres of different particles that overlap most, across periodic faces too.
 
@@ -67,6 +68,7 @@ def largest_pair_overlap(spheres: Spheres) -> PairOverlap:
     return PairOverlap(float(depth[deepest]), (int(near.first[deepest]), int(near.second[deepest])))
 
 
+@takes_spheres
 def largest_wall_overlap(spheres: Spheres, container: ArrayLike) -> WallOverlap:
     """Find the sphere that overlaps most with one of the planes that bound a container.
 

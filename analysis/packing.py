@@ -14,7 +14,7 @@ from .areas import areas_in
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, as_box, as_count, spheres_reaching
 from .neighbours import near_pairs, pairs_among
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 from .volumes import Pieces, pieces_of, split
 
 # Points are drawn in batches: the memory stays small, however many are asked for.
@@ -71,6 +71,7 @@ class MeasuredPackingFraction:
     drawn: PackingFraction
 
 
+@takes_spheres
 def measure_packing_fraction(
     spheres: Spheres, box: ArrayLike | None = None, *, points: int = 1_000_000, seed: int = 0
 ) -> MeasuredPackingFraction:
@@ -92,6 +93,7 @@ def measure_packing_fraction(
     return MeasuredPackingFraction(exact.value, exact, drawn)
 
 
+@takes_spheres
 def best_packing_fraction(
     spheres: Spheres, box: ArrayLike | None = None, *, points: int = 1_000_000, seed: int = 0
 ) -> float:
@@ -113,6 +115,7 @@ def best_packing_fraction(
     return packing_fraction(spheres, box, points=points, seed=seed).value
 
 
+@takes_spheres
 def packing_fraction(
     spheres: Spheres, box: ArrayLike | None = None, *, points: int = 1_000_000, seed: int = 0
 ) -> PackingFraction:
@@ -141,6 +144,7 @@ def packing_fraction(
     return region.share_of_points(cover.holds, points, seed)
 
 
+@takes_spheres
 def exact_packing_fraction(spheres: Spheres, box: ArrayLike | None = None) -> ExactPackingFraction:
     """Compute the packing fraction of spheres and dimers in a box without random points.
 

@@ -18,7 +18,7 @@ from .cell import Cell
 from .errors import InputError, PictureError
 from .files import reason_of, unfinished
 from .geometry import FloatArray, IntArray, as_box, as_count, as_integers
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # A picture is drawn so many times larger and then reduced, which smooths all edges.
 OVERSAMPLING = 2
@@ -68,6 +68,7 @@ class _Shading:
         ]
 
 
+@takes_spheres
 def draw_packing(
     path: str | PathLike[str],
     spheres: Spheres,

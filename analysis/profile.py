@@ -25,7 +25,7 @@ from .geometry import (
 )
 from .overlaps import FACES
 from .packing import packing_fraction
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 from .volumes import Pieces, pieces_of
 
 # Pairs of a sphere and a slab are worked off in groups of about this many, to bound the memory.
@@ -53,6 +53,7 @@ class WallProfile:
     uncertainties: FloatArray | None
 
 
+@takes_spheres
 def wall_profile(
     spheres: Spheres,
     box: ArrayLike,
@@ -105,6 +106,7 @@ def wall_profile(
     return WallProfile(slabs.middles, slabs.middles / scale, values, None)
 
 
+@takes_spheres
 def wall_profile_monte_carlo(
     spheres: Spheres,
     box: ArrayLike,

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, as_count, as_floats
 from .neighbours import contacts_by_distance
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # Exponents beyond this are no power law of a packing.
 STEEPEST = 20.0
@@ -113,6 +113,7 @@ def _mean_of_logarithm(s: float, length: float) -> float:
     return (length / -math.expm1(-t) if t > -STEEPEST_TERM else 0.0) - 1 / s
 
 
+@takes_spheres
 def small_gaps(spheres: Spheres, largest: float, left_out: BoolArray | None = None) -> FloatArray:
     """Return the gaps between spheres of different particles up to a largest one, in any order.
 

@@ -6,8 +6,11 @@ particles next to a box, and what holds for an open packing holds for the copies
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -272,3 +275,27 @@ def _gather(positions: FloatArray, radii: FloatArray, members: IntArray, cell: C
         place[row, last] = near[row, last]
         placed[row, last] = True
     positions[members] = place
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def takes_spheres(measure: Callable[P, R]) -> Callable[P, R]:
+    """Let a measure of `spheres` refuse what are none, such as an array of positions.
+
+    Raises InputError when the measure is called so, which says how to make them.
+    """
+    place = list(inspect.signature(measure).parameters).index("spheres")
+
+    @wraps(measure)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        given = args[place] if place < len(args) else kwargs.get("spheres")
+        if given is not None and not isinstance(given, Spheres):
+            raise InputError(
+                f"{measure.__name__}: spheres must be of the class Spheres, as frame.spheres is, "
+                f"not {type(given).__name__}: Spheres(positions, radii) makes them of arrays"
+            )
+        return measure(*args, **kwargs)
+
+    return checked

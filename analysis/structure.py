@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray, as_box, as_count, inside_of
 from .packing import Region
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,6 +118,7 @@ class BondOrder:
         return found | {"disordered": 1.0 - self.crystalline_share}
 
 
+@takes_spheres
 def radial_distribution(
     spheres: Spheres, box: ArrayLike | None = None, *, largest: float, bins: int = 200
 ) -> RadialDistribution:
@@ -167,6 +168,7 @@ def radial_distribution(
     )
 
 
+@takes_spheres
 def bond_order(spheres: Spheres, box: ArrayLike | None = None, *, w6: bool = False) -> BondOrder:
     """Measure the bond-orientational order of the particles in a box away from the walls.
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from .bodies import Particles, dimer_spheres
 from .errors import InputError
 from .geometry import BoolArray, FloatArray, IntArray, as_box
-from .spheres import Spheres
+from .spheres import Spheres, takes_spheres
 
 # Rows are worked off in blocks: the temporary arrays of one fit into a processor's cache.
 BLOCK = 2048
@@ -111,6 +111,7 @@ class Pieces:
         return clipped
 
 
+@takes_spheres
 def sphere_volumes_in_box(spheres: Spheres, box: ArrayLike) -> FloatArray:
     """Return the volume of each sphere's part in a box, (n,), length^3.
 
@@ -134,6 +135,7 @@ def sphere_volumes_in_box(spheres: Spheres, box: ArrayLike) -> FloatArray:
     return sums
 
 
+@takes_spheres
 def particle_volumes_in_box(spheres: Spheres, box: ArrayLike) -> FloatArray:
     """Return the volume of each particle's part in a box, (p,), length^3.
 

@@ -529,7 +529,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
     check_.after_step(output_.largest_change());
   }
   const bool solved = result.status == inelastic::Status::CONVERGED;
-  overlaps.end_step(solved && constraints_.entangled().empty(), push_apart_.left().largest);
+  overlaps.end_step(solved && constraints_.entangled().empty(), push_apart_.deepest_at_end());
   restart_peratom = overlaps.pushes_in_velocity() || laws_.has_law();
   restart_global = length_.is_shortened() || laws_.has_law();
   {

@@ -234,9 +234,13 @@ void BodyMembers::check_reach() const
                "Fix inelastic rigid: ranks and periodic images see {:.6g} far, which is too short "
                "for bodies of this size: set comm_modify cutoff to at least {:.6g}",
                cutoff, ROUNDED_UP * needed);
-  if (periods.narrowest() < 2.0 * needed)
-    error->all(FLERR,
-               "Fix inelastic rigid: the periodic box is {:.6g} wide and must be at least {:.6g}, "
-               "so that no body can meet its own image",
-               periods.narrowest(), 2.0 * ROUNDED_UP * needed);
+  if (periods.narrowest() >= 2.0 * needed) return;
+  const double most = (periods.narrowest() / 2.0 - needed) / ROUNDED_UP + neighbor->skin;
+  error->all(FLERR,
+             "Fix inelastic rigid: the periodic box is {:.6g} wide and must be at least {:.6g}, so "
+             "that no body can meet its own image{}",
+             periods.narrowest(), 2.0 * ROUNDED_UP * needed,
+             most > 0.0 ? fmt::format(", or the skin of command neighbor, {:.6g}, at most {:.4g}",
+                                      neighbor->skin, most)
+                        : "");
 }

@@ -52,6 +52,7 @@ void PushApart::skip()
   gives_way_ = false;
   in_vain_ = 0;
   left_ = Left{};
+  deepest_at_end_ = 0.0;
 }
 
 bool PushApart::in_vain() const
@@ -88,16 +89,16 @@ void PushApart::ask_for_all(bool gives_way)
   if (movers_.any_turns()) constraints_.entangled().disentangle(atom, constraints_.overlaps());
 }
 
-// Looks how far bad overlaps open, and at what is left of them at the end of the step. Returns
-// whether none becomes deeper by more than a push may open it: walls that close would drive spheres
-// into one another where these give way. Collective.
+// Counts bad overlaps, and looks how far they open and what the push leaves of them. Returns
+// whether none becomes deeper than the deepest by more than a push may open it: walls that close
+// would drive spheres into one another where these give way. Collective.
 bool PushApart::look_at_opening()
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
-  const double h = step_.problem.timestep, tolerance = step_.settings.tolerance;
+  const double h = step_.problem.timestep;
   enum { NUMBER, OPENED, ASKED, SUMS };
   double sums[SUMS] = {0.0, 0.0, 0.0};
-  double driven = 0.0;
+  double maxima[2] = {0.0, 0.0};    // whether one is driven deeper, and what is left of them
   double deepest = 0.0;
   std::string named;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
@@ -108,20 +109,22 @@ bool PushApart::look_at_opening()
     const double *const one = &step_.velocity[3 * static_cast<std::size_t>(i)];
     const double *const other = &step_.velocity[3 * static_cast<std::size_t>(j)];
     const double opens = h * (dot(n, one) - dot(n, other)) - step_.rows[c].wall_motion;
-    if (opens < -PUSH_LIMIT * contact.size * h / step_.regular_timestep) driven = 1.0;
+    const double most = PUSH_LIMIT * contact.size * h / step_.regular_timestep;
+    if (-contact.gap_now - opens > step_.largest_overlap + most) maxima[0] = 1.0;
     if (!constraints_.overlaps().is_bad(contact.gap_now)) continue;
     const double asked = -contacts.gap[c] - step_.rows[c].wall_motion;
     sums[OPENED] += asked * std::min(opens, asked);
     sums[ASKED] += asked * asked;
-    const double depth = -contact.gap_now - opens;
-    if (depth > REGULAR_OVERLAP * tolerance) sums[NUMBER] += 1.0;
-    if (depth <= deepest) continue;
-    deepest = depth;
+    maxima[1] = std::max(maxima[1], -contact.gap_now - opens);
+    sums[NUMBER] += 1.0;
+    if (-contact.gap_now <= deepest) continue;
+    deepest = -contact.gap_now;
     named = contact.is_with_wall()
         ? fmt::format("atom {} and wall {}", atom->tag[i], contact.wall())
         : fmt::format("atoms {} and {}", atom->tag[i], contact.partner);
   }
-  ranks_.reduce(sums, SUMS, &driven, 1);
+  ranks_.reduce(sums, SUMS, maxima, 2);
+  deepest_at_end_ = maxima[1];
   left_.number = sums[NUMBER];
   const int rank = ranks_.rank_of_largest(deepest, &left_.largest);
   left_.named = ranks_.said_by(rank, named);
@@ -131,7 +134,7 @@ bool PushApart::look_at_opening()
   else if (looked_at_ != update->ntimestep)
     ++in_vain_;
   looked_at_ = update->ntimestep;
-  return driven == 0.0;
+  return maxima[0] == 0.0;
 }
 
 void PushApart::run(inelastic::ProjectionResult &result, const Project &project)

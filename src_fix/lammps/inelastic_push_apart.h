@@ -41,13 +41,15 @@ class PushApart : protected Pointers {
 
   // Tells whether the overlaps no longer open, so that there is no room.
   bool in_vain() const;
-  // The bad overlaps that the last step leaves at its end: their number, and the largest [length]
-  // with the names of the two. None after a step without bad ones.
+  // The bad overlaps at the present positions: their number, and the largest [length] with the
+  // names of the two. None in a step without bad ones.
   struct Left {
     double number = 0.0, largest = 0.0;
     std::string named;
   };
   const Left &left() const { return left_; }
+  // The largest overlap that the push leaves at the end of the step [length].
+  double deepest_at_end() const { return deepest_at_end_; }
 
  private:
   void begin_trial(const inelastic::ContactSet &contacts);
@@ -63,6 +65,7 @@ class PushApart : protected Pointers {
   int in_vain_ = 0;           // steps in a row, whatever runs they belong to
   bigint looked_at_ = -1;     // the step that was counted last
   Left left_;
+  double deepest_at_end_ = 0.0;    // [length]
 };
 
 }    // namespace LAMMPS_NS::Inelastic_NS

@@ -100,6 +100,8 @@ def run(options: argparse.Namespace) -> int:
     if options.contact_gap is not None and not 0 <= options.contact_gap < np.inf:
         raise AnalysisError(f"--contact-gap must be 0 or more, not {options.contact_gap:g}")
     folder: Path = options.folder
+    if not folder.exists():
+        raise AnalysisError(f"{folder}: no such file or folder")
     name = PARTICLE_DUMP if options.dump is None else options.dump
     if folder.is_file():
         if options.dump is not None:

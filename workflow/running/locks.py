@@ -59,13 +59,15 @@ def is_locked(path: Path) -> bool:
         handle = os.open(path, os.O_RDONLY | _PLAIN)
     except OSError:
         return False
-    with os.fdopen(handle) as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return False
+    # Not a file object: a folder in its place cannot become one.
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(handle)
     return False
 
 
