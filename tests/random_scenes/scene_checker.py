@@ -56,6 +56,8 @@ REAL_TURNING = 2
 HALF_A_TURN = 3.0
 # Of the sum of two radii, the overlap from which bodies are pushed along the line of their centres.
 ENTANGLED = 0.05
+# Of the sum of two radii, by how much a push opens an overlap at most.
+PUSHED = 0.05
 # Of the length of a normal at a wall.
 NORMAL_AT_WALL = 1e-9
 # Contacts hold a direction if their normals have more than such a part along it.
@@ -463,7 +465,11 @@ class _Part:
         bound: Array,
         shape: Shape | None = None,
     ) -> None:
-        """Overlaps beyond the bound are those of the frame before, and no deeper."""
+        """Overlaps beyond the bound are those of the frame before.
+
+        Where bad ones cannot all be opened at once they give way to one another: none becomes
+        deeper than the deepest was by more than a push may open it.
+        """
         if last is None:
             # What a run begins with is the deck's, or that of an earlier tolerance.
             started_well = not (self.facts["bad_start"] or self.facts["warn"])
@@ -492,6 +498,7 @@ class _Part:
             sizes = last.radius[i[beyond]] + last.radius[j[beyond]]
             earlier = sizes - np.linalg.norm(away, axis=1)
         else:
+            sizes = last.radius[i[beyond]]
             earlier = np.array(
                 [
                     max(
@@ -502,10 +509,8 @@ class _Part:
                     for k, wall in zip(i[beyond], j[beyond], strict=True)
                 ]
             )
-        # What overlapped may be as deep as it was, to within the bound of a regular contact.
-        deeper = (
-            depth[beyond] - np.where(earlier > REGULAR * self.eps, earlier, 0.0) > bound[beyond]
-        )
+        most = np.maximum(earlier, last.deepest + PUSHED * sizes)
+        deeper = depth[beyond] - np.where(earlier > REGULAR * self.eps, most, 0.0) > bound[beyond]
         for k in np.flatnonzero(deeper):
             if shape is None:
                 deeper[k] = not self.are_entangled(last, i[beyond[k]], j[beyond[k]])
