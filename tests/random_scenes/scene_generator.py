@@ -128,7 +128,7 @@ def random_scene(seed: int, *, crowded: bool = False) -> Scene:
     """
     for attempt in range(100):
         with suppress(NoPlaceError):
-            return _Draw(seed, attempt, crowded).scene()
+            return SceneDraw(seed, attempt, crowded).scene()
     raise NoPlaceError
 
 
@@ -148,7 +148,7 @@ class _Spheres:
 
 
 @dataclass
-class _Draw:
+class SceneDraw:
     """The drawing of one scene, from the outside inwards."""
 
     seed: int
@@ -358,7 +358,10 @@ class _Draw:
                 self.flags[axis] = self.one("s", "m") if self.open_sides else "s"
                 self.note("shrink-wrapped")
         self.random.shuffle(self.regions)
-        # Numbers count on in the order of the list.
+        self.number_walls()
+
+    def number_walls(self) -> None:
+        """Numbers count on in the order of the list."""
         at = 1
         for _, names in self.regions:
             for shape in self.shapes:
