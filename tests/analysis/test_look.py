@@ -383,7 +383,8 @@ def failure_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "no such file" in failure_of(["look", str(tmp_path / "nowhere")], capsys)
+    said = failure_of(["look", str(tmp_path / "nowhere")], capsys)
+    assert said == f"inelastic: {tmp_path / 'nowhere'}: no such file or folder\n"
 
 
 @pytest.mark.slow

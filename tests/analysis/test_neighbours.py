@@ -13,6 +13,7 @@ from lammps_inelastic.analysis import (
     Spheres,
     contact_counts,
     contacts_by_distance,
+    exact_packing_fraction,
     group_spheres,
 )
 
@@ -108,6 +109,16 @@ def test_a_hundred_thousand_spheres_take_about_a_second() -> None:
 def test_wrong_input(places: Any, arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(InputError, match=message):
         contacts_by_distance(Spheres(places, np.ones(len(places))), *arguments)
+
+
+def test_arrays_in_the_place_of_spheres() -> None:
+    """A call of 0.2 says what is asked for now."""
+    ask: Any = contacts_by_distance
+    with pytest.raises(InputError, match="contacts_by_distance: spheres must be of the class Sphe"):
+        ask([[0, 0, 0], [1, 0, 0]], [0.5, 0.5], 1e-4)
+    ask = exact_packing_fraction
+    with pytest.raises(InputError, match=r"not ndarray: Spheres\(positions, radii\) makes them"):
+        ask(spheres=np.zeros((2, 3)))
 
 
 def test_as_many_spheres_as_in_particles() -> None:

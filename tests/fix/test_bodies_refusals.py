@@ -398,6 +398,30 @@ def test_a_periodic_box_that_is_too_small(ranks: int, tmp_path: Path, refused: R
     assert "periodic box is 0.57 wide" in error, error
 
 
+def test_the_skin_that_is_named_does(tmp_path: Path, lmp: Runner) -> None:
+    """Of a periodic box that is too small for it, but not for its bodies."""
+    box = ((0, 1), (0, 1), (0, 1))
+    text = body_scene(
+        Bodies(np.array([[0.45, 0.5, 0.5], [0.55, 0.5, 0.5]]), np.array([1, 1])),
+        0.1,
+        tmp_path,
+        tolerance=1e-4,
+        inertia="solid",
+        box=box,
+        boundary="p p p",
+        gravity=False,
+        skin=0.3,
+        options="",
+    )
+    first = lmp(text + "run 1\n", must_pass=False)
+    (error,) = first.errors
+    assert "the periodic box is 1 wide and must be at least" in error
+    most = float(error.split("at most ")[1].split()[0])
+    assert 0 < most < 0.3
+    # It is printed with four digits.
+    lmp(text.replace("neighbor 0.29999999999999999 bin", f"neighbor {most * 0.999} bin") + "run 1\n")
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize(("lost", "speed"), [("error", 1), ("ignore", 1), ("ignore", 20)])
 def test_a_body_that_leaves_the_box(

@@ -430,6 +430,23 @@ def test_types_whose_cutoff_is_too_short(
     lmp(text + f"pair_coeff 1 1 {2 * RADIUS}\nrun 2\n", ranks=ranks)
 
 
+@pytest.mark.parametrize("style", ["multi", "bin"])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_type_without_spheres_needs_no_cutoff(
+    style: str, ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
+) -> None:
+    """Small spheres that are to come have cutoffs of their own: the list reaches as far as before."""
+    text = scene([[0.2, RADIUS, 0.2], [0.2, 5 * RADIUS, 0.2]], RADIUS, tmp_path, tolerance=EPS)
+    text = text.replace("read_data spheres.data", "read_data spheres.data extra/atom/types 1")
+    text = re.sub(r"(?m)^neighbor (\S+) bin", rf"neighbor \1 {style}", text)
+    small = f"pair_coeff 1 2 {1.2 * RADIUS}\npair_coeff 2 2 {0.4 * RADIUS}\n"
+    with_small = lmp(text + small + "run 20\n", ranks=ranks)
+    assert (with_small.thermo["KinEng"] == lmp(text + "run 20\n", ranks=ranks).thermo["KinEng"]).all()
+    # As soon as one is there, and large, the cutoffs of its type count.
+    error = refused(text + small + "set atom 2 type 2\nrun 2\n", ranks=ranks)
+    assert f"a cutoff of at least {2 * RADIUS:g}" in error or "cutoff of at least" in error
+
+
 @pytest.mark.parametrize("what", ["wrong side", "far outside", "on the wall", "moved away"])
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_centre_outside_the_region(

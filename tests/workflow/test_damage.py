@@ -256,6 +256,22 @@ def test_what_stands_in_the_way(
     assert main(["status", str(path), "--out", str(tmp_path / "out")]) == (0 if place else 2)
 
 
+def test_a_folder_in_the_place_of_a_lock(
+    write_study: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is named by what needs the lock, and in nobody's way otherwise."""
+    path = write_study(TINY.replace("{seeds}", "1"))
+    (case,) = read_study(path).cases
+    odd = tmp_path / "out" / "cases" / ".locks" / case.name
+    odd.mkdir(parents=True)
+    arguments = [str(path), "--out", str(tmp_path / "out")]
+    assert main(["status", *arguments]) == 0
+    capsys.readouterr()
+    assert main(["run", *arguments, "--timeout", "0.01"]) == 2
+    (line,) = capsys.readouterr().err.removeprefix(warning(path)).splitlines()
+    assert line.startswith(f"inelastic: {odd}: ")
+
+
 @pytest.mark.parametrize("command", ["status", "collect"])
 def test_a_folder_that_is_not_there(
     command: str,
