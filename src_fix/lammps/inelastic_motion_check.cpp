@@ -44,6 +44,7 @@ void MotionCheck::begin_run()
                                    movers_.any_turns()};
   scene_.check_held(group);
   scene_.warn_of_hidden_pairs(group);
+  scene_.warn_of_counts();
   step_.continues = false;
 }
 

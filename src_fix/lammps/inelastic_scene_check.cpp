@@ -4,6 +4,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "compute.h"
 #include "error.h"
 #include "fix.h"
 #include "force.h"
@@ -171,6 +172,25 @@ bool SceneCheck::is_integrated(int i) const
   for (const Fix *fix : modify->get_fix_list())
     if (fix->time_integrate && (atom->mask[i] & fix->groupbit)) return true;
   return false;
+}
+
+void SceneCheck::warn_of_counts()
+{
+  std::string found;
+  for (const Compute *compute : modify->get_compute_list()) {
+    const std::string style = compute->style;
+    if (style == "contact/atom" || style == "rattlers/atom" || style == "fabric")
+      found += fmt::format("{}{} ({})", found.empty() ? "" : ", ", compute->id, style);
+  }
+  if (found.empty() || warned_of_counts_) return;
+  warned_of_counts_ = true;
+  if (comm->me == 0)
+    error->warning(FLERR,
+                   "Fix inelastic: compute {} takes spheres that overlap for contacts, and of the "
+                   "contacts of hard spheres few do: take those that carry a force, columns 1 and "
+                   "2 of this fix for each atom, its local array, and inelastic look or "
+                   "lammps_inelastic.analysis for rattlers and fabric",
+                   found);
 }
 
 void SceneCheck::remember_box()

@@ -37,6 +37,10 @@ class SceneCheck : protected Pointers {
   // At the start of a run. Warnings: settings that keep pairs apart. Collective.
   void warn_of_hidden_pairs(const Group &group) const;
 
+  // At the start of a run. Warnings, once: computes that count contacts by overlaps, of which hard
+  // spheres have few.
+  void warn_of_counts();
+
   // Remembers the box as it is at the start of a run.
   void remember_box();
 
@@ -58,6 +62,7 @@ class SceneCheck : protected Pointers {
   bool any(bool here) const;
 
   std::vector<double> box_at_start_;    // periods and tilts
+  bool warned_of_counts_ = false;
 };
 
 }    // namespace LAMMPS_NS::Inelastic_NS

@@ -430,6 +430,15 @@ def test_types_whose_cutoff_is_too_short(
     lmp(text + f"pair_coeff 1 1 {2 * RADIUS}\nrun 2\n", ranks=ranks)
 
 
+@pytest.mark.parametrize("compute", ["contact/atom", "rattlers/atom type 4 1", "fabric type contact"])
+def test_counts_by_overlap_are_warned_of(compute: str, tmp_path: Path, lmp: Runner) -> None:
+    """Once, with what to take instead."""
+    result = lmp(deck(tmp_path) + f"compute count all {compute}\nrun 2\nrun 2\n")
+    (said,) = [line for line in result.warnings if "takes spheres that overlap for contacts" in line]
+    assert f"compute count ({compute.split()[0]})" in said
+    assert "columns 1 and 2 of this fix" in said
+
+
 @pytest.mark.parametrize("style", ["multi", "bin"])
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_type_without_spheres_needs_no_cutoff(
