@@ -385,6 +385,7 @@ inelastic::ProjectionResult FixInelastic::solve()
   unsolved_.begin_step();
   hard_.begin_step();
   step_.keeps_overlaps = constraints_.overlaps().pushed_before();
+  step_.waits = energy_.waits_on();
   while (true) {
     step_.keeps_overlaps = step_.keeps_overlaps || step_.waits;
     unsolved_.begin_trial();
@@ -411,6 +412,13 @@ inelastic::ProjectionResult FixInelastic::solve()
     else
       push_apart_.skip();
     if (push_apart_.in_vain()) unsolved_.report_jam(push_apart_.left());
+    // Where the step may be without room for what it gives back, it gives nothing back.
+    if (result.status != inelastic::Status::CONVERGED && !step_.bad_start && !step_.waits &&
+        energy_.gives_back()) {
+      energy_.note_no_room();
+      step_.waits = true;
+      continue;
+    }
     // What can hardly be solved looks solved in a step that is short enough, in which EPS is more
     // than anything moves.
     const bool hardly = hard_.has_shortened() && hard_.is_hardly_solved(result);
@@ -433,6 +441,7 @@ inelastic::ProjectionResult FixInelastic::solve()
     // A step that is not solved, or pushes a bad start apart, says so itself.
     const bool solved = result.status == inelastic::Status::CONVERGED;
     if (solved && !step_.bad_start && adds_too_much(result)) {
+      energy_.note_no_room();
       step_.waits = true;
       continue;
     }

@@ -18,6 +18,17 @@ EnergyWatch::EnergyWatch(LAMMPS *lmp, const Step &step, const GapRules &rules,
 {
 }
 
+bool EnergyWatch::gives_back() const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  double any = 0.0;
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    if (step_.contact_of(c).gap_now < 0.0 && contacts.gap[c] + step_.rows[c].wall_motion < 0.0)
+      any = 1.0;
+  ranks_.reduce(nullptr, 0, &any, 1);
+  return any > 0.0;
+}
+
 bool EnergyWatch::adds_too_much(const std::vector<double> &target)
 {
   constexpr double TIMES_AS_FAST = 10.0, ROUND_OFF = 1.0e-10;
@@ -84,4 +95,21 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
 }
 
 void EnergyWatch::end_step()
-{ most_ = std::max(most_, added_); }
+{
+  most_ = std::max(most_, added_);
+  if (!step_.waits) pause_ = 0;
+}
+
+bool EnergyWatch::waits_on()
+{
+  if (left_ == 0) return false;
+  --left_;
+  return true;
+}
+
+void EnergyWatch::note_no_room()
+{
+  constexpr int LONGEST = 64;
+  pause_ = std::clamp(2 * pause_, 1, LONGEST);
+  left_ = pause_;
+}

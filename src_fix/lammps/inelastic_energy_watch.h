@@ -31,11 +31,19 @@ class EnergyWatch : protected Pointers {
   EnergyWatch(class LAMMPS *lmp, const Step &step, const GapRules &rules, GhostExchange &ranks);
 
   void begin_run() { most_ = 0.0; }
+  // Tells at the start of a step whether it is to give nothing back, since one before had no room
+  // for that: every second step tries, then every third, fifth and so on, up to every 65th.
+  bool waits_on();
+  // Notes that the step has no room for what it gives back.
+  void note_no_room();
+  // Tells whether the step asks for overlaps to open, on any rank. Collective.
+  bool gives_back() const;
   // Tells whether the contacts of a cluster that gives back overlaps add more than they may in the
   // step, which is solved; `target` [length] has one number per constraint. Collective.
   bool adds_too_much(const std::vector<double> &target);
   // Notes that the step is taken as adds_too_much() has seen it.
   void end_step();
+
   // The most that the contacts of a cluster have added in a step of the run beside what laws and
   // walls that move do [energy, in the units of mass velocity^2].
   double most() const { return most_; }
@@ -46,6 +54,7 @@ class EnergyWatch : protected Pointers {
   GhostExchange &ranks_;
   Clusters clusters_;
   double added_ = 0.0, most_ = 0.0;
+  int pause_ = 0, left_ = 0;    // steps from one try to give overlaps back to the next
 };
 
 }    // namespace LAMMPS_NS::Inelastic_NS

@@ -92,7 +92,7 @@ void PushApart::ask_for_all(bool gives_way)
 // Counts bad overlaps, and looks how far they open and what the push leaves of them. Returns
 // whether none becomes deeper than the deepest by more than a push may open it: walls that close
 // would drive spheres into one another where these give way. Collective.
-bool PushApart::look_at_opening()
+bool PushApart::look_at_opening(bool solved)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const double h = step_.problem.timestep;
@@ -129,6 +129,8 @@ bool PushApart::look_at_opening()
   const int rank = ranks_.rank_of_largest(deepest, &left_.largest);
   left_.named = ranks_.said_by(rank, named);
   const bool opens = sums[OPENED] > OPENS * sums[ASKED];
+  // What is not solved tells nothing of room.
+  if (!solved) return true;
   if (opens || !gives_way_)
     in_vain_ = 0;
   else if (looked_at_ != update->ntimestep)
@@ -149,20 +151,21 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   // Iterations of the first trial. Thousands of spheres that have room for what is asked take far
   // fewer.
   constexpr long MOST = 10000;
-  for (bool solved = false; !solved;) {
+  for (bool ends = false; !ends;) {
     begin_trial(contacts);
     ask_for_all(gives_way_);
     const long left = std::max(0L, step_.settings.max_iterations - result.iterations);
     const inelastic::ProjectionResult pushed =
         project(gives_way_ ? left : std::min(MOST, left / 4));
-    solved = gives_way_ || pushed.status == inelastic::Status::CONVERGED;
-    if (solved)
+    ends = gives_way_ || pushed.status == inelastic::Status::CONVERGED;
+    if (ends)
       add(result, pushed);
     else
       result.iterations += pushed.iterations;
-    gives_way_ = gives_way_ || !solved;
+    gives_way_ = gives_way_ || !ends;
   }
-  if (!look_at_opening() && gives_way_)
+  const bool solved = result.status == inelastic::Status::CONVERGED;
+  if (!look_at_opening(solved) && gives_way_)
     result.status = inelastic::worse(result.status, inelastic::Status::INFEASIBLE);
 
   problem.contacts = contacts;

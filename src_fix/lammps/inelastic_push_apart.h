@@ -54,7 +54,7 @@ class PushApart : protected Pointers {
  private:
   void begin_trial(const inelastic::ContactSet &contacts);
   void ask_for_all(bool gives_way);
-  bool look_at_opening();
+  bool look_at_opening(bool solved);
 
   Step &step_;
   Constraints &constraints_;

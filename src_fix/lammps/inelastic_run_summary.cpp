@@ -36,7 +36,7 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
 {
   ++steps_;
   if (step_.at_rest) ++at_rest_;
-  if (step_.waits) ++waited_;
+  if (step_.waits && step_.largest_overlap > step_.settings.tolerance) ++waited_;
   iterations_ += static_cast<double>(result.iterations);
   largest_excess_ = std::max(largest_excess_, step_.excess);
   const bool of_start = step_.bad_start && pushed_at_start_ == steps_ - 1;
