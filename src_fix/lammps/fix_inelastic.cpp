@@ -441,9 +441,17 @@ inelastic::ProjectionResult FixInelastic::solve()
     // A step that is not solved, or pushes a bad start apart, says so itself.
     const bool solved = result.status == inelastic::Status::CONVERGED;
     if (solved && !step_.bad_start && adds_too_much(result)) {
-      energy_.note_no_room();
-      step_.waits = true;
-      continue;
+      if (!step_.waits) {
+        energy_.note_no_room();
+        step_.waits = true;
+        continue;
+      }
+      if (length_.may_shorten_unsolved(false)) {
+        hard_.note_shortened();
+        length_.shorten(0.5, unsolved_.named());
+        continue;
+      }
+      unsolved_.report_energy(energy_.times_too_much());
     }
     if (solved && !step_.bad_start && walls_.any_moves())
       squeezed_.look();
@@ -453,23 +461,19 @@ inelastic::ProjectionResult FixInelastic::solve()
   }
 }
 
-// Tells whether the step is to be solved again without what it gives back of overlaps, since its
-// contacts add too much energy. Where they do so without that, they are not solved as far as they
-// have to be: the step is then solved to its targets here.
+// Tells whether contacts add more energy than they may. Where they do though nothing is given back,
+// they are not solved as far as they have to be: the step is first solved to its targets here.
 bool FixInelastic::adds_too_much(inelastic::ProjectionResult &result)
 {
   if (!energy_.adds_too_much(solver_->targets().resolved())) return false;
-  if (!step_.waits) return true;
-  if (!result.accurate) {
-    const inelastic::ProjectionResult better = project(settings_.max_iterations, true);
-    result.iterations += better.iterations;
-    result.status = better.status;
-    result.residual = better.residual;
-    result.accurate = better.accurate;
-    result.unresolved = better.unresolved;
-    energy_.adds_too_much(solver_->targets().resolved());
-  }
-  return false;
+  if (!step_.waits || result.accurate) return true;
+  const inelastic::ProjectionResult better = project(settings_.max_iterations, true);
+  result.iterations += better.iterations;
+  result.residual = better.residual;
+  result.accurate = better.accurate;
+  result.unresolved = better.unresolved;
+  return better.status != inelastic::Status::CONVERGED ||
+      energy_.adds_too_much(solver_->targets().resolved());
 }
 
 // Every other fix and force has done its work: sets the velocities that the step would end with.

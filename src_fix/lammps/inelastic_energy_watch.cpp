@@ -79,24 +79,26 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
     if (impulse > 0.0 && contact.gap_now < 0.0 && after > 0.0) gives[k] = 1.0;
   }
   clusters_.over_ranks(SUMS, sums, 1, gives);
-  double too_much = 0.0;
+  times_too_much_ = 0.0;
   for (std::size_t k = 0; k < clusters_.size(); ++k) {
     const double *const s = &sums[SUMS * k];
     const double added = s[ADDED] - s[BY_LAW];
     added_ = std::max(added_, added);
     const double speed = TIMES_AS_FAST * fastest;
     const double most = 0.5 * s[MASS] * speed * speed + s[TARGETS] + ROUND_OFF * s[SIZE];
-    if (gives[k] > 0.0 && added > most) too_much = 1.0;
+    if (gives[k] > 0.0 && added > most) times_too_much_ = std::max(times_too_much_, added / most);
   }
-  double maxima[2] = {too_much, added_};
+  double maxima[2] = {times_too_much_, added_};
   ranks_.reduce(nullptr, 0, maxima, 2);
+  times_too_much_ = maxima[0];
   added_ = maxima[1];
-  return maxima[0] > 0.0;
+  return times_too_much_ > 0.0;
 }
 
 void EnergyWatch::end_step()
 {
   most_ = std::max(most_, added_);
+  added_ = 0.0;
   if (!step_.waits) pause_ = 0;
 }
 

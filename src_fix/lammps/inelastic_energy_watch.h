@@ -41,6 +41,8 @@ class EnergyWatch : protected Pointers {
   // Tells whether the contacts of a cluster that gives back overlaps add more than they may in the
   // step, which is solved; `target` [length] has one number per constraint. Collective.
   bool adds_too_much(const std::vector<double> &target);
+  // How many times as much as they may the contacts of a cluster added when it told so.
+  double times_too_much() const { return times_too_much_; }
   // Notes that the step is taken as adds_too_much() has seen it.
   void end_step();
 
@@ -53,7 +55,7 @@ class EnergyWatch : protected Pointers {
   const GapRules &rules_;
   GhostExchange &ranks_;
   Clusters clusters_;
-  double added_ = 0.0, most_ = 0.0;
+  double added_ = 0.0, most_ = 0.0, times_too_much_ = 0.0;
   int pause_ = 0, left_ = 0;    // steps from one try to give overlaps back to the next
 };
 

@@ -100,6 +100,17 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
 }
 
+void UnsolvedStep::report_energy(double times)
+{
+  const std::string message =
+      fmt::format("step {}: contacts add {:.3g} times as much kinetic energy as they may, though "
+                  "they give no overlaps back",
+                  update->ntimestep, times);
+  const std::string cause = hard_.cause();
+  if (!step_.settings.warn_only) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
+  if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
+}
+
 void UnsolvedStep::report_jam(const PushApart::Left &left)
 {
   const double tolerance = step_.settings.tolerance;

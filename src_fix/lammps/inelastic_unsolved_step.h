@@ -54,6 +54,8 @@ class UnsolvedStep : protected Pointers {
   void report(const inelastic::ProjectionResult &result);
   // The same for overlaps that a push no longer opens.
   void report_jam(const PushApart::Left &left);
+  // The same for contacts that add so many times as much kinetic energy as they may.
+  void report_energy(double times);
 
  private:
   std::string no_room(const inelastic::ProjectionResult &result, std::string &cause) const;
