@@ -42,11 +42,11 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
     spheres_(lmp, step_, ranks_, state_), walls_(lmp, settings_.regions),
     constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
-    solver_(inelastic::make_solver(settings_.solver)), push_apart_(lmp, step_, constraints_, ranks_, movers_),
-    length_(lmp, step_, ranks_), rest_(lmp, step_, ranks_, state_, movers_),
-    check_(lmp, this, step_, ranks_, state_, movers_), hard_(lmp, step_, ranks_),
-    energy_(lmp, step_, constraints_.rules(), ranks_), unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_),
-    squeezed_(lmp, step_, ranks_),
+    solver_(inelastic::make_solver(settings_.solver)),
+    push_apart_(lmp, step_, constraints_, ranks_, movers_), length_(lmp, step_, ranks_),
+    rest_(lmp, step_, ranks_, state_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
+    hard_(lmp, step_, ranks_), energy_(lmp, step_, constraints_.rules(), ranks_),
+    unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
 {
   movers_.add(&spheres_);

@@ -49,8 +49,7 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
       fastest = std::max(fastest, along(c, step_.velocity));
   ranks_.reduce(nullptr, 0, &fastest, 1);
   if (fastest == 0.0) return false;
-  fastest = std::min(fastest,
-                     REGULAR_OVERLAP * step_.settings.tolerance / step_.regular_timestep);
+  fastest = std::min(fastest, REGULAR_OVERLAP * step_.settings.tolerance / step_.regular_timestep);
 
   clusters_.find();
   enum { MASS, ADDED, SIZE, TARGETS, BY_LAW, SUMS };

@@ -77,8 +77,7 @@ void PushApart::ask_for_all(bool gives_way)
     const Contact &contact = step_.contact_of(c);
     // A gap that counted as closed in the first projection is taken as it is here.
     if (contact.gap_now <= step_.settings.tolerance)
-      contacts.gap[c] =
-          constraints_.rules().effective_gap(contact) - step_.rows[c].wall_motion;
+      contacts.gap[c] = constraints_.rules().effective_gap(contact) - step_.rows[c].wall_motion;
     if (gives_way && constraints_.overlaps().is_bad(contact.gap_now))
       contacts.compliance[c] =
           GIVES_WAY * contacts.diagonal(c, step_.problem, step_.problem.timestep);

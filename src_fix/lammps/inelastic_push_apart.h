@@ -2,8 +2,8 @@
 // step's but not kept as momentum, that takes the spheres apart at a bounded speed.
 //
 // Where there is no motion that opens all overlaps at once by what is asked for, as in a bed whose
-// spheres have grown, they give way to one another: overlap c opens by a_c - C lambda_c, a_c what is
-// asked for, C its compliance, lambda_c the impulse of the push. Step by step the overlaps then
+// spheres have grown, they give way to one another: overlap c opens by a_c - C lambda_c, a_c what
+// is asked for, C its compliance, lambda_c the impulse of the push. Step by step the overlaps then
 // relax as those of soft spheres do that move without inertia, to none where there is room. Where
 // they no longer open there is none.
 

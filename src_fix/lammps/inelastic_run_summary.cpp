@@ -45,9 +45,8 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
   overlap = std::max(overlap, step_.largest_overlap);
 }
 
-void RunSummary::log(long shortened_steps, long unexpected_steps,
-                     const HardSteps::Counts &hard, const PushApart::Left &left,
-                     double most_added) const
+void RunSummary::log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard,
+                     const PushApart::Left &left, double most_added) const
 {
   const bool all_pushed = pushed_at_start_ == steps_;
   const double overlap = all_pushed ? overlap_of_start_ : largest_overlap_;
@@ -74,12 +73,13 @@ void RunSummary::log_overlaps(long unexpected_steps, const PushApart::Left &left
   else if (pushed_at_start_ > 0 && left.number == 0.0)
     utils::logmesg(lmp, "  all steps pushed the overlaps of the start apart\n");
   if (left.number > 0.0)
-    error->warning(FLERR,
-                   "Fix inelastic: {:.0f} overlaps of more than 2 tolerances, up to {:.4g} ({:.3g} "
-                   "tolerances; {}), are left after {} steps that pushed them apart: let more steps "
-                   "pass, or make more room",
-                   left.number, left.largest, left.largest / step_.settings.tolerance, left.named,
-                   pushed_at_start_ + pushed_later_);
+    error->warning(
+        FLERR,
+        "Fix inelastic: {:.0f} overlaps of more than 2 tolerances, up to {:.4g} ({:.3g} "
+        "tolerances; {}), are left after {} steps that pushed them apart: let more steps "
+        "pass, or make more room",
+        left.number, left.largest, left.largest / step_.settings.tolerance, left.named,
+        pushed_at_start_ + pushed_later_);
   if (largest_excess_ > 0.0)
     utils::logmesg(
         lmp,

@@ -4,9 +4,9 @@
 #define INELASTIC_RUN_SUMMARY_H
 
 #include "inelastic_hard_steps.h"
-#include "inelastic_push_apart.h"
 #include "inelastic_phase_clock.h"
 #include "inelastic_projection.h"
+#include "inelastic_push_apart.h"
 #include "inelastic_step.h"
 
 #include "pointers.h"

@@ -133,8 +133,7 @@ void StepLength::list_built()
   if (neighbor->style == Neighbor::MULTI || neighbor->style == Neighbor::MULTI_OLD)
     check_reach_of_types(radius);
   measure_farthest();
-  list_reach_ =
-      one_cutoff_ ? least_listed(radius) - 2.0 * step_.largest_radius : neighbor->skin;
+  list_reach_ = one_cutoff_ ? least_listed(radius) - 2.0 * step_.largest_radius : neighbor->skin;
 }
 
 // Returns the largest radius of each atom type in the group, from type 1 on at place 1; 0 for a

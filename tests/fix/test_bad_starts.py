@@ -199,7 +199,7 @@ def test_walls_hold_where_spheres_jam(number: int, tmp_path: Path, lmp: Runner) 
 def crystal(folder: Path, squeeze: float) -> str:
     """Touching spheres of diameter 1 as dense as can be, in a periodic cell; then it shrinks."""
     cell = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]) / np.sqrt(2)
-    corners = np.sqrt(2) * np.stack(np.indices((3, 3, 3)), axis=-1).reshape(-1, 1, 3)
+    corners = np.sqrt(2) * np.indices((3, 3, 3)).reshape(3, -1).T[:, None]
     box = ((0, 3 * np.sqrt(2)),) * 3
     deck = scene(
         (corners + cell).reshape(-1, 3),

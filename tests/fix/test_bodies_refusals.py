@@ -419,7 +419,9 @@ def test_the_skin_that_is_named_does(tmp_path: Path, lmp: Runner) -> None:
     most = float(error.split("at most ")[1].split()[0])
     assert 0 < most < 0.3
     # It is printed with four digits.
-    lmp(text.replace("neighbor 0.29999999999999999 bin", f"neighbor {most * 0.999} bin") + "run 1\n")
+    lmp(
+        text.replace("neighbor 0.29999999999999999 bin", f"neighbor {most * 0.999} bin") + "run 1\n"
+    )
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

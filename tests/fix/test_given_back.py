@@ -52,7 +52,7 @@ def between_two(
 def test_without_room_overlaps_wait(
     angle: float, depth: float, options: str, ranks: int, tmp_path: Path, lmp: Runner
 ) -> None:
-    """To open what is more than a tolerance would throw the sphere out at 1 / angle of the speed."""
+    """To open what is beyond a tolerance would throw the sphere out at 1 / angle of that speed."""
     result = between_two(tmp_path, lmp, angle, depth * EPS, options, ranks)
     frames = read_dump(tmp_path / "particles.dump")
     speeds = [float(np.linalg.norm(frame.velocities[0])) for frame in frames]

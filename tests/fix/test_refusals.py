@@ -430,11 +430,15 @@ def test_types_whose_cutoff_is_too_short(
     lmp(text + f"pair_coeff 1 1 {2 * RADIUS}\nrun 2\n", ranks=ranks)
 
 
-@pytest.mark.parametrize("compute", ["contact/atom", "rattlers/atom type 4 1", "fabric type contact"])
+@pytest.mark.parametrize(
+    "compute", ["contact/atom", "rattlers/atom type 4 1", "fabric type contact"]
+)
 def test_counts_by_overlap_are_warned_of(compute: str, tmp_path: Path, lmp: Runner) -> None:
     """Once, with what to take instead."""
     result = lmp(deck(tmp_path) + f"compute count all {compute}\nrun 2\nrun 2\n")
-    (said,) = [line for line in result.warnings if "takes spheres that overlap for contacts" in line]
+    (said,) = [
+        line for line in result.warnings if "takes spheres that overlap for contacts" in line
+    ]
     assert f"compute count ({compute.split()[0]})" in said
     assert "columns 1 and 2 of this fix" in said
 
@@ -444,13 +448,15 @@ def test_counts_by_overlap_are_warned_of(compute: str, tmp_path: Path, lmp: Runn
 def test_a_type_without_spheres_needs_no_cutoff(
     style: str, ranks: int, tmp_path: Path, refused: Refused, lmp: Runner
 ) -> None:
-    """Small spheres that are to come have cutoffs of their own: the list reaches as far as before."""
+    """Small spheres that are to come have their own cutoffs: the list reaches as far as before."""
     text = scene([[0.2, RADIUS, 0.2], [0.2, 5 * RADIUS, 0.2]], RADIUS, tmp_path, tolerance=EPS)
     text = text.replace("read_data spheres.data", "read_data spheres.data extra/atom/types 1")
     text = re.sub(r"(?m)^neighbor (\S+) bin", rf"neighbor \1 {style}", text)
     small = f"pair_coeff 1 2 {1.2 * RADIUS}\npair_coeff 2 2 {0.4 * RADIUS}\n"
     with_small = lmp(text + small + "run 20\n", ranks=ranks)
-    assert (with_small.thermo["KinEng"] == lmp(text + "run 20\n", ranks=ranks).thermo["KinEng"]).all()
+    assert (
+        with_small.thermo["KinEng"] == lmp(text + "run 20\n", ranks=ranks).thermo["KinEng"]
+    ).all()
     # As soon as one is there, and large, the cutoffs of its type count.
     error = refused(text + small + "set atom 2 type 2\nrun 2\n", ranks=ranks)
     assert f"a cutoff of at least {2 * RADIUS:g}" in error or "cutoff of at least" in error

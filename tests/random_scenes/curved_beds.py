@@ -224,7 +224,9 @@ def main() -> int:
     bad = [row["seed"] for row in rows if row["problems"]]
     errors = [row["seed"] for row in rows if row["ended"] != "ended"]
     moving = [row["seed"] for row in rows if row["ended"] == "ended" and row["carried"] > CARRIED]
-    print(f"{len(rows)} beds; with problems {bad}; ended in an error {errors}; not at rest {moving}")
+    print(
+        f"{len(rows)} beds; with problems {bad}; ended in an error {errors}; not at rest {moving}"
+    )
     return int(bool(bad))
 
 
