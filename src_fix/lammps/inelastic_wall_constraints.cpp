@@ -211,11 +211,12 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   const double wall_motion = view.distance_now - view.distance;
   // A region can show a wall late: from inside one part of a union the others are not seen. An
   // obstacle that is overlapped is seen; its plane at the end of the step may lie beyond where the
-  // sphere is now; and that of a wall that turns, or curves and moves, is not where it is now: what
-  // overlaps it is known from note_overlaps_with_moving_walls().
+  // sphere is now; and that of a wall that turns, or curves and moves, is not where it is now: bad
+  // overlaps with such walls are known from note_overlaps_with_moving_walls().
   const double to_plane = gap_here + wall_motion;
-  const bool may_be_beyond = view.convex || walls_.any_moves();
-  Contact unseen = contact_with(i, view.wall, may_be_beyond ? std::max(0.0, to_plane) : to_plane);
+  const bool is_beyond = to_plane < 0.0 &&
+      (view.convex || (walls_.any_moves() && rules_.overlaps().is_bad(to_plane)));
+  Contact unseen = contact_with(i, view.wall, is_beyond ? 0.0 : to_plane);
   const Contact &contact = known ? step_.contact_of(existing->second) : unseen;
   rules_.overlaps().note(contact.gap_now, i, -view.wall);
   // With `turning` the gap is exact for this motion, also where a body turns.
