@@ -128,7 +128,8 @@ bool AcceleratedProjectedGradient::end_on_plateau(bool tries, ContactProblem &pr
     return false;
   const bool accurate = judge(problem, limits, host, result);
   return accurate ||
-      (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED);
+      (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED &&
+       result.unresolved > WELL_RESOLVED);
 }
 
 bool AcceleratedProjectedGradient::solve_slow_modes(ContactProblem &problem,
