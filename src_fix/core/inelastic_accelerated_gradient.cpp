@@ -129,7 +129,8 @@ bool AcceleratedProjectedGradient::end_on_plateau(bool tries, ContactProblem &pr
   const bool accurate = judge(problem, limits, host, result);
   if (limits.to_targets) return accurate;
   return accurate ||
-      (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED);
+      (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED &&
+       result.unresolved > WELL_RESOLVED);
 }
 
 bool AcceleratedProjectedGradient::solve_slow_modes(ContactProblem &problem,

@@ -77,8 +77,8 @@ class AcceleratedProjectedGradient : public Solver {
 
   // Ends a search on a plateau, if it can: with `tries` slow modes are tried first. Otherwise the
   // impulses in `problem`, which are judged here, will do if their residual has not come down for
-  // long and is within the tolerance, and little is left of what contacts change: the targets are
-  // not to be had. Collective.
+  // long and is within the tolerance, and little is left of what contacts change, but more than the
+  // default accuracy leaves: the targets are not to be had. Collective.
   bool end_on_plateau(bool tries, ContactProblem &problem, const SolverLimits &limits, Host &host,
                       SolverResult &result);
 
