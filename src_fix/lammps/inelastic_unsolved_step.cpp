@@ -75,11 +75,17 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
   std::string cause;
   if (!no_room_ && hard_.is_hardly_solved(result)) {
     cause = hard_.cause();
+    const std::string &longer = named_.empty() ? named_last_ : named_;
     error->all(
         FLERR,
         "Fix inelastic: step {}: no time step down to {:.3g} is solved: even there {:.2g} of "
-        "what contacts change is left. {}",
-        update->ntimestep, update->dt, result.unresolved, cause);
+        "what contacts change is left{}. {}{}",
+        update->ntimestep, update->dt, result.unresolved,
+        longer.empty() ? "" : ", and in a longer one " + longer,
+        constraints_.walls_move()
+            ? "The scene leaves no room for the spheres: walls or frozen spheres close in. Or: "
+            : "",
+        cause);
   }
   const std::string message = no_room_ ? no_room(result, cause) : out_of_iterations(result, cause);
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
