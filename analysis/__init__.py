@@ -53,7 +53,7 @@ from .profile import (
 )
 from .rattlers import Backbone, backbone, contacts_to_hold
 from .run_files import RunFiles, check_contacts, open_run
-from .run_log import Run, RunLog, at_steps, read_run_log
+from .run_log import Run, RunLog, Unrest, at_steps, read_run_log
 from .scaling import (
     PowerLaw,
     binned_exponent,
@@ -112,6 +112,7 @@ __all__ = [
     "RunLog",
     "Spheres",
     "UnfinishedRunError",
+    "Unrest",
     "VoxelImage",
     "WallOverlap",
     "WallProfile",

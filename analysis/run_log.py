@@ -22,6 +22,11 @@ from .files import reason_of, regular
 from .geometry import FloatArray, IntArray
 
 _LOOP = re.compile(r"Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) atoms")
+# What the summary of fix inelastic says of a run's end.
+_UNREST = re.compile(
+    r"\s+at its end the scene is (at rest|NOT AT REST): "
+    r"rms speed (\S+) g h, net force (\S+) of the weight"
+)
 _COUNT = re.compile(r"f_(\w+)\[(5|6)\]")
 # After these commands the step is another one, without a run.
 _NEW_STEP = ("read_restart", "read_data", "read_dump", "clear", "rerun", "tad", "prd", "hyper")
@@ -36,6 +41,27 @@ _DIGITS = 1e-8
 _MOST = 10_000_000
 # Steps are read as float64, which holds every whole number below this one.
 _LARGEST_STEP = 2**53
+
+
+@dataclass(frozen=True)
+class Unrest:
+    """How far a scene is from rest at the end of a run, as fix inelastic tells it.
+
+    Attributes
+    ----------
+    at_rest : whether it counts as at rest
+    speed : root mean square speed / that of the velocities that forces from outside give in a step
+    net_force : |sum of all forces| / |sum of those from outside|
+    """
+
+    at_rest: bool
+    speed: float
+    net_force: float
+
+    @property
+    def words(self) -> str:
+        """How fast what moves is, and which part of the weight nothing carries."""
+        return f"rms speed {self.speed:.3g} g h, net force {self.net_force:.3g} of the weight"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +81,7 @@ class Run:
         None where that is not known
     counts : columns of the contacts that a fix inelastic counts, by the place in its vector: 5 for
         those between spheres, 6 for those with walls; none where a format may have cut digits
+    unrest : how far its end is from rest; None where no fix inelastic tells it
     """
 
     line: int
@@ -66,6 +93,7 @@ class Run:
     thermo: Mapping[str, FloatArray]
     every: int | None
     counts: Mapping[int, str]
+    unrest: Unrest | None
 
     @property
     def known(self) -> int:
@@ -123,6 +151,11 @@ class RunLog:
     def complete(self) -> bool:
         """Whether the last run has ended."""
         return not self.runs or self.runs[-1].steps is not None
+
+    def unrest_at(self, step: int) -> Unrest | None:
+        """Return how far the scene is from rest at a step; None where no run that ended tells."""
+        told = (run.unrest for run in reversed(self.runs) if run.known == step and run.unrest)
+        return next(told, None)
 
     def names(self, path: Path) -> bool:
         """Say whether the log tells that a dump of this file's name was written."""
@@ -217,6 +250,7 @@ class _Reader:
         self._cut = False
         self._names: list[str] = []
         self._rows: list[list[float]] = []
+        self._unrest: Unrest | None = None
         self._header = 0
 
     def read(self, line: str, number: int) -> None:
@@ -236,6 +270,8 @@ class _Reader:
             if _count(words[0]) is None:
                 raise LogError(self._path, f"'{shortened(words[0])}' is no step", number)
             self._rows.append(row)
+        elif self._names and (told := _UNREST.match(line)):
+            self._unrest = self._unrest_of(told, number)
         elif _LOOP.match(line):
             # This run has thermo output of another style: nobody knows where it ended.
             self._step = None
@@ -255,6 +291,13 @@ class _Reader:
             )
         return _End(seconds, steps, atoms)
 
+    def _unrest_of(self, told: re.Match[str], number: int) -> Unrest:
+        """Return what the summary of the fix says of the end of a run."""
+        speed, net_force = _real(told[2]), _real(told[3])
+        if speed is None or net_force is None:
+            raise LogError(self._path, f"'{shortened(told[0].strip())}' is damaged", number)
+        return Unrest(told[1] == "at rest", speed, net_force)
+
     def close_run(self, end: _End | None) -> None:
         """Keep the run that the thermo output of the last header belongs to, if there is one."""
         if self._rows:
@@ -270,6 +313,7 @@ class _Reader:
                 thermo=thermo,
                 every=self._every,
                 counts=self._counts_of(self._names),
+                unrest=self._unrest,
             )
             self.runs.append(run)
             self._check(run)
@@ -278,7 +322,7 @@ class _Reader:
             self._step = run.known
         elif self._names and end is not None:
             raise LogError(self._path, "a run has no line of thermo output", self._header)
-        self._names, self._rows = [], []
+        self._names, self._rows, self._unrest = [], [], None
 
     def written(self, name: str) -> Written | None:
         file = self.files[name]

@@ -9,9 +9,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .packing import Ball, Box, Cluster, Cylinder, Dimer, Packing, Sphere, pack
+    from .packing import (
+        Ball,
+        Box,
+        Cluster,
+        Cylinder,
+        Dimer,
+        NotAtRestError,
+        Packing,
+        Sphere,
+        pack,
+    )
 
-__all__ = ["Ball", "Box", "Cluster", "Cylinder", "Dimer", "Packing", "Sphere", "pack"]
+__all__ = [
+    "Ball",
+    "Box",
+    "Cluster",
+    "Cylinder",
+    "Dimer",
+    "NotAtRestError",
+    "Packing",
+    "Sphere",
+    "pack",
+]
 
 
 def __getattr__(name: str) -> Any:

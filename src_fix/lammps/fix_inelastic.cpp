@@ -47,7 +47,8 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     rest_(lmp, step_, ranks_, state_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
     hard_(lmp, step_, ranks_), energy_(lmp, step_, constraints_.rules(), ranks_),
     unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
-    output_(lmp, step_, ranks_), summary_(lmp, step_, clock_), record_(lmp, step_, ranks_)
+    output_(lmp, step_, ranks_), unrest_(lmp, step_, output_), summary_(lmp, step_, clock_),
+    record_(lmp, step_, ranks_)
 {
   movers_.add(&spheres_);
   if (bodies_) movers_.add(bodies_.get());
@@ -527,6 +528,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
 {
   hard_.end_step(result);
   energy_.end_step();
+  unrest_.end_step();
   OverlapWatch &overlaps = constraints_.overlaps();
   overlaps.warn_of_unexpected();
   squeezed_.warn();
@@ -564,8 +566,9 @@ void FixInelastic::post_run()
   check_.end_run(constraints_.overlaps().pushes_in_velocity());
   state_.take_out_pushes();
   restart_peratom = laws_.has_law();
+  unrest_.look();
   summary_.log(length_.shortened_steps(), constraints_.overlaps().unexpected_steps(),
-               hard_.counts(), push_apart_.left(), energy_.most());
+               hard_.counts(), push_apart_.left(), energy_.most(), unrest_);
   begin_summary();
 }
 
@@ -577,8 +580,13 @@ void FixInelastic::reset_dt()
    output, and what follows the atoms
 ------------------------------------------------------------------------- */
 
+// Collective.
 double FixInelastic::compute_vector(int n)
-{ return output_.vector(n); }
+{
+  if (n != ContactOutput::REST_SPEED && n != ContactOutput::NET_FORCE) return output_.vector(n);
+  unrest_.look();
+  return n == ContactOutput::REST_SPEED ? unrest_.speed() : unrest_.net_force();
+}
 
 double FixInelastic::compute_array(int wall, int direction)
 { return output_.wall_force(wall, direction); }

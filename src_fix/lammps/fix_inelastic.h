@@ -37,6 +37,7 @@ FixStyle(inelastic,FixInelastic);
 #include "inelastic_squeezed_grains.h"
 #include "inelastic_step.h"
 #include "inelastic_step_length.h"
+#include "inelastic_unrest.h"
 #include "inelastic_unsolved_step.h"
 
 #include "fix.h"
@@ -107,6 +108,7 @@ class FixInelastic : public Fix {
   Inelastic_NS::UnsolvedStep unsolved_;
   Inelastic_NS::SqueezedGrains squeezed_;
   Inelastic_NS::ContactOutput output_;
+  Inelastic_NS::Unrest unrest_;
   Inelastic_NS::RunSummary summary_;
   Inelastic_NS::ProblemRecord record_;
   std::string law_in_restart_;    // the law whose memory a restart file holds; empty for none

@@ -44,6 +44,9 @@ class ContactOutput : protected Pointers {
     AT_REST,
     PRESSED_CONTACTS,
     HELD_CONTACTS,
+    // These two are known to the room inelastic_unrest alone.
+    REST_SPEED,
+    NET_FORCE,
     VECTOR_SIZE
   };
 

@@ -4,6 +4,7 @@
 #include "inelastic_ghost_exchange.h"
 
 #include "atom.h"
+#include "force.h"
 
 #include <algorithm>
 #include <cmath>
@@ -100,6 +101,9 @@ void EnergyWatch::end_step()
   added_ = 0.0;
   if (!step_.waits) pause_ = 0;
 }
+
+double EnergyWatch::most() const
+{ return most_ * force->mvv2e; }
 
 bool EnergyWatch::waits_on()
 {

@@ -47,8 +47,8 @@ class EnergyWatch : protected Pointers {
   void end_step();
 
   // The most that the contacts of a cluster have added in a step of the run beside what laws and
-  // walls that move do [energy, in the units of mass velocity^2].
-  double most() const { return most_; }
+  // walls that move do [energy].
+  double most() const;
 
  private:
   const Step &step_;

@@ -246,6 +246,10 @@ void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
 
 void GhostExchange::reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima)
 {
+  // More would be written beyond the message.
+  if (number_of_sums > REDUCED_SUMS || number_of_maxima > REDUCED_MAXIMA)
+    error->one(FLERR, "Fix inelastic: {} sums and {} maxima are reduced at once, at most {} and {}",
+               number_of_sums, number_of_maxima, REDUCED_SUMS, REDUCED_MAXIMA);
   if (comm->nprocs == 1) return;
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
   Reduced mine{};

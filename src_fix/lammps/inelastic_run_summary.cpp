@@ -46,7 +46,7 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
 }
 
 void RunSummary::log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard,
-                     const PushApart::Left &left, double most_added) const
+                     const PushApart::Left &left, double most_added, const Unrest &unrest) const
 {
   const bool all_pushed = pushed_at_start_ == steps_;
   const double overlap = all_pushed ? overlap_of_start_ : largest_overlap_;
@@ -60,6 +60,7 @@ void RunSummary::log(long shortened_steps, long unexpected_steps, const HardStep
     log_overlaps(unexpected_steps, left);
     log_given_back(most_added);
     log_hard_steps(hard);
+    log_unrest(unrest);
   }
   log_times();
 }
@@ -123,6 +124,15 @@ void RunSummary::log_hard_steps(const HardSteps::Counts &hard) const
   if (unconverged_ > 0)
     utils::logmesg(lmp, "  {} projections did not reach the tolerance within maxiter\n",
                    unconverged_);
+}
+
+// Programs read this line.
+void RunSummary::log_unrest(const Unrest &unrest) const
+{
+  if (!unrest.is_known()) return;
+  utils::logmesg(
+      lmp, "  at its end the scene is {}: rms speed {:.3g} g h, net force {:.3g} of the weight\n",
+      unrest.is_at_rest() ? "at rest" : "NOT AT REST", unrest.speed(), unrest.net_force());
 }
 
 void RunSummary::log_times() const

@@ -8,6 +8,7 @@
 #include "inelastic_projection.h"
 #include "inelastic_push_apart.h"
 #include "inelastic_step.h"
+#include "inelastic_unrest.h"
 
 #include "pointers.h"
 
@@ -27,12 +28,13 @@ class RunSummary : protected Pointers {
 
   // Collective.
   void log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard,
-           const PushApart::Left &left, double most_added) const;
+           const PushApart::Left &left, double most_added, const Unrest &unrest) const;
 
  private:
   void log_overlaps(long unexpected_steps, const PushApart::Left &left) const;
   void log_given_back(double most_added) const;
   void log_hard_steps(const HardSteps::Counts &hard) const;
+  void log_unrest(const Unrest &unrest) const;
   void log_times() const;
 
   const Step &step_;

@@ -60,6 +60,18 @@ double UnsolvedStep::largest_angle() const
   return angle;
 }
 
+// Tells whether walls or frozen spheres move. Collective.
+bool UnsolvedStep::obstacles_move() const
+{
+  double any = constraints_.walls_move() ? 1.0 : 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (step_.in_group(atom, i) && !step_.is_mobile(atom, i) &&
+        inelastic::norm(&step_.problem.predicted_velocity[3 * static_cast<std::size_t>(i)]) > 0.0)
+      any = 1.0;
+  ranks_.reduce(nullptr, 0, &any, 1);
+  return any > 0.0;
+}
+
 bool UnsolvedStep::law_parts() const
 {
   double any = 0.0;
@@ -75,14 +87,14 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
   std::string cause;
   if (!no_room_ && hard_.is_hardly_solved(result)) {
     cause = hard_.cause();
-    const std::string &longer = named_.empty() ? named_last_ : named_;
+    const std::string &longer = named_or_last();
     error->all(
         FLERR,
         "Fix inelastic: step {}: no time step down to {:.3g} is solved: even there {:.2g} of "
         "what contacts change is left{}. {}{}",
         update->ntimestep, update->dt, result.unresolved,
         longer.empty() ? "" : ", and in a longer one " + longer,
-        constraints_.walls_move()
+        obstacles_move()
             ? "The scene leaves no room for the spheres: walls or frozen spheres close in. Or: "
             : "",
         cause);
@@ -146,9 +158,9 @@ std::string UnsolvedStep::no_room(const inelastic::ProjectionResult &result,
                     constraints_.walls_move() ? ". Or walls that move leave no room" : "")
       : "The scene leaves no room for the spheres: walls or frozen spheres close in, or there "
         "are too many spheres";
-  const std::string &named = named_.empty() ? named_last_ : named_;
   return fmt::format("step {}: no velocities keep the surfaces apart{}{}, where {:.4g} is allowed",
-                     update->ntimestep, shorter, named.empty() ? "" : ": " + named,
+                     update->ntimestep, shorter,
+                     named_or_last().empty() ? "" : ": " + named_or_last(),
                      step_.settings.tolerance);
 }
 

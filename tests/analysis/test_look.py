@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -221,6 +222,35 @@ def test_spheres_of_a_body_may_overlap(
 HEIGHT = np.sqrt((0.2 - 1e-4) ** 2 - 2 * 0.05**2)
 # The centres of the second and the third dimer are inside; the spheres of the third are not.
 MIDDLE = ["--box", "0.48", "0.52", "0.2", "0.6", "0.48", "0.6"]
+
+
+@pytest.mark.parametrize(
+    ("said", "shown", "at_rest"),
+    [
+        ("at rest: rms speed 0.002 g h, net force 1e-05 of the weight", r"at rest +yes +rms", True),
+        (
+            "NOT AT REST: rms speed 0.23 g h, net force 0.04 of the weight",
+            r"at rest +NOT AT REST +rms speed 0\.23 g h, net force 0\.04 of the weight",
+            False,
+        ),
+    ],
+)
+def test_whether_it_is_at_rest(
+    run: Path, capsys: pytest.CaptureFixture[str], said: str, shown: str, at_rest: bool
+) -> None:
+    """What the log beside the dump says of the frame's step; without one, nothing."""
+    assert main(["look", str(run), *BOX, "--no-picture"]) == 0
+    assert "at rest" not in capsys.readouterr().out
+    (run / "log.lammps").write_text(
+        "dump all all custom 90 particles.lammpsdump id x y z\n"
+        "   Step   Time\n  0  0\n  90  9\n  at its end the scene is "
+        + said
+        + "\nLoop time of 0.5 on 1 procs for 90 steps with 125 atoms\nTotal wall time: 0:00:01\n"
+    )
+    assert main(["look", str(run), *BOX, "--no-picture"]) == 0
+    assert re.search(shown, capsys.readouterr().out)
+    assert main(["look", str(run), *BOX, "--no-picture", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["at_rest"]["value"] is at_rest
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from lammps_inelastic.analysis import LogError, ParticleDump, UnfinishedRunError, open_run
+from lammps_inelastic.analysis import LogError, ParticleDump, UnfinishedRunError, Unrest, open_run
 from lammps_inelastic.analysis.run_log import read_run_log
 
 DUMP = "dump all all custom {} out/a.dump id x y z radius\n"
@@ -238,3 +238,31 @@ def test_a_dump_of_which_no_log_tells(tmp_path: Path, steps: list[int], said: st
         assert open_run(dump, None, log, over=False).log is None
         with pytest.raises(UnfinishedRunError, match=r"its end is missing, .* tell of own\.dump"):
             open_run(dump, None, log)
+
+
+AT_REST = "  at its end the scene is at rest: rms speed 0.002 g h, net force 7e-05 of the weight\n"
+MOVES = "  at its end the scene is NOT AT REST: rms speed 0.232 g h, net force 1 of the weight\n"
+
+
+def ends(first: int, steps: int, said: str) -> str:
+    """Return what a log holds of a run at whose end the fix says something."""
+    return run(first, steps).replace("Loop time", f"{said}Loop time")
+
+
+def test_how_far_a_run_ends_from_rest(tmp_path: Path) -> None:
+    """It is known at the steps at which runs end, of the last one that tells."""
+    text = ends(0, 6, MOVES) + ends(6, 3, AT_REST) + run(9, 2) + ends(11, 0, MOVES) + run(11, 0)
+    (tmp_path / "log.lammps").write_text(text)
+    log = read_run_log(tmp_path / "log.lammps")
+    assert log.unrest_at(6) == Unrest(at_rest=False, speed=0.232, net_force=1.0)
+    assert log.unrest_at(9) == Unrest(at_rest=True, speed=0.002, net_force=7e-5)
+    assert log.unrest_at(7) is None
+    assert log.unrest_at(11) == log.unrest_at(6)
+    assert log.unrest_at(9).words == "rms speed 0.002 g h, net force 7e-05 of the weight"
+
+
+def test_damaged_numbers_of_rest(tmp_path: Path) -> None:
+    """No number, or none that is finite, is an error that names the line."""
+    (tmp_path / "log.lammps").write_text(ends(0, 6, MOVES.replace("0.232", "0.2x2")))
+    with pytest.raises(LogError, match=r"log\.lammps, line 4: 'at its end .* is damaged"):
+        read_run_log(tmp_path / "log.lammps")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -25,9 +26,20 @@ from lammps_inelastic.analysis import (
     iterate_contact_frames,
     read_particle_frame,
 )
-from lammps_inelastic.workflow import Ball, Box, Cluster, Cylinder, Dimer, Packing, Sphere, pack
+from lammps_inelastic.workflow import (
+    Ball,
+    Box,
+    Cluster,
+    Cylinder,
+    Dimer,
+    NotAtRestError,
+    Packing,
+    Sphere,
+    pack,
+)
 from lammps_inelastic.workflow.errors import PackingError, WorkflowError
 from lammps_inelastic.workflow.main import main
+from lammps_inelastic.workflow.packing import one_call
 from tests.helpers.lammps_run import LAUNCHER, run_lmp
 from tests.helpers.small_disk import mounted
 from tests.workflow.test_pack_arguments import outside
@@ -132,6 +144,30 @@ def test_nothing_overlaps_in_any_container(shape: Any, container: Any, particles
     mass = len(packing.radii) * np.pi / 6
     # What is at rest within the solver's accuracy of a per mille.
     assert up == pytest.approx(9.81 * mass, rel=0.01)
+
+
+def test_a_packing_that_moves_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It says so, and holds the packing; where it may move it comes back, and says so."""
+    usual = one_call._complete
+    hasty = {"steps_settling": 0, "steps_resting": 0, "steps_tightening": 0, "steps_agitated": 30}
+
+    def stopped(*arguments: Any) -> tuple[dict[str, Any], int]:
+        values, steps = usual(*arguments)
+        return {**values, **hasty}, steps
+
+    resting = quiet(40, sizes=0.2, container=Box(1, 1, 5))
+    assert resting.at_rest
+    assert re.search(r"at rest +yes", repr(resting))
+    monkeypatch.setattr(one_call, "_complete", stopped)
+    with pytest.raises(NotAtRestError, match=r"40 spheres in a box .* are NOT AT REST") as caught:
+        quiet(40, sizes=0.2, container=Box(1, 1, 5))
+    packing = quiet(40, sizes=0.2, container=Box(1, 1, 5), must_rest=False)
+    assert not packing.at_rest
+    assert re.search(r"at rest +NOT AT REST: rms speed", repr(packing))
+    assert np.array_equal(packing.positions, caught.value.packing.positions)
+    # Of the dump: faster than the velocity that gravity gives in a step, a tenth of a time unit.
+    assert packing.frame.velocities is not None
+    assert np.sqrt((packing.frame.velocities**2).sum(axis=1).mean()) > 9.81 * 0.1
 
 
 def test_each_size_is_there_as_often_as_asked() -> None:

@@ -19,6 +19,7 @@ from lammps_inelastic.analysis import (
     PictureError,
     RunFiles,
     UnfinishedRunError,
+    Unrest,
     contact_counts,
     contacts_by_distance,
     measure_packing,
@@ -49,6 +50,7 @@ class Look:
     box : (3, 2), where the packing fraction and the coordination number are measured, length;
         None for the whole simulation box
     seed : seed of the random points
+    unrest : how far the packing is from rest; None where no log tells
     packing : numbers of the packing, as studies measure them
     coordination : coordination number of the particles in the box, over all contact frames
     contact_steps : first and last step of the contact frames
@@ -66,6 +68,7 @@ class Look:
     frame: ParticleFrame
     box: FloatArray | None
     seed: int
+    unrest: Unrest | None
     packing: PackingMeasurement
     coordination: CoordinationNumber
     contact_steps: tuple[int, int]
@@ -168,6 +171,7 @@ def look_at(dump: Path, contact_dump: Path, wanted: Wanted) -> Look:
         frame=frame,
         box=box,
         seed=wanted.seed,
+        unrest=None if files.log is None else files.log.unrest_at(frame.step),
         packing=packing,
         coordination=packing.coordination,
         contact_steps=(steps[0], steps[-1]),

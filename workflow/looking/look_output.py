@@ -34,6 +34,7 @@ def as_text(found: Look) -> str:
     rows = [
         ("particles", f"{len(found.frame.particles)}", f"step {found.frame.step}"),
         *spheres,
+        *_rest_rows(found),
         _packing_row(found),
         *_coordination_rows(found),
         *(_body_rows(found) if composite else []),
@@ -93,6 +94,13 @@ def _part_in_bed(bed: BoxInBed) -> str:
         return "no part of the box"
     inside = " ".join(f"{bound:g}" for bound in bed.inside.ravel())
     return f"{bed.share:.0%} of the box, --box {inside}"
+
+
+def _rest_rows(found: Look) -> list[Row]:
+    """Say whether the packing is at rest, where that is known."""
+    if found.unrest is None:
+        return []
+    return [("at rest", "yes" if found.unrest.at_rest else "NOT AT REST", found.unrest.words)]
 
 
 def _packing_row(found: Look) -> Row:
@@ -191,6 +199,13 @@ def as_json(found: Look) -> str:
         "box": None if found.box is None else found.box.tolist(),
         "periodic": list(found.frame.cell.periodic),
         "dimensions": 2 if found.frame.cell.flat else 3,
+        "at_rest": None
+        if found.unrest is None
+        else {
+            "value": found.unrest.at_rest,
+            "rms_speed": found.unrest.speed,
+            "net_force": found.unrest.net_force,
+        },
         "bed": _bed_report(found.packing.bed),
         "packing_fraction": _packing_report(found),
         "coordination_number": _coordination_report(found),

@@ -6,7 +6,7 @@ leaves the user's process, and an interrupt stops it; several ranks are `mpiexec
 
 from .containers import Ball, Box, Container, Cylinder
 from .one_call import pack
-from .result import Packing
+from .result import NotAtRestError, Packing
 from .shapes import Cluster, Dimer, Shape, Sphere
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Container",
     "Cylinder",
     "Dimer",
+    "NotAtRestError",
     "Packing",
     "Shape",
     "Sphere",

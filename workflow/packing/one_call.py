@@ -21,7 +21,7 @@ from ..running.processes import cores
 from ..shipped import PACK, deck_text
 from .checked import as_number, as_positive, as_whole
 from .containers import USUAL_DIAMETER, Container, as_container
-from .result import Packing, read_packing
+from .result import NotAtRestError, Packing, read_packing
 from .running import Scene, run_deck
 from .shapes import Cluster, Shape, Sphere, as_shape, volume_of
 from .sizes import Sizes, diameters_of
@@ -48,6 +48,7 @@ def pack(
     ranks: int = 1,
     folder: str | os.PathLike[str] | None = None,
     progress: bool = True,
+    must_rest: bool = True,
 ) -> Packing:
     """Pour hard particles into a container, shake them, and wait until they are at rest.
 
@@ -73,8 +74,11 @@ def pack(
     ranks : number of MPI ranks, at most that of the cores
     folder : for LAMMPS's files, which must not be there yet; without, they go with the packing
     progress : whether to show how far it is, on the standard error
+    must_rest : whether a packing that still moves at the end is an error; otherwise its `at_rest`
+        is False
 
-    Raises PackingError with one line for what cannot be packed, and where LAMMPS fails. An
+    Raises NotAtRestError, a PackingError whose `packing` is what has been packed, where it still
+    moves, PackingError with one line for what cannot be packed, and where LAMMPS fails. An
     interrupt (KeyboardInterrupt) stops LAMMPS; then, and after an error, nothing is left.
     """
     count = as_whole(particles, "particles", 1, 2**31 - 1, "a whole number of at least 1")
@@ -91,7 +95,10 @@ def pack(
     }
     target = None if folder is None else _free(Path(folder))
     start = _start(form, sizes, count, container, np.random.default_rng(number))
-    return _packed(start, values, target, at_once, progress)
+    packing = _packed(start, values, target, at_once, progress)
+    if must_rest and not packing.at_rest:
+        raise NotAtRestError(packing)
+    return packing
 
 
 @dataclass(frozen=True, eq=False)

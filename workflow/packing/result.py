@@ -19,12 +19,14 @@ from lammps_inelastic.analysis import (
     PackingMeasurement,
     ParticleFrame,
     Particles,
+    Unrest,
     box_in_bed,
     contact_counts,
     iterate_contact_frames,
     largest_pair_overlap,
     measure_packing,
     read_particle_frame,
+    read_run_log,
     write_contacts_vtk,
     write_csv,
     write_json,
@@ -41,7 +43,7 @@ from lammps_inelastic.analysis.geometry import FloatArray, IntArray
 from ..errors import PackingError
 from ..files import whole, writing
 from ..looking.view import KnownContacts, view_of
-from ..provenance.finished import CONTACTS, PARTICLES
+from ..provenance.finished import CONTACTS, LOG, PARTICLES
 from .containers import Ball, Container
 from .shapes import Shape
 
@@ -67,7 +69,9 @@ VOXELS_PER_RADIUS = 10
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Packing:
-    """Particles at rest in a container. A particle is a sphere, or a rigid body of spheres.
+    """Particles in a container, at rest unless one has asked otherwise.
+
+    A particle is a sphere, or a rigid body of spheres.
 
     Attributes
     ----------
@@ -75,6 +79,7 @@ class Packing:
     container : that they lie in, with its height
     frame : the spheres, ordered by id
     contact_frames : the contacts in each of the last steps
+    unrest : how far it is from rest: `at_rest`, `speed`, `net_force`
     folder : of LAMMPS's run; a temporary one goes with the packing
     """
 
@@ -82,7 +87,18 @@ class Packing:
     container: Container
     frame: ParticleFrame
     contact_frames: tuple[ContactFrame, ...] = field(repr=False)
+    unrest: Unrest
     folder: Path
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it is at rest: rms speed at most 0.05 g h, and the walls carry the weight."""
+        return self.unrest.at_rest
+
+    @property
+    def words(self) -> str:
+        """What is packed in what."""
+        return f"{len(self.particles)} {self.shape.plural} in {self.container.words}"
 
     @property
     def positions(self) -> FloatArray:
@@ -216,7 +232,9 @@ class Packing:
         """Return the main numbers, one a line."""
         small, large = 2 * float(self.radii.min()), 2 * float(self.radii.max())
         counts = self._counts[-1]
+        rest = "yes" if self.at_rest else f"NOT AT REST: {self.unrest.words}"
         rows = [
+            ("at rest", rest),
             ("diameter", f"{small:g}" if small == large else f"{small:g} to {large:g}"),
             ("packing fraction", _number(self.packing_fraction, ".4f")),
             ("coordination number", _number(self.coordination_number, ".3f")),
@@ -224,8 +242,7 @@ class Packing:
             ("contacts", f"{counts.particles.sum() // 2}, with walls {counts.walls.sum()}"),
             ("largest overlap", f"{self.largest_overlap:.2g}"),
         ]
-        first = f"{len(self.particles)} {self.shape.plural} in {self.container.words}"
-        return "\n".join([first, *(f"  {name:<20} {value}" for name, value in rows)])
+        return "\n".join([self.words, *(f"  {name:<20} {value}" for name, value in rows)])
 
     @cached_property
     def _counts(self) -> list[ContactCounts]:
@@ -270,8 +287,7 @@ class Packing:
                 write_contacts_vtk(target, self.contacts, frame.ids, frame.spheres)
             case ".html":
                 known = KnownContacts(self.contacts.ids, self.contacts.points, self.forces)
-                caption = repr(self).partition("\n")[0]
-                write_view(target, view_of(frame, known, target.stem, caption))
+                write_view(target, view_of(frame, known, target.stem, self.words))
             case ".pqr":
                 write_pqr(target, frame.spheres, ids=frame.ids)
             case _:
@@ -300,6 +316,18 @@ class Packing:
             )
 
 
+class NotAtRestError(PackingError):
+    """A packing that still moves; `packing` is that packing."""
+
+    def __init__(self, packing: Packing) -> None:
+        """Keep what has been packed."""
+        super().__init__(
+            f"{packing.words} are NOT AT REST: {packing.unrest.words}; must_rest=False returns "
+            "them as they are, and so does this error's packing"
+        )
+        self.packing = packing
+
+
 def _ending_of(target: Path) -> str:
     """Return the ending of a file's name; raise PackingError for one that says nothing."""
     ending = target.suffix.lower()
@@ -314,7 +342,10 @@ def read_packing(folder: Path, shape: Shape, container: Container) -> Packing:
     """Read the packing that LAMMPS has left in a folder. Raises AnalysisError."""
     frame = read_particle_frame(folder / PARTICLES)
     contacts = tuple(iterate_contact_frames(folder / CONTACTS))
-    return Packing(shape, container, frame, contacts, folder)
+    unrest = read_run_log(folder / LOG).unrest_at(frame.step)
+    if unrest is None:
+        raise PackingError(f"{folder / LOG}: does not tell whether the packing is at rest")
+    return Packing(shape, container, frame, contacts, unrest, folder)
 
 
 def _volume(box: FloatArray) -> float:

@@ -40,7 +40,9 @@ NOT_WHOLE = 2
 NOT_MEASURED = "not measured: "
 # And so one about a box that reaches out of the bed.
 OUT_OF_BED = "out of the bed: "
-REMARKS = (NOT_MEASURED, OUT_OF_BED)
+# And so one about a bed that moves.
+NOT_AT_REST = "NOT AT REST: "
+REMARKS = (NOT_MEASURED, OUT_OF_BED, NOT_AT_REST)
 # These files of a finished run are read.
 FILES = (LOG, PARTICLES, CONTACTS)
 # A JSON file holds the texts of the decks, and is not larger than this [bytes].

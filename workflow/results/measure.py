@@ -61,6 +61,7 @@ from ..provenance.finished import (
     FINISHED,
     LOG,
     MEASURED_BY,
+    NOT_AT_REST,
     NOT_MEASURED,
     NOT_WHOLE,
     OUT_OF_BED,
@@ -150,6 +151,16 @@ def _measure(
         f"centre_{axis}": float(v)
         for axis, v in zip("xyz", frame.positions.mean(axis=0), strict=True)
     }
+    unrest = log.unrest_at(frame.step)
+    if unrest is not None:
+        numbers |= {
+            "at_rest": float(unrest.at_rest),
+            "rest_speed": unrest.speed,
+            "net_force": unrest.net_force,
+        }
+        # What a deck before the last one leaves may move.
+        if is_last and not unrest.at_rest:
+            _say(f"{NOT_AT_REST}{unrest.words}; every number is of a bed that still moves")
     resolution = _resolution(stage, float(frame.radii.max()))
     if resolution is not None:
         numbers["resolution"] = resolution

@@ -39,6 +39,13 @@ SCHEMA: Mapping[str, Entry] = {
     "numbers/box_in_bed": _number(
         "1", "share of the measuring box inside the bed; below 1 its numbers are of empty space too"
     ),
+    "numbers/at_rest": _number("1", "1 if the packing is at rest at the end, else 0"),
+    "numbers/rest_speed": _number(
+        "1", "rms speed at the end / rms velocity that forces from outside give in a step, g h"
+    ),
+    "numbers/net_force": _number(
+        "1", "sum of all forces at the end / sum of those from outside, the weight"
+    ),
     "numbers/packing_fraction": _number(
         "1", "in the measuring box: exact for spheres and dimers, else by Monte Carlo"
     ),

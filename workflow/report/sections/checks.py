@@ -58,6 +58,12 @@ class _Row:
         return min((share for share in shares if not math.isnan(share)), default=math.nan)
 
     @property
+    def at_rest(self) -> float:
+        """The share of the runs that end at rest; NaN where it is not known."""
+        told = [value for one in self.group if not math.isnan(value := one.number("at_rest"))]
+        return sum(told) / len(told) if told else math.nan
+
+    @property
     def resolution(self) -> float:
         """The mean resolution of the runs."""
         return RESOLUTION.over(self.group).mean
@@ -99,6 +105,15 @@ IN_BED: Column[_Row] = Column(
     "%",
 )
 
+# Nor this one.
+AT_REST: Column[_Row] = Column("at rest", lambda row: _rest_cell(row), "% of the runs")
+
+
+def _rest_cell(row: _Row) -> Cell:
+    if row.at_rest < 1:
+        return Cell(f"NOT AT REST: {as_text(100 * row.at_rest, 0)}", marked=True)
+    return Cell(as_text(100 * row.at_rest, 0))
+
 
 def checks(data: Data) -> Content:
     """Show overlap and resolution of every case."""
@@ -115,6 +130,12 @@ def checks(data: Data) -> Content:
         notes.append(
             "Box in the bed: the least share of a run's measuring box; below 100 % the numbers of "
             "the box are partly of empty space."
+        )
+    if not all(math.isnan(row.at_rest) for row in rows):
+        columns.append(AT_REST)
+        notes.append(
+            "At rest: the share of the runs that end with an rms speed of at most 0.05 g h and "
+            "forces that miss the weight by at most 0.005 of it."
         )
     caption = "Largest overlap at any step of any run, and how well contacts are resolved"
     return Content([table(caption, columns, rows, notes)])
