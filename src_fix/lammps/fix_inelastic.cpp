@@ -45,7 +45,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     solver_(inelastic::make_solver(settings_.solver)),
     push_apart_(lmp, step_, constraints_, ranks_, movers_), length_(lmp, step_, ranks_),
     rest_(lmp, step_, ranks_, state_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
-    hard_(lmp, step_, ranks_), energy_(lmp, step_, constraints_.rules(), ranks_),
+    hard_(lmp, step_, ranks_), energy_(lmp, step_, constraints_.rules(), ranks_, movers_),
     unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
     output_(lmp, step_, ranks_), unrest_(lmp, step_, output_), summary_(lmp, step_, clock_),
     record_(lmp, step_, ranks_)
@@ -413,53 +413,73 @@ inelastic::ProjectionResult FixInelastic::solve()
     else
       push_apart_.skip();
     if (push_apart_.in_vain()) unsolved_.report_jam(push_apart_.left());
-    // Where the step may be without room for what it gives back, it gives nothing back.
-    if (result.status != inelastic::Status::CONVERGED && !step_.bad_start && !step_.waits &&
-        energy_.gives_back()) {
-      energy_.note_no_room();
-      step_.waits = true;
-      continue;
-    }
-    // What can hardly be solved looks solved in a step that is short enough, in which EPS is more
-    // than anything moves.
-    const bool hardly = hard_.has_shortened() && hard_.is_hardly_solved(result);
-    if (result.status != inelastic::Status::CONVERGED || hardly) {
-      const bool no_room = result.status == inelastic::Status::INFEASIBLE;
-      if (no_room) unsolved_.note_no_room();
-      // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
-      // shorter one. Any other step takes fewer iterations when it is shorter; with warn a run that
-      // has few of them goes on, as it is.
-      const bool law_parts = unsolved_.law_parts();
-      if (length_.may_shorten_unsolved(law_parts) &&
-          (no_room || !settings_.warn_only || constraints_.relinearised() || law_parts || hardly)) {
-        hard_.note_shortened();
-        length_.shorten(0.5, unsolved_.named());
-        continue;
-      }
-      summary_.add_unconverged();
-      unsolved_.report(result);
-    }
-    // A step that is not solved, or pushes a bad start apart, says so itself.
+    if (solves_again(result)) continue;
     const bool solved = result.status == inelastic::Status::CONVERGED;
-    if (solved && !step_.bad_start && adds_too_much(result)) {
-      if (!step_.waits) {
-        energy_.note_no_room();
-        step_.waits = true;
-        continue;
-      }
-      if (length_.may_shorten_unsolved(false)) {
-        hard_.note_shortened();
-        length_.shorten(0.5, unsolved_.named());
-        continue;
-      }
-      unsolved_.report_energy(energy_.times_too_much());
-    }
     if (solved && !step_.bad_start && walls_.any_moves())
       squeezed_.look();
     else
       squeezed_.skip();
     if (length_.accepts(solved, unsolved_.named(), squeezed_.said())) return result;
   }
+}
+
+// Tells whether the step, of which this came out, is to be solved again: it gives nothing back, or
+// is shorter, now. Errors: it is not solved, or adds energy, and nothing of this helps.
+bool FixInelastic::solves_again(inelastic::ProjectionResult &result)
+{
+  // Where the step may be without room for what it gives back, it gives nothing back.
+  if (result.status != inelastic::Status::CONVERGED && !step_.bad_start && !step_.waits &&
+      energy_.gives_back()) {
+    waits_for_room();
+    return true;
+  }
+  // What can hardly be solved looks solved in a step that is short enough, in which EPS is more
+  // than anything moves.
+  const bool hardly = hard_.has_shortened() && hard_.is_hardly_solved(result);
+  if (result.status != inelastic::Status::CONVERGED || hardly) {
+    const bool no_room = result.status == inelastic::Status::INFEASIBLE;
+    if (no_room) unsolved_.note_no_room();
+    // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
+    // shorter one. Any other step takes fewer iterations when it is shorter; with warn a run that
+    // has few of them goes on, as it is.
+    const bool law_parts = unsolved_.law_parts();
+    if ((no_room || !settings_.warn_only || constraints_.relinearised() || law_parts || hardly) &&
+        halves(law_parts)) {
+      hard_.note_shortened();
+      return true;
+    }
+    summary_.add_unconverged();
+    unsolved_.report(result);
+  }
+  // A step that is not solved, or pushes a bad start apart, says so itself.
+  if (result.status != inelastic::Status::CONVERGED || step_.bad_start) return false;
+  if (adds_too_much(result)) {
+    if (!step_.waits) {
+      waits_for_room();
+      return true;
+    }
+    if (halves(false)) {
+      hard_.note_shortened();
+      return true;
+    }
+    unsolved_.report_energy(energy_.times_too_much());
+  }
+  return energy_.law_adds() && halves(true);
+}
+
+// Overlaps stay as deep as they are in the step, which has no room to give them back.
+void FixInelastic::waits_for_room()
+{
+  energy_.note_no_room();
+  step_.waits = true;
+}
+
+// Halves the step if the keyword allows it, and tells whether.
+bool FixInelastic::halves(bool law_parts)
+{
+  if (!length_.may_shorten_unsolved(law_parts)) return false;
+  length_.shorten(0.5, unsolved_.named());
+  return true;
 }
 
 // Tells whether contacts add more energy than they may. Where they do though nothing is given back,
@@ -568,7 +588,7 @@ void FixInelastic::post_run()
   restart_peratom = laws_.has_law();
   unrest_.look();
   summary_.log(length_.shortened_steps(), constraints_.overlaps().unexpected_steps(),
-               hard_.counts(), push_apart_.left(), energy_.most(), unrest_);
+               hard_.counts(), push_apart_.left(), energy_, unrest_);
   begin_summary();
 }
 

@@ -129,6 +129,9 @@ class FixInelastic : public Fix {
   void predict();
   double least_length() const;
   inelastic::ProjectionResult project(long max_iterations, bool to_targets = false);
+  bool solves_again(inelastic::ProjectionResult &result);
+  void waits_for_room();
+  bool halves(bool law_parts);
   bool adds_too_much(inelastic::ProjectionResult &result);
   void finish(const inelastic::ProjectionResult &result);
 };

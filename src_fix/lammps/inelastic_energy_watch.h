@@ -25,12 +25,18 @@ namespace LAMMPS_NS::Inelastic_NS {
 
 class GapRules;
 class GhostExchange;
+class Movers;
 
 class EnergyWatch : protected Pointers {
  public:
-  EnergyWatch(class LAMMPS *lmp, const Step &step, const GapRules &rules, GhostExchange &ranks);
+  EnergyWatch(class LAMMPS *lmp, const Step &step, const GapRules &rules, GhostExchange &ranks,
+              const Movers &movers);
 
-  void begin_run() { most_ = 0.0; }
+  void begin_run()
+  {
+    most_ = 0.0;
+    steps_of_law_ = 0;
+  }
   // Tells at the start of a step whether it is to give nothing back, since one before had no room
   // for that: every second step tries, then every third, fifth and so on, up to every 65th.
   bool waits_on();
@@ -43,19 +49,40 @@ class EnergyWatch : protected Pointers {
   bool adds_too_much(const std::vector<double> &target);
   // How many times as much as they may the contacts of a cluster added when it told so.
   double times_too_much() const { return times_too_much_; }
+  // Tells whether energy is added where the law has surfaces part, though each collision alone
+  // takes some or none: a surface that parts meets another one in the same step, or bodies turn
+  // too far in it, so that their surfaces go other ways than at first, or that LAMMPS, which keeps
+  // the angular momentum of each, does not keep its energy. Known once adds_too_much() was asked.
+  bool law_adds() const { return law_adds_; }
   // Notes that the step is taken as adds_too_much() has seen it.
   void end_step();
 
   // The most that the contacts of a cluster have added in a step of the run beside what laws and
   // walls that move do [energy].
   double most() const;
+  // Steps of the run in which the law has added energy.
+  long steps_of_law() const { return steps_of_law_; }
 
  private:
+  double along(std::size_t c, const std::vector<double> &v) const;
+  double fastest_given_back();
+  void add_up(const std::vector<double> &target);
+
   const Step &step_;
   const GapRules &rules_;
   GhostExchange &ranks_;
+  const Movers &movers_;
   Clusters clusters_;
+  // Per cluster: its mass; what contacts add, those of a law beside others, and the sizes of what
+  // they take and give; and what targets and turning allow [energy]. Whether it gives overlaps
+  // back, and whether the law has surfaces part.
+  enum { MASS, ADDED, BY_LAW, SIZE, TARGETS, TURNS, SUMS };
+  enum { GIVES_BACK, PARTS, DOES };
+  std::vector<double> sums_, does_;
   double added_ = 0.0, most_ = 0.0, times_too_much_ = 0.0;
+  bool parts_ = false;    // some surfaces have been asked to part since the fix was defined
+  bool law_adds_ = false;
+  long steps_of_law_ = 0;
   int pause_ = 0, left_ = 0;    // steps from one try to give overlaps back to the next
 };
 

@@ -83,6 +83,14 @@ double Movers::angle_predicted(const ContactProblem &problem, int particle) cons
   return angle;
 }
 
+double Movers::energy_of_turning(const ContactProblem &problem, int particle) const
+{
+  double part = 0.0;
+  for (const Mover *mover : turning_)
+    part = std::max(part, mover->energy_of_turning(problem, particle));
+  return part;
+}
+
 void Movers::note_push(const ContactProblem &problem, const std::vector<double> &velocity)
 {
   for (Mover *mover : turning_) mover->note_push(problem, velocity);

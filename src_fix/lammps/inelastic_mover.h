@@ -64,6 +64,12 @@ class Mover {
                                  int /*particle*/) const
   { return 0.0; }
 
+  // The part by which the step of the last turn() raises the energy of rotation of what a particle
+  // turns with, where nothing acts: angular momentum is kept exactly, orientations are not.
+  virtual double energy_of_turning(const inelastic::ContactProblem & /*problem*/,
+                                   int /*particle*/) const
+  { return 0.0; }
+
   // Takes the part of velocities beyond the predicted ones as a push, which is no momentum.
   virtual void note_push(const inelastic::ContactProblem & /*problem*/,
                          const std::vector<double> & /*velocity*/)
@@ -103,6 +109,7 @@ class Movers {
             std::vector<double> &motion);
   double angle_turned(const inelastic::ContactProblem &problem, int particle) const;
   double angle_predicted(const inelastic::ContactProblem &problem, int particle) const;
+  double energy_of_turning(const inelastic::ContactProblem &problem, int particle) const;
   void note_push(const inelastic::ContactProblem &problem, const std::vector<double> &velocity);
   void note_stop(const inelastic::ContactProblem &problem, const std::vector<double> &by_contacts,
                  const std::vector<double> &wanted);

@@ -236,6 +236,20 @@ double RigidMotion::angle_predicted(const inelastic::ContactProblem &problem, in
   return problem.timestep * norm(spin);
 }
 
+double RigidMotion::energy_of_turning(const inelastic::ContactProblem &problem, int i) const
+{
+  const int b = problem.bodies.body[i];
+  if (b < 0) return 0.0;
+  const Body &body = bodies_[b];
+  const double *const momentum = body.angular_momentum_end;
+  const double *const inverse = &problem.bodies.inverse_inertia[6 * b];
+  double before[3], after[3];
+  multiply(inverse, momentum, before);
+  angular_velocity_turned(body.turned, inverse, momentum, after);
+  const double energy = dot(momentum, before);
+  return energy > 0.0 ? dot(momentum, after) / energy - 1.0 : 0.0;
+}
+
 // The velocity of a member after the step of the last turn().
 void RigidMotion::velocity_after(int i, double *velocity) const
 {

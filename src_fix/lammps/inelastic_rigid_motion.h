@@ -60,6 +60,7 @@ class RigidMotion final : public Mover, protected Pointers {
   // 0 for a free particle.
   double angle_turned(const inelastic::ContactProblem &problem, int i) const override;
   double angle_predicted(const inelastic::ContactProblem &problem, int i) const override;
+  double energy_of_turning(const inelastic::ContactProblem &problem, int i) const override;
 
   void note_push(const inelastic::ContactProblem &problem,
                  const std::vector<double> &velocity) override;

@@ -46,7 +46,8 @@ void RunSummary::add_step(const inelastic::ProjectionResult &result)
 }
 
 void RunSummary::log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard,
-                     const PushApart::Left &left, double most_added, const Unrest &unrest) const
+                     const PushApart::Left &left, const EnergyWatch &energy,
+                     const Unrest &unrest) const
 {
   const bool all_pushed = pushed_at_start_ == steps_;
   const double overlap = all_pushed ? overlap_of_start_ : largest_overlap_;
@@ -58,7 +59,7 @@ void RunSummary::log(long shortened_steps, long unexpected_steps, const HardStep
         steps_, iterations_, overlap, overlap / step_.settings.tolerance,
         shortened_steps - shortened_before_);
     log_overlaps(unexpected_steps, left);
-    log_given_back(most_added);
+    log_given_back(energy);
     log_hard_steps(hard);
     log_unrest(unrest);
   }
@@ -100,16 +101,22 @@ void RunSummary::log_overlaps(long unexpected_steps, const PushApart::Left &left
     utils::logmesg(lmp, "  in {} steps the scene was at rest, and nothing moved\n", at_rest_);
 }
 
-void RunSummary::log_given_back(double most_added) const
+void RunSummary::log_given_back(const EnergyWatch &energy) const
 {
   if (waited_ > 0)
     utils::logmesg(
         lmp, "  in {} steps overlaps stayed, since there was no room to give them back\n", waited_);
+  const double most_added = energy.most();
   if (most_added > 0.0)
     utils::logmesg(lmp,
                    "  contacts added at most {:.3g} to the kinetic energy in a step, by overlaps "
                    "that they gave back\n",
                    most_added);
+  if (energy.steps_of_law() > 0)
+    utils::logmesg(lmp,
+                   "  in {} steps collisions, or bodies that turned far, added energy: a shorter "
+                   "timestep, or shorten yes, avoids it\n",
+                   energy.steps_of_law());
 }
 
 void RunSummary::log_hard_steps(const HardSteps::Counts &hard) const

@@ -3,6 +3,7 @@
 #ifndef INELASTIC_RUN_SUMMARY_H
 #define INELASTIC_RUN_SUMMARY_H
 
+#include "inelastic_energy_watch.h"
 #include "inelastic_hard_steps.h"
 #include "inelastic_phase_clock.h"
 #include "inelastic_projection.h"
@@ -28,11 +29,11 @@ class RunSummary : protected Pointers {
 
   // Collective.
   void log(long shortened_steps, long unexpected_steps, const HardSteps::Counts &hard,
-           const PushApart::Left &left, double most_added, const Unrest &unrest) const;
+           const PushApart::Left &left, const EnergyWatch &energy, const Unrest &unrest) const;
 
  private:
   void log_overlaps(long unexpected_steps, const PushApart::Left &left) const;
-  void log_given_back(double most_added) const;
+  void log_given_back(const EnergyWatch &energy) const;
   void log_hard_steps(const HardSteps::Counts &hard) const;
   void log_unrest(const Unrest &unrest) const;
   void log_times() const;

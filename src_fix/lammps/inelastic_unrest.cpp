@@ -20,7 +20,7 @@ Unrest::Unrest(LAMMPS *lmp, const Step &step, const ContactOutput &output) :
 
 void Unrest::look()
 {
-  if (looked_at_ == update->ntimestep || update->whichflag == 0) return;
+  if (!any_step_ || looked_at_ == update->ntimestep || update->whichflag == 0) return;
   looked_at_ = update->ntimestep;
   // Sums over what may move: mass times squared speed, the same of velocities that forces from
   // outside give in a step, these forces, all forces, and sizes of those from outside.

@@ -21,7 +21,11 @@ class Unrest : protected Pointers {
   Unrest(class LAMMPS *lmp, const Step &step, const ContactOutput &output);
 
   // At the end of a step, which is then looked at when it is asked for.
-  void end_step() { looked_at_ = NOT_YET; }
+  void end_step()
+  {
+    any_step_ = true;
+    looked_at_ = NOT_YET;
+  }
   // Looks at the step, unless that is done. Collective; call it in a run, or at its end.
   void look();
 
@@ -41,6 +45,7 @@ class Unrest : protected Pointers {
   const Step &step_;
   const ContactOutput &output_;
   bigint looked_at_ = NOT_YET;
+  bool any_step_ = false;    // since the fix was defined
   bool known_ = false;
   double speed_ = 0.0, net_force_ = 0.0;
 };

@@ -74,12 +74,11 @@ def pack(
     ranks : number of MPI ranks, at most that of the cores
     folder : for LAMMPS's files, which must not be there yet; without, they go with the packing
     progress : whether to show how far it is, on the standard error
-    must_rest : whether a packing that still moves at the end is an error; otherwise its `at_rest`
-        is False
+    must_rest : whether one that still moves at the end is an error; or its `at_rest` is False
 
-    Raises NotAtRestError, a PackingError whose `packing` is what has been packed, where it still
-    moves, PackingError with one line for what cannot be packed, and where LAMMPS fails. An
-    interrupt (KeyboardInterrupt) stops LAMMPS; then, and after an error, nothing is left.
+    Raises NotAtRestError where it moves, a PackingError whose `packing` it is; PackingError with
+    one line for what cannot be packed, and where LAMMPS fails. An interrupt (KeyboardInterrupt)
+    stops LAMMPS; then, and after other errors, nothing is left.
     """
     count = as_whole(particles, "particles", 1, 2**31 - 1, "a whole number of at least 1")
     form = as_shape(shape)
@@ -95,8 +94,12 @@ def pack(
     }
     target = None if folder is None else _free(Path(folder))
     start = _start(form, sizes, count, container, np.random.default_rng(number))
-    packing = _packed(start, values, target, at_once, progress)
-    if must_rest and not packing.at_rest:
+    return _at_rest(_packed(start, values, target, at_once, progress), must=must_rest)
+
+
+def _at_rest(packing: Packing, *, must: bool) -> Packing:
+    """Return a packing; raise NotAtRestError for one that moves, if it must not."""
+    if must and not packing.at_rest:
         raise NotAtRestError(packing)
     return packing
 

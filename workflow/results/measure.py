@@ -34,6 +34,7 @@ from lammps_inelastic.analysis import (
     PictureError,
     RunFiles,
     RunLog,
+    Unrest,
     at_steps,
     best_packing_fraction,
     bond_order,
@@ -151,16 +152,8 @@ def _measure(
         f"centre_{axis}": float(v)
         for axis, v in zip("xyz", frame.positions.mean(axis=0), strict=True)
     }
-    unrest = log.unrest_at(frame.step)
-    if unrest is not None:
-        numbers |= {
-            "at_rest": float(unrest.at_rest),
-            "rest_speed": unrest.speed,
-            "net_force": unrest.net_force,
-        }
-        # What a deck before the last one leaves may move.
-        if is_last and not unrest.at_rest:
-            _say(f"{NOT_AT_REST}{unrest.words}; every number is of a bed that still moves")
+    # What a deck before the last one leaves may move.
+    numbers |= _unrest(log.unrest_at(frame.step), said=is_last)
     resolution = _resolution(stage, float(frame.radii.max()))
     if resolution is not None:
         numbers["resolution"] = resolution
@@ -191,6 +184,19 @@ def _measure(
         _profile(frame, box, outputs.profile, values)
     values |= {f"numbers/{name}": np.asarray(value, dtype=float) for name, value in numbers.items()}
     return values
+
+
+def _unrest(unrest: Unrest | None, *, said: bool) -> dict[str, float]:
+    """Return how far a packing is from rest, if that is known; say so of one that moves."""
+    if unrest is None:
+        return {}
+    if said and not unrest.at_rest:
+        _say(f"{NOT_AT_REST}{unrest.words}; every number is of a bed that still moves")
+    return {
+        "at_rest": float(unrest.at_rest),
+        "rest_speed": unrest.speed,
+        "net_force": unrest.net_force,
+    }
 
 
 def _packing_fractions(
