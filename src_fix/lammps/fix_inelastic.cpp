@@ -394,15 +394,14 @@ inelastic::ProjectionResult FixInelastic::solve()
     predict();
     rest_.compare_loads();
     constraints_.collect();
-    inelastic::ProjectionResult result = project(settings_.max_iterations);
     constraints_.overlaps().share();
-    // Beside bad overlaps regular ones are kept, once they cannot all be given back in one step.
-    const bool unsolved = result.status != inelastic::Status::CONVERGED;
-    const bool keeps = step_.waits || (step_.bad_start && (step_.keeps_overlaps || unsolved));
+    // Beside bad overlaps, which count as touching and may leave no room, regular ones are kept.
+    const bool keeps = step_.waits || step_.bad_start;
     if (keeps != step_.keeps_overlaps) {
       step_.keeps_overlaps = keeps;
       continue;
     }
+    inelastic::ProjectionResult result = project(settings_.max_iterations);
     if (settings_.record_every > 0 && step_.kick == Kick::WHOLE &&
         update->ntimestep % settings_.record_every == 0)
       record_.write(result);

@@ -227,7 +227,9 @@ void BodyMembers::check_reach() const
   host_.reduce(nullptr, 0, &extent, 1);
   const Periods periods(lmp);
   if (comm->nprocs == 1 && !periods.any()) return;
-  const double needed = neighbor->cutneighmax + extent;
+  // Locked bodies may hang in one another without that any of their spheres is listed.
+  const double near = step_.settings.unlock ? 0.5 * extent : 0.0;
+  const double needed = std::max(neighbor->cutneighmax, near) + extent;
   const double cutoff = std::max(comm->cutghostuser, neighbor->cutneighmax);
   if (cutoff < needed)
     error->all(FLERR,

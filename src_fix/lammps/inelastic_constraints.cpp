@@ -20,13 +20,14 @@ Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClo
                          Movers &movers) :
     Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), movers_(movers), walls_(walls),
     overlaps_(lmp, step, ranks), rules_(step, overlaps_), rows_(step, rules_, laws, guesses),
-    entangled_(step), pairs_(lmp, step, rules_, rows_, entangled_, movers),
+    entangled_(step), locked_(lmp, step), pairs_(lmp, step, rules_, rows_, entangled_, movers),
     wall_constraints_(lmp, step, rules_, rows_, walls, ranks, movers)
 {
 }
 
 void Constraints::begin_run(double smallest_radius)
 {
+  is_start_ = true;
   if (margin_ < 0.0 && step_.largest_radius > 0.0) margin_ = FIRST_MARGIN * smallest_radius;
 }
 
@@ -44,6 +45,30 @@ void Constraints::collect()
   pairs_.collect(margin_);
   wall_constraints_.collect(margin_);
   ranks_.fail_together(step_.problem_found);
+  find_locked();
+}
+
+// Locked bodies make a start bad, and count as overlapping by as much as a push may open.
+void Constraints::find_locked()
+{
+  locked_.clear();
+  if (!step_.settings.unlock || !is_start_) return;
+  locked_.find();
+  for (const LockedBodies::Pair &pair : locked_.pairs())
+    overlaps_.note(-PUSH_LIMIT * (atom->radius[pair.first] + atom->radius[pair.second]), pair.first,
+                   atom->tag[pair.second]);
+}
+
+void Constraints::entangle()
+{
+  entangled_.find(locked_.pairs());
+  for (const LockedBodies::Pair &pair : locked_.pairs()) {
+    const int i = pair.first, j = pair.second;
+    const double size = atom->radius[i] + atom->radius[j];
+    // Along the line between the centres, which disentangle() sets.
+    const double any[3] = {1.0, 0.0, 0.0};
+    rows_.add({atom->tag[j], -PUSH_LIMIT * size, size}, 0.0, i, j, any);
+  }
 }
 
 // The velocities are those of the step, `problem` is its problem.
@@ -105,6 +130,7 @@ void Constraints::adapt_margin(double reach)
 {
   constexpr double MORE = 1.1, FEWER = 0.95;
   const double least = 4.0 * step_.settings.tolerance;
+  is_start_ = is_start_ && step_.bad_start;
   margin_ *= came_back_ ? MORE : FEWER;
   margin_ = std::clamp(margin_, least, std::max(least, reach));
 }

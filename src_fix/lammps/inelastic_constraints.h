@@ -28,7 +28,11 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   bool walls_move() const { return walls_.any_moves(); }
   OverlapWatch &overlaps() { return overlaps_; }
   const OverlapWatch &overlaps() const { return overlaps_; }
-  EntangledBodies &entangled() { return entangled_; }
+  const EntangledBodies &entangled() const { return entangled_; }
+  // Before a push, in its phase: finds entangled bodies, and adds the constraints that take locked
+  // ones apart.
+  void entangle();
+  void disentangle() { entangled_.disentangle(atom, overlaps_); }
   const GapRules &rules() const { return rules_; }
   void use(NeighList *list) { pairs_.use(list); }
 
@@ -63,6 +67,7 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   void adapt_margin(double reach);
 
  private:
+  void find_locked();
   bool need_relinearising() const;
   long relinearise();
 
@@ -75,6 +80,8 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   GapRules rules_;
   ContactRows rows_;
   EntangledBodies entangled_;
+  LockedBodies locked_;
+  bool is_start_ = true;    // all steps of the run so far have pushed its start apart
   PairConstraints pairs_;
   WallConstraints wall_constraints_;
   double margin_ = -1.0;    // [length] what comes nearer than this is in the problem from the start

@@ -19,9 +19,10 @@ std::uint64_t EntangledBodies::pair(int i, int j) const
   return std::min(a, b) << 32 | std::max(a, b);
 }
 
-void EntangledBodies::find()
+void EntangledBodies::find(const std::vector<LockedBodies::Pair> &locked)
 {
   pairs_.clear();
+  for (const LockedBodies::Pair &of : locked) pairs_.insert(pair(of.first, of.second));
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const Contact &contact = step_.contact_of(c);

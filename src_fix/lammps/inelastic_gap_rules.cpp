@@ -158,7 +158,8 @@ bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
   const double allowed = bad ? contact.gap_now : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
   const double wanted = bad ? wanted_gap(contact) : 0.0;
-  return wanted - gap_at_end > (step_.waits ? REGULAR_OVERLAP : RELINEARISE_BEYOND) * tolerance;
+  return wanted - gap_at_end >
+      (step_.keeps_overlaps ? REGULAR_OVERLAP : RELINEARISE_BEYOND) * tolerance;
 }
 
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)

@@ -85,7 +85,7 @@ void PushApart::ask_for_all(bool gives_way)
       contacts.gap[c] = -step_.rows[c].wall_motion;
     contacts.impulse[c] = 0.0;
   }
-  if (movers_.any_turns()) constraints_.entangled().disentangle(atom, constraints_.overlaps());
+  if (movers_.any_turns()) constraints_.disentangle();
 }
 
 // Counts bad overlaps, and looks how far they open and what the push leaves of them. Returns
@@ -146,12 +146,13 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   problem.predicted_velocity = step_.velocity;
   step_.phase = Phase::PUSH;
   step_.relinearisations = 0;
-  if (movers_.any_turns()) constraints_.entangled().find();
+  if (movers_.any_turns()) constraints_.entangle();
+  const inelastic::ContactSet with_locked = problem.contacts;
   // Iterations of the first trial. Thousands of spheres that have room for what is asked take far
   // fewer.
   constexpr long MOST = 10000;
   for (bool ends = false; !ends;) {
-    begin_trial(contacts);
+    begin_trial(with_locked);
     ask_for_all(gives_way_);
     const long left = std::max(0L, step_.settings.max_iterations - result.iterations);
     const inelastic::ProjectionResult pushed =

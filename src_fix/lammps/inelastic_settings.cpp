@@ -17,8 +17,8 @@ using namespace Inelastic_NS;
 
 namespace {
 
-constexpr const char *KEYWORDS[] = {"region",  "rigid",  "law",    "accuracy", "solver",
-                                    "maxiter", "frozen", "record", "shorten",  "rest"};
+constexpr const char *KEYWORDS[] = {"region", "rigid",  "law",     "accuracy", "solver", "maxiter",
+                                    "frozen", "record", "shorten", "rest",     "unlock"};
 
 bool is_keyword(const char *word)
 {
@@ -64,7 +64,7 @@ void Reader::read_keywords()
     if (!is_keyword(arg_[at_]))
       error_at(error_, FLERR, at_,
                "Unknown fix inelastic keyword {}: use region, rigid, law, accuracy, solver, "
-               "maxiter, frozen, record, shorten or rest",
+               "maxiter, frozen, record, shorten, rest or unlock",
                keyword);
     if (at_ + 2 > narg_) utils::missing_cmd_args(FLERR, "fix inelastic " + keyword, error_);
     refuse_twice(keyword);
@@ -86,6 +86,8 @@ void Reader::read_keywords()
       read_frozen(value);
     else if (keyword == "record")
       read_record(value);
+    else if (keyword == "unlock")
+      settings_.unlock = utils::logical(FLERR, value, false, lmp_) == 1;
     else if (keyword == "rest")
       settings_.rest = utils::logical(FLERR, value, false, lmp_) == 1;
     else

@@ -34,6 +34,8 @@ struct Settings {
   bool shorten = false;
   // Particles that their contacts hold come to rest (inelastic_rest.h).
   bool rest = true;
+  // Locked bodies are taken apart while a run pushes a start apart (inelastic_locked_bodies.h).
+  bool unlock = false;
   // The group of the fix, and the group of spheres that nothing moves (0 = none).
   int group_bit = 0;
   std::string frozen_group;    // empty: there is none
