@@ -115,7 +115,8 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
     added_ = std::max(added_, added);
     const double least = 0.5 * s[MASS] * speed * speed + s[TARGETS] + ROUND_OFF * s[SIZE];
     const double most = least + s[TURNS];
-    if (does[GIVES_BACK] > 0.0 && added > most)
+    // Where surfaces part others may gain by that, whatever is given back.
+    if (does[GIVES_BACK] > 0.0 && does[PARTS] == 0.0 && added > most)
       times_too_much_ = std::max(times_too_much_, added / most);
     if (does[PARTS] > 0.0 && s[ADDED] > least + LAW_ADDS * s[SIZE]) law_adds = 1.0;
   }

@@ -249,6 +249,7 @@ class _Gained:
     speed : the largest at which an overlap is given back
     allowed : (rows,) what each contact may add
     impulse, end : (rows,) of each contact, and its linearised gap at the end
+    curved : (rows,) by how much the turns of both bodies without contacts close its gap at most
     """
 
     clusters: Clusters
@@ -259,6 +260,7 @@ class _Gained:
     allowed: Array
     impulse: Array
     end: Array
+    curved: Array
 
 
 @dataclass(eq=False)
@@ -1256,6 +1258,8 @@ class _Part:
         before = velocity - np.where(movable[:, None], added / new.mass[:, None], 0.0)
         gained = 0.5 * new.mass * ((velocity**2).sum(axis=1) - (before**2).sum(axis=1))
         size = new.mass * (velocity**2 + sizes[:, None] ** 2).sum(axis=1)
+        # By so much a turn that the step would make without contacts takes a sphere off its line.
+        curved = np.zeros(len(new.mass))
         if new.bodies is not None:
             for row, mine, arm in self.members(new):
                 v, momentum = new.body_v[row], new.body_l[row]
@@ -1265,6 +1269,8 @@ class _Part:
                 spin = self.spin(new, mine, arm, momentum)
                 spin_before = self.spin(new, mine, arm, l_before)
                 before[mine] = v_before + np.cross(spin_before, arm)
+                turned = new.h * np.linalg.norm(spin_before)
+                curved[mine] = np.linalg.norm(arm, axis=1) * min(0.5 * turned**2, 2.0)
                 gained[mine] = 0.0
                 gained[mine[0]] = 0.5 * mass * (v @ v - v_before @ v_before) + 0.5 * (
                     momentum @ spin - l_before @ spin_before
@@ -1309,6 +1315,7 @@ class _Part:
             allowed,
             impulse,
             listed["gap"] + new.h * u,
+            curved[i] + np.where(pair, curved[j], 0.0),
         )
 
     def energy_gained(self, new: _Frame, last: _Frame) -> None:
@@ -1330,7 +1337,7 @@ class _Part:
             distances = [float(view.distance[0]) for view in seen if view is not None]
             if distances:
                 closed[row] = of.end[row] - min(distances) + new.radius[k]
-        turning = np.maximum(0, of.impulse) * np.maximum(0, closed) / last.h
+        turning = np.maximum(0, of.impulse) * np.maximum(of.curved, closed) / last.h
         cluster = of.clusters.of_sphere[of.sphere]
         for spheres, _ in of.clusters:
             mine = cluster == of.clusters.of_sphere[spheres[0]]
