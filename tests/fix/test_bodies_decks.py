@@ -76,7 +76,8 @@ def test_the_decks_run(case: str, lmp: Runner, tmp_path: Path) -> None:
     name, ranks, variables, particles, spheres = CASES[case]
     (tmp_path / "trimer.txt").write_text(TRIMER)
     steps = FEW_STEPS | variables
-    result = lmp(deck(name), ranks=ranks, variables=steps)
+    # Two ranks of 600 spheres wait for one another more than they work.
+    result = lmp(deck(name), ranks=ranks, variables=steps, timeout=60.0 * ranks**2)
     last = steps["steps_agitated"] + steps["steps_settling"] + 50 + 8
     frame = read_particle_frame(result.folder / "out" / "particles.lammpsdump")
     assert frame.step == last
