@@ -1269,8 +1269,8 @@ class _Part:
                 spin = self.spin(new, mine, arm, momentum)
                 spin_before = self.spin(new, mine, arm, l_before)
                 before[mine] = v_before + np.cross(spin_before, arm)
-                turned = new.h * np.linalg.norm(spin_before)
-                curved[mine] = np.linalg.norm(arm, axis=1) * min(0.5 * turned**2, 2.0)
+                angle = float(new.h * np.linalg.norm(spin_before))
+                curved[mine] = np.linalg.norm(arm, axis=1) * min(0.5 * angle**2, 2.0)
                 gained[mine] = 0.0
                 gained[mine[0]] = 0.5 * mass * (v @ v - v_before @ v_before) + 0.5 * (
                     momentum @ spin - l_before @ spin_before
