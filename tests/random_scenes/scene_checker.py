@@ -1222,9 +1222,9 @@ class _Part:
     def wall_motion(self, new: _Frame, listed: dict[str, Array], row: int) -> float:
         """How far a wall comes nearer in the step, seen from where the sphere is now."""
         k, number = listed["i"][row], listed["wall"][row]
-        for shape in self.shapes:
+        for shape in filter(moves, self.shapes):
             now = self.seen_by(shape, number, new.x[k : k + 1], new.time)
-            if now is not None and moves(shape):
+            if now is not None:
                 later = self.seen_by(shape, number, new.x[k : k + 1], new.time + new.h)
                 assert later is not None
                 return float(now.distance[0] - later.distance[0])

@@ -66,18 +66,20 @@ def placed(shape: Shape, time: float) -> tuple[FloatArray, Rotation]:
 def views(shape: Shape, points: ArrayLike, time: float) -> list[View]:
     """Return every wall of a shape as it stands at a time, seen from points (n, 3)."""
     x = np.atleast_2d(np.asarray(points, dtype=float))
+    # Most walls stand, and to place them takes longer than to see them.
+    if not moves(shape):
+        return _seen(shape, x)
     shift, rotation = placed(shape, time)
     about = np.array(shape.get("point", (0, 0, 0)), dtype=float)
-    x = x - shift
-    if turns(shape):
-        x = rotation.inv().apply(x - about) + about
-    found = _inside(shape, x) if shape["inside"] else [_outside(shape, x)]
-    if not turns(shape):
-        return found
+    found = _seen(shape, rotation.inv().apply(x - shift - about) + about)
     return [
         View(view.number, view.distance, rotation.apply(np.array(view.normal)), view.curved)
         for view in found
     ]
+
+
+def _seen(shape: Shape, x: FloatArray) -> list[View]:
+    return _inside(shape, x) if shape["inside"] else [_outside(shape, x)]
 
 
 def _inside(shape: Shape, x: FloatArray) -> list[View]:
