@@ -27,7 +27,6 @@ Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClo
 
 void Constraints::begin_run(double smallest_radius)
 {
-  is_start_ = true;
   if (margin_ < 0.0 && step_.largest_radius > 0.0) margin_ = FIRST_MARGIN * smallest_radius;
 }
 

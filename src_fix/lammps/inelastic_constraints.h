@@ -81,7 +81,8 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   ContactRows rows_;
   EntangledBodies entangled_;
   LockedBodies locked_;
-  bool is_start_ = true;    // all steps of the run so far have pushed its start apart
+  // All steps since the fix was defined have pushed a start apart.
+  bool is_start_ = true;
   PairConstraints pairs_;
   WallConstraints wall_constraints_;
   double margin_ = -1.0;    // [length] what comes nearer than this is in the problem from the start

@@ -69,6 +69,15 @@ def test_chains_stay_what_they_are(tmp_path: Path, lmp: Runner) -> None:
     assert linked_pairs(last.positions.reshape(2, 10, 3)) == (1, 1)
 
 
+def test_what_links_later_stays_linked(tmp_path: Path, lmp: Runner) -> None:
+    """The keyword is for the start of the fix alone, which is over when nothing is to be pushed."""
+    apart = scene_of(two_links(shift=1.0), tmp_path, "region container unlock yes")
+    link = "group second id 11:20\ndisplace_atoms second move -0.7 0 0 units box\n"
+    lmp(apart + "run 3\n" + link + DUMP_BODY_SPHERES + "run 20\n")
+    last = read_dump(tmp_path / "particles.dump")[-1]
+    assert linked_pairs(last.positions.reshape(2, 10, 3)) == (1, 1)
+
+
 def test_a_grain_comes_out_of_its_cage(tmp_path: Path, lmp: Runner) -> None:
     """A free sphere in the middle of a cage of 60 spheres, through which it could not pass."""
     golden = np.pi * (3 - np.sqrt(5))
