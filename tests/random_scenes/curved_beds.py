@@ -32,7 +32,7 @@ from tests.random_scenes.scene_generator import (
     computes,
     numbers,
 )
-from tests.random_scenes.scene_loop import installed, judge
+from tests.random_scenes.scene_loop import Programs, Verdict, installed, judge
 
 STEPS = 500
 # In the time in which a sphere falls by its radius, of which a step is a part.
@@ -183,6 +183,16 @@ def carried(folder: Path, gravity: float) -> float:
     return float(abs(lifted / weight - 1))
 
 
+def judge_bed(seed: int, folder: Path, programs: Programs) -> tuple[Verdict, float]:
+    """Run a bed and check each of its steps; return also by what its walls miss the weight.
+
+    That is NaN where the run has ended in an error.
+    """
+    verdict = judge(seed, folder, programs, scene=curved_bed(seed), keep=True)
+    assert verdict is not None
+    return verdict, carried(folder, 1.0) if verdict.ended == "ended" else np.nan
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -200,13 +210,10 @@ def main() -> int:
     for seed in range(given.seed, given.seed + given.beds):
         if seed in done:
             continue
-        scene = curved_bed(seed)
-        verdict = judge(seed, folder / str(seed), programs, scene=scene, keep=True)
-        assert verdict is not None
-        off = carried(folder / str(seed), 1.0) if verdict.ended == "ended" else np.nan
+        verdict, off = judge_bed(seed, folder / str(seed), programs)
         row = {
             "seed": seed,
-            "words": list(scene.words),
+            "words": list(verdict.words),
             "ended": verdict.ended,
             "problems": list(verdict.problems),
             "carried": off,
