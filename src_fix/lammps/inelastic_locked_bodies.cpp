@@ -1,5 +1,7 @@
 #include "inelastic_locked_bodies.h"
 
+#include "inelastic_lammps_versions.h"
+
 #include "atom.h"
 #include "domain.h"
 
@@ -95,7 +97,7 @@ void LockedBodies::look_at(const Grain &one, const Grain &other)
   static const std::vector<std::array<double, 3>> directions = all_directions();
   double between[3];
   for (int d = 0; d < 3; ++d) between[d] = one.centre[d] - other.centre[d];
-  domain->minimum_image(FLERR, between);
+  NearestImage<Domain>::of(domain, between);
   const double distance = norm(between);
   if (distance > one.reach + other.reach) return;
   away_.clear();
