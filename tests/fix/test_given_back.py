@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from tests.helpers.lammps_run import Run, Runner
-from tests.helpers.scenes import DUMP_PARTICLES, deepest_pair, read_dump, scene
+from tests.helpers.scenes import (
+    DUMP_PARTICLES,
+    deepest_pair,
+    mass,
+    random_points,
+    read_dump,
+    scene,
+)
 
 RADIUS = 0.5
 EPS = 1e-6
@@ -72,3 +79,48 @@ def test_with_room_they_are_given_back(tmp_path: Path, lmp: Runner) -> None:
     assert deepest_pair(frames[2].positions, frames[2]["radius"]) <= EPS
     assert float(np.linalg.norm(frames[2].velocities[0])) <= MOST
     assert "overlaps stayed" not in result.screen
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "cone", "sphere"])
+def test_overlaps_with_curved_walls_stay_within_the_tolerance(
+    shape: str, tmp_path: Path, lmp: Runner
+) -> None:
+    """At every step of a bed that falls, slides and comes to rest, as at flat walls."""
+    radius, eps, wide = 0.1, 2e-5, 0.5
+    regions = {
+        "cylinder": f"cylinder y 0 0 {wide} 0 4",
+        "cone": f"cone y 0 0 0.2 {wide} 0 4",
+        "sphere": f"sphere 0 {wide} 0 {wide}",
+    }
+    inside = ((-0.3, 0.3), (0.25, 0.8 if shape == "sphere" else 3.9), (-0.3, 0.3))
+    points = random_points(20 if shape == "sphere" else 60, inside, 0, seed=2)
+    if shape == "cone":
+        points[:, [0, 2]] *= 0.2
+    deck = scene(
+        points,
+        radius,
+        tmp_path,
+        tolerance=eps,
+        box=((-1.0, 1.0), (-0.5, 4.5), (-1.0, 1.0)),
+        timestep=0.01,
+        skin=0.2,
+        options="region curved",
+        setup="",
+        fixes=f"region curved {regions[shape]}\nfix drag all viscous {float(mass(radius)):.17g}",
+    )
+    # The start is pushed apart first.
+    lmp(deck + "run 60\n" + DUMP_PARTICLES + "run 300\n")
+    for frame in read_dump(tmp_path / "particles.dump"):
+        x, y, z = frame.positions.T
+        across = np.hypot(x, z)
+        if shape == "cylinder":
+            gaps = [wide - across, y]
+        elif shape == "cone":
+            # The distance from its straight side, which leans outwards.
+            lean = np.hypot(wide - 0.2, 4.0)
+            gaps = [((0.2 + (wide - 0.2) / 4 * y) - across) * 4.0 / lean, y]
+        else:
+            gaps = [wide - np.sqrt(across**2 + (y - wide) ** 2)]
+        # Round-off of positions.
+        assert min(gap.min() for gap in gaps) - radius >= -eps * (1 + 1e-6)
+        assert deepest_pair(frame.positions, frame["radius"]) <= eps * (1 + 1e-6)
