@@ -117,6 +117,10 @@ class CurvedBed(SceneDraw):
         self.extent = 2 * self.radius
         self.smallest, self.largest = self.radius / self.ratio, self.radius
         self.skin = 2 * self.radius * float(self.random.uniform(0.5, 1))
+        if not self.shorten:
+            # As far as two go in a step that fall from the top and meet.
+            fall = np.sqrt(2 * self.gravity * height)
+            self.skin = max(self.skin, 2 * self.timestep * float(fall))
         self.arm = max(float(np.linalg.norm(o, axis=1).max()) for o, _ in self.to_place)
         self.ghosts = 2 * self.largest + self.skin + 4.1 * self.arm
         self.flags = ["m", "m", "m"]
@@ -126,6 +130,9 @@ class CurvedBed(SceneDraw):
     def place(self) -> None:
         super().place()
         self.spheres.kind = [FREE] * len(self.spheres.r)
+        # Where steps may be shorter the grains fly about at first; others fall.
+        if not self.shorten:
+            self.spheres.v[:] = self.spheres.w[:] = 0.0
         self.frozen = self.outside = False
         self.frozen_moves = ""
 
