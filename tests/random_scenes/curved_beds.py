@@ -35,6 +35,8 @@ from tests.random_scenes.scene_generator import (
 from tests.random_scenes.scene_loop import Programs, Verdict, installed, judge
 
 STEPS = 500
+# At the start grains fill this part of the container, and are so many at most.
+FILLED, MOST_GRAINS = 0.33, 120
 # In the time in which a sphere falls by its radius, of which a step is a part.
 STEP = (0.05, 0.2)
 # Of the weight, what floor and walls may be off by at the end.
@@ -75,37 +77,39 @@ class CurvedBed(SceneDraw):
         if self.bodies:
             self.width = max(self.width, 2.2 * 2 * self.radius)
         if self.kind == "annulus":
-            self.width = max(self.width, 4 * 2 * self.radius)
+            self.width = max(self.width, (5 if self.bodies else 4) * 2 * self.radius)
         self.note(self.kind)
         outer = self.width / 2
+        of_grain = 4 / 3 * np.pi * self.radius**3 * (1.6 if self.bodies else 1)
+        # Across the axis, on the average over the height.
+        narrow, inner = outer, 0.0
+        if self.kind == "cone":
+            narrow = outer * float(self.random.uniform(0, 1))
+        if self.kind == "annulus":
+            most = outer - 1.1 * 2 * self.radius * (2 if self.bodies else 1)
+            inner = most * float(self.random.uniform(0.2, 1))
+        area = np.pi * ((outer**2 + outer * narrow + narrow**2) / 3 - inner**2)
+        # No higher than the grains need: a fall takes time.
         height = self.width * float(self.random.uniform(2, 5))
+        height = min(height, max(MOST_GRAINS * of_grain / (FILLED * area), 3 * 2 * self.radius))
+        volume = area * height
+        tube = {"axis_name": "y", "centre": self.centre, "ends": [0.0, height]}
+        shape = {"kind": "cylinder", "radius": outer, "inside": True, **tube}
         if self.kind == "ball":
             height = self.width
-        self.low = np.array([-outer, 0.0, -outer])
-        self.high = np.array([outer, height, outer])
-        volume = np.pi * outer**2 * height
-        tube = {"axis_name": "y", "centre": self.centre, "ends": [0.0, height]}
-        if self.kind == "ball":
             volume = np.pi / 6 * self.width**3
             centre = [0.0, outer, 0.0]
             shape = {"kind": "sphere", "centre": centre, "radius": outer, "inside": True}
         elif self.kind == "cone":
-            narrow = outer * float(self.random.uniform(0, 1))
-            volume *= (1 + narrow / outer + (narrow / outer) ** 2) / 3
             shape = {"kind": "cone", "radii": [narrow, outer], "inside": True, **tube}
-        else:
-            shape = {"kind": "cylinder", "radius": outer, "inside": True, **tube}
+        self.low = np.array([-outer, 0.0, -outer])
+        self.high = np.array([outer, height, outer])
         self.single("wall", shape, motion=False)
         if self.kind == "annulus":
-            most = outer - 1.1 * 2 * self.radius * (2 if self.bodies else 1)
-            inner = most * float(self.random.uniform(0.2, 1))
-            volume -= np.pi * inner**2 * height
             core = {"kind": "cylinder", "radius": inner, "inside": False, **tube}
             core["ends"] = [-1.0, height + 1.0]
             self.single("core", core, motion=False)
-        of_grain = 4 / 3 * np.pi * self.radius**3 * (1.6 if self.bodies else 1)
-        most_grains = max(1, int(0.33 * volume / of_grain))
-        self.count = min(most_grains, 120)
+        self.count = min(max(1, int(FILLED * volume / of_grain)), MOST_GRAINS)
         self.to_place = []
         for k in range(self.count):
             small = self.ratio > 1 and k % 2 == 1

@@ -42,6 +42,7 @@ comm_modify cutoff 4
 """
 # Damped soft spheres, until the overlaps no longer change.
 SOFT = """
+thermo_style custom step
 comm_modify vel yes
 pair_style gran/hooke 1000.0 NULL 50.0 NULL 0.0 0
 pair_coeff * *
