@@ -148,6 +148,8 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   step_.relinearisations = 0;
   if (movers_.any_turns()) constraints_.entangle();
   const inelastic::ContactSet with_locked = problem.contacts;
+  // What no longer opens while it gives way may be the rest, which opens at once: so it is tried.
+  if (in_vain_ > 0) gives_way_ = false;
   // Iterations of the first trial. Thousands of spheres that have room for what is asked take far
   // fewer.
   constexpr long MOST = 10000;

@@ -52,6 +52,6 @@ void Unrest::look()
 
 bool Unrest::is_at_rest() const
 {
-  constexpr double SLOW = 0.05, BALANCED = 0.005;
+  constexpr double SLOW = 0.1, BALANCED = 0.01;
   return speed_ <= SLOW && net_force_ <= BALANCED;
 }

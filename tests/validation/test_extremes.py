@@ -621,6 +621,16 @@ def test_no_room(name: str, ranks: int, options: str, tmp_path: Path) -> None:
     result = run(tmp_path, deck + "run 400\n", ranks=ranks, must_pass=False)
     seconds = time.perf_counter() - start
     (error,) = result.errors
+    if name == "too many spheres":
+        # A bad start in which all give way to one another, and that no longer opens.
+        found = re.search(
+            r"overlaps of up to ([\d.e-]+) .*; (atoms \d+ and \d+)\) do not open", error
+        )
+        assert found, error
+        assert "leaves no room" in error
+        assert float(found[1]) > EPS
+        assert seconds < 60
+        return
     found = re.search(r"(atoms? \d+ and (?:wall )?\d+) overlap by ([-+.\de]+) at its end", error)
     assert found, error
     certain = "no velocities keep the surfaces apart" in error

@@ -107,7 +107,7 @@ def test_a_soft_packing_that_is_too_dense_is_refused(
     told = [line for line in result.errors if "no room" in line]
     left = [line for line in result.warnings if " are left after " in line]
     assert told or left, result.screen[-1500:]
-    assert len(result.runs[-1]["f_contact[4]"]) <= SOON + 1
+    assert len(result.runs[-1].get("f_contact[4]", ())) <= SOON + 1
 
 
 @pytest.mark.validation
@@ -136,35 +136,36 @@ fix motion all nve
 @pytest.mark.parametrize("growth", [1.03, 1.1])
 @pytest.mark.parametrize("number", range(10))
 def test_a_bed_whose_spheres_grow_swells(number: int, growth: float, tmp_path: Path) -> None:
-    """A bed at rest in a box with free height; all overlaps open, and none is left or refused."""
-    radius = 0.1
-    particles = 100 + 15 * number
+    """A bed at rest, periodic across, with free height; all overlaps open, and none is refused.
+
+    (Between walls some spheres at the floor may really jam: 160 of 4.5 diameters across do.)
+    """
+    diameter, eps = 0.11, 3e-5
     deck = f"""
 units lj
 atom_style sphere
-boundary f f f
-region box block 0 1 0 5 0 1
+boundary p p f
+region box block 0 1 0 1 0 3
 create_box 1 box
-region inside block 0.1 0.9 0.1 4.9 0.1 0.9
-create_atoms 1 random {particles} {number + 1} inside overlap 0.2 maxtry 1000
-set group all diameter {2 * radius} density 1
-pair_style zero {2 * radius * growth}
+create_atoms 1 random {200 + 20 * number} {number + 1} box overlap {diameter} maxtry 1000
+set group all diameter {diameter} density 1
+pair_style zero 0.14
 pair_coeff * *
-neighbor 0.2 bin
+neighbor 0.1 bin
 timestep 0.01
-fix gravity all gravity 9.81 vector 0 -1 0
-fix drag all viscous 0.004
-fix contact all inelastic {5e-4 * radius} region box shorten yes
+region walls block INF INF INF INF 0 3
+fix gravity all gravity 9.81 vector 0 0 -1
+fix contact all inelastic {eps} region walls shorten yes
 fix motion all nve
 thermo 1
 thermo_style custom step f_contact[4] f_contact[12]
-run 400
-set group all diameter {2 * radius * growth}
-run 100
+run 200
+set group all diameter {diameter * growth}
+run 200
 """
     result = run_lmp(tmp_path, deck, timeout=300)
     overlap = result.thermo["f_contact[4]"]
-    assert overlap[0] > 0.5 * 2 * radius * (growth - 1)
+    assert overlap[0] > 0.5 * diameter * (growth - 1)
     # Round-off of positions.
-    assert overlap[-1] <= 5e-4 * radius * (1 + 1e-6)
+    assert overlap[-1] <= eps * (1 + 1e-6)
     assert not any(" are left after " in line for line in result.warnings)

@@ -92,7 +92,7 @@ class Packing:
 
     @property
     def at_rest(self) -> bool:
-        """Whether it is at rest: rms speed at most 0.05 g h, and the walls carry the weight."""
+        """Whether it is at rest: rms speed at most 0.1 g h, and the walls carry the weight."""
         return self.unrest.at_rest
 
     @property

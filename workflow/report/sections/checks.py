@@ -134,8 +134,8 @@ def checks(data: Data) -> Content:
     if not all(math.isnan(row.at_rest) for row in rows):
         columns.append(AT_REST)
         notes.append(
-            "At rest: the share of the runs that end with an rms speed of at most 0.05 g h and "
-            "forces that miss the weight by at most 0.005 of it."
+            "At rest: the share of the runs that end with an rms speed of at most 0.1 g h and "
+            "forces that miss the weight by at most 0.01 of it."
         )
     caption = "Largest overlap at any step of any run, and how well contacts are resolved"
     return Content([table(caption, columns, rows, notes)])
