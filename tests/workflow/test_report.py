@@ -1409,3 +1409,20 @@ def test_checks_show_how_much_of_the_box_is_in_the_bed() -> None:
                 ("100", False),
                 ("48", True),
             ]
+
+
+def test_checks_show_what_is_not_at_rest() -> None:
+    """Results of before this was measured leave the table as it was."""
+    for told, head in (([math.nan], False), ([1.0, 0.0], True)):
+        results = [
+            measured(particles=1000 + n, **({} if math.isnan(one) else {"numbers__at_rest": one}))
+            for n, one in enumerate(told)
+        ]
+        content = checks(Data({"own": StoredStudy("own", "Own", "", results)}, paper_numbers()))
+        (shown,) = (block for block in content.blocks if isinstance(block, Table))
+        assert any("at rest" in column for column in shown.head) == head
+        if head:
+            assert [(row[-1].text, row[-1].marked) for row in shown.rows] == [
+                ("100", False),
+                ("NOT AT REST: 0", True),
+            ]

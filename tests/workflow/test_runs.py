@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import threading
@@ -69,6 +70,22 @@ def test_what_cannot_be_measured_is_said(options: list[str], tmp_path: Path) -> 
     ]
     names = numbers_of(tmp_path / "out" / "few.h5").keys()
     assert not any("q6" in name or "structure/" in name for name in names)
+
+
+@pytest.mark.slow
+def test_what_still_moves_is_said(tmp_path: Path) -> None:
+    """A bed that is stopped while it falls: by `run`, and among its numbers."""
+    path = one_case(tmp_path)
+    hasty = "steps_settling = 0\nsteps_resting = 0\nsteps_tightening = 0\nsteps_agitated = 30\n"
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("steps_")]
+    at = lines.index("[parameters]") + 1
+    path.write_text("\n".join([*lines[:at], hasty, *lines[at:], ""]))
+    done = inelastic("run", path, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"NOT AT REST: rms speed [\d.e+-]+ g h, net force", done.stdout)
+    found = numbers_of(tmp_path / "out" / "few.h5")
+    (at_rest,) = (value for name, value in found.items() if name.endswith("numbers/at_rest"))
+    assert at_rest == 0
 
 
 def of_case(numbers: dict[str, Any], case: Case) -> dict[str, Any]:
