@@ -149,7 +149,8 @@ def test_nothing_overlaps_in_any_container(shape: Any, container: Any, particles
 def test_a_packing_that_moves_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """It says so, and holds the packing; where it may move it comes back, and says so."""
     usual = one_call._complete
-    hasty = {"steps_settling": 0, "steps_resting": 0, "steps_tightening": 0, "steps_agitated": 30}
+    phases = ("settling", "resting", "tightening")
+    hasty = {f"steps_{phase}": 0 for phase in phases} | {"steps_agitated": 30, "waiting": 0}
 
     def stopped(*arguments: Any) -> tuple[dict[str, Any], int]:
         values, steps = usual(*arguments)
