@@ -1394,35 +1394,27 @@ def test_a_box_that_reaches_out_of_the_bed_is_marked_and_not_drawn() -> None:
     assert "box = [0.25, 0.75, 0.25, 0.5, 0.25, 0.75]" in said
 
 
-def test_checks_show_how_much_of_the_box_is_in_the_bed() -> None:
+@pytest.mark.parametrize(
+    ("number", "heading", "values", "cells"),
+    [
+        ("box_in_bed", "box in the bed [%]", [1.0, 0.48], [("100", False), ("48", True)]),
+        ("at_rest", "at rest [% of the runs]", [1, 0], [("100", False), ("NOT AT REST: 0", True)]),
+    ],
+)
+def test_checks_show_beds_that_are_too_low_or_move(
+    number: str, heading: str, values: list[float], cells: list[tuple[str, bool]]
+) -> None:
     """Results of before this was measured leave the table as it was."""
-    for shares, head in (([math.nan], False), ([1.0, 0.48], True)):
-        results = [
-            measured(particles=1000 + n, **({} if math.isnan(s) else {"numbers__box_in_bed": s}))
-            for n, s in enumerate(shares)
-        ]
-        content = checks(Data({"own": StoredStudy("own", "Own", "", results)}, paper_numbers()))
-        (shown,) = (block for block in content.blocks if isinstance(block, Table))
-        assert ("box in the bed [%]" in shown.head) == head
-        if head:
-            assert [(row[-1].text, row[-1].marked) for row in shown.rows] == [
-                ("100", False),
-                ("48", True),
-            ]
 
-
-def test_checks_show_what_is_not_at_rest() -> None:
-    """Results of before this was measured leave the table as it was."""
-    for told, head in (([math.nan], False), ([1.0, 0.0], True)):
-        results = [
-            measured(particles=1000 + n, **({} if math.isnan(one) else {"numbers__at_rest": one}))
-            for n, one in enumerate(told)
-        ]
+    def shown(results: list[Result]) -> Table:
         content = checks(Data({"own": StoredStudy("own", "Own", "", results)}, paper_numbers()))
-        (shown,) = (block for block in content.blocks if isinstance(block, Table))
-        assert any("at rest" in column for column in shown.head) == head
-        if head:
-            assert [(row[-1].text, row[-1].marked) for row in shown.rows] == [
-                ("100", False),
-                ("NOT AT REST: 0", True),
-            ]
+        (found,) = (block for block in content.blocks if isinstance(block, Table))
+        return found
+
+    assert heading not in shown([measured(particles=1000)]).head
+    told = [
+        measured(particles=1000 + n, **{f"numbers__{number}": value})
+        for n, value in enumerate(values)
+    ]
+    assert heading in shown(told).head
+    assert [(row[-1].text, row[-1].marked) for row in shown(told).rows] == cells
