@@ -78,15 +78,11 @@ void EnergyWatch::add_up(const std::vector<double> &target)
     const double before = along(c, step_.problem.predicted_velocity);
     const double added = 0.5 * impulse * (after + before);
     const Contact &contact = step_.contact_of(c);
-    const Row &row = step_.rows[c];
-    const double turns = row.as_at_start
-        ? 0.0
-        : contact.gap_now - rules_.wanted_gap(contact) - row.wall_motion - contacts.gap[c];
     double *const s = &sums_[SUMS * k];
     s[ADDED] += added;
     s[SIZE] += 0.5 * std::abs(impulse) * (std::abs(after) + std::abs(before));
     s[TARGETS] += std::abs(impulse) * target[c] / h;
-    s[TURNS] += std::abs(impulse) * std::max(0.0, turns) / h;
+    s[TURNS] += std::abs(impulse) * rules_.closed_by_turning(c) / h;
     if (contact.asked.parts || contact.asked.set.may_pull()) s[BY_LAW] += std::max(0.0, added);
     if (impulse > 0.0 && contact.gap_now < 0.0 && after > 0.0) does_[DOES * k + GIVES_BACK] = 1.0;
     if (contact.asked.parts) does_[DOES * k + PARTS] = 1.0;

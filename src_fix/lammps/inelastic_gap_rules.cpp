@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 using namespace LAMMPS_NS;
@@ -15,6 +16,8 @@ constexpr double RELINEARISE_BEYOND = 1.0;
 constexpr double CLOSED = 0.5;
 // Beyond that a contact closes in a step by at most this part of what it has to stop.
 constexpr double CLOSING = 0.01;
+// In tolerances: what a pair of free spheres that would end too deep is first asked to leave.
+constexpr double LEFT = 0.75;
 
 }    // namespace
 
@@ -158,14 +161,36 @@ bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
   const double allowed = bad ? contact.gap_now : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
   const double wanted = bad ? wanted_gap(contact) : 0.0;
-  return wanted - gap_at_end >
-      (step_.keeps_overlaps ? REGULAR_OVERLAP : RELINEARISE_BEYOND) * tolerance;
+  const double deepest_kept = deepest(contact, RELINEARISE_BEYOND * tolerance);
+  return wanted - gap_at_end > std::min(deepest_kept, REGULAR_OVERLAP * tolerance);
+}
+
+double GapRules::closed_by_turning(std::size_t c) const
+{
+  const Row &row = step_.rows[c];
+  const Contact &contact = step_.contact_of(c);
+  const double gap = step_.problem.contacts.gap[c];
+  const double linear_gap = contact.gap_now - row.wall_motion;
+  // The gaps of free spheres that keep_within_tolerance() changes ask for overlaps alone.
+  if (row.as_at_start || gap == linear_gap || gap == linear_gap + LEFT * step_.settings.tolerance)
+    return 0.0;
+  return std::max(0.0, linear_gap - wanted_gap(contact) - gap);
+}
+
+// Returns how deep an overlap may be at the end of the step [length] if an ordinary step allows
+// `allowed`. Beside bad ones regular ones are kept: in a dense start spheres jam for a moment, and
+// cannot all be taken apart at once. Where a step waits, what is deeper than allowed may stay, but
+// nothing becomes so.
+double GapRules::deepest(const Contact &contact, double allowed) const
+{
+  if (!step_.keeps_overlaps) return allowed;
+  if (step_.bad_start) return std::numeric_limits<double>::infinity();
+  return std::max(allowed, -contact.gap_now);
 }
 
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
-  constexpr double LEFT = 0.75;    // tolerances
   const double tolerance = step_.settings.tolerance;
   // Once a constraint has to change, later ones that are near the tolerance change with it: in a
   // chain each would otherwise need a round of its own.
@@ -184,8 +209,8 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     // A held contact is closed no faster than its gap asks for.
     const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
     const bool may_be_open = holds || contacts.impulse[c] == 0.0 || contact.asked.parts;
-    if ((at_end >= -allowed || step_.keeps_overlaps) && (at_end <= allowed || may_be_open))
-      continue;
+    const bool stays = at_end >= -deepest(contact, allowed);
+    if (stays && (at_end <= allowed || may_be_open)) continue;
     // Surfaces that part are asked for no less than that.
     if (contact.asked.parts && contacts.gap[c] <= linear_gap) continue;
     allowed = LEFT * tolerance;

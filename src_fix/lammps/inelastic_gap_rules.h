@@ -68,6 +68,10 @@ class GapRules {
   // a dense start spheres jam for a moment, and cannot all be taken apart at once.
   long keep_within_tolerance(const std::vector<double> &velocity);
 
+  // What constraint c asks for beyond its gap at the start of the step [length], because bodies turn
+  // or walls curve.
+  double closed_by_turning(std::size_t c) const;
+
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
@@ -80,6 +84,7 @@ class GapRules {
   double limited(const Contact &contact, double wanted) const;
   double held_gap(const Contact &contact) const;
   double most_closed(const Contact &contact) const;
+  double deepest(const Contact &contact, double allowed) const;
   // [length] of constraint c with these velocities, along a straight line.
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 

@@ -484,14 +484,13 @@ class _Part:
         if last.deepest > REGULAR * self.eps:
             # Beside a bad start regular overlaps are kept, to within the residual.
             bound = np.maximum(bound, (REGULAR + 1) * self.eps)
-        if self.facts["warn"]:
-            short = max(0.0, last.thermo["f_contact[2]"] - self.eps)
-            # What is lacking comes on top of an overlap that an unsolved step keeps.
-            short += min(last.deepest, self.eps) if short > 0.0 else 0.0
-            # Beside a bad start regular overlaps are kept until the push, for which an unsolved
-            # step has no iterations left: what is lacking comes on top.
-            keeps = short > 0.0 and last.deepest > REGULAR * self.eps
-            bound = bound + short + (REGULAR * self.eps if keeps else 0.0)
+        lacks, keeps_open = last.thermo["f_contact[2]"], last.thermo["f_contact[3]"]
+        if self.facts["warn"] and max(lacks, keeps_open) > self.eps:
+            # What an unsolved step lacks comes on top of an overlap that it keeps, and beside a
+            # bad start of regular overlaps, which are kept until the push, for which it has no
+            # iterations left.
+            kept = self.eps if last.deepest <= REGULAR * self.eps else (REGULAR + 1) * self.eps
+            bound = bound + max(0.0, lacks - self.eps) + min(last.deepest, kept)
         beyond = np.flatnonzero(depth > bound)
         if not len(beyond):
             return
@@ -804,7 +803,7 @@ class _Part:
         velocity = self.velocities(new)
         self.complementary(new, listed, velocity, quiet)
         if quiet:
-            self.energy(new, listed, after, velocity, kick, sizes)
+            self.energy(new, listed, after, velocity, kick, sizes, last)
 
     def added(
         self, new: _Frame, listed: dict[str, Array], after: Array, sizes: Array, kick: float
@@ -1238,6 +1237,7 @@ class _Part:
         velocity: Array,
         kick: float,
         sizes: Array,
+        last: _Frame | None,
     ) -> None:
         """(c) A cluster of mass M: T(V+) <= T(V*) + 1/2 M (10 b)^2 + sum lambda t / h + ...
 
@@ -1291,13 +1291,17 @@ class _Part:
         speed = min(u[deep].max(initial=0.0), REGULAR * self.eps / self.longest)
         change = new.h * np.linalg.norm(velocity - before, axis=1)
         lightest = np.where(movable, 1 / new.mass, 0.0)
-        load = np.abs(impulse) * new.h * (lightest[i] + np.where(pair, lightest[j], 0.0))
+        per_force = kick * self.to_v * new.h * (lightest[i] + np.where(pair, lightest[j], 0.0))
+        load = np.abs(listed["force"]) * per_force
         large = np.maximum(change[i], change[other]) + new.h * np.abs(u_before) + load / 50000
         target = np.minimum(self.eps, ACCURACY * large) + 100 * ROUND_OFF * (
             self.lengths(new) + new.h * np.abs(u)
         )
         allowed = np.where(impulse > 0, np.abs(impulse) * target / new.h, 0.0)
-        pulls = np.abs(impulse) * (np.maximum(0, listed["gap"]) + self.eps) / new.h
+        # A pull closes by up to the accuracy, 1e-3, of what it stops, or of a tenth of what it did.
+        stops = np.maximum(large, 0.1 * per_force * self.force_before(listed, last))
+        closes = np.maximum(0, listed["gap"]) + np.maximum(self.eps, 16 * ACCURACY * stops)
+        pulls = np.abs(impulse) * closes / new.h
         allowed += np.where(impulse < 0, pulls, 0.0)
         allowed += np.maximum(0, impulse * motion) / new.h
         if "law restitution" in self.facts["words"]:
@@ -1321,6 +1325,19 @@ class _Part:
             listed["gap"] + new.h * u,
             curved[i] + np.where(pair, curved[j], 0.0),
         )
+
+    @staticmethod
+    def force_before(listed: dict[str, Array], last: _Frame | None) -> Array:
+        """The sizes of the forces of these contacts in the step before; inf where not known."""
+        if last is None or last.listed_all is None:
+            return np.full(len(listed["i"]), np.inf)
+        was = last.listed_all
+        keys = zip(was["i"], np.where(was["pair"], was["j"], -1), was["wall"], strict=True)
+        known = dict(zip(keys, np.abs(was["force"]), strict=True))
+        keys = zip(
+            listed["i"], np.where(listed["pair"], listed["j"], -1), listed["wall"], strict=True
+        )
+        return np.array([known.get(key, 0.0) for key in keys])
 
     def energy_gained(self, new: _Frame, last: _Frame) -> None:
         """(c) What the step before gained; its end tells by how much turning has closed gaps.
