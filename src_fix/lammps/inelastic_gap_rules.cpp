@@ -158,9 +158,13 @@ bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
 {
   const double tolerance = step_.settings.tolerance;
   const bool bad = overlaps_.is_bad(contact.gap_now);
-  const double allowed = bad ? contact.gap_now : 0.0;
-  step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
-  const double wanted = bad ? wanted_gap(contact) : 0.0;
+  // Where bad overlaps give way to one another one may become as deep as the deepest.
+  const bool gives_way = bad && step_.gives_way;
+  const double allowed = gives_way ? -step_.largest_overlap : bad ? contact.gap_now : 0.0;
+  // Regular overlaps beside a bad one are kept to within the residual, in steps of any length.
+  const double regular = (REGULAR_OVERLAP + (step_.bad_start ? 1.0 : 0.0)) * tolerance;
+  step_.excess = std::max(step_.excess, allowed - gap_at_end - regular);
+  const double wanted = gives_way ? allowed : bad ? wanted_gap(contact) : 0.0;
   const double deepest_kept = deepest(contact, RELINEARISE_BEYOND * tolerance);
   return wanted - gap_at_end > std::min(deepest_kept, REGULAR_OVERLAP * tolerance);
 }

@@ -155,6 +155,7 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   constexpr long MOST = 10000;
   for (bool ends = false; !ends;) {
     begin_trial(with_locked);
+    step_.gives_way = gives_way_;
     ask_for_all(gives_way_);
     const long left = std::max(0L, step_.settings.max_iterations - result.iterations);
     const inelastic::ProjectionResult pushed =
@@ -170,6 +171,7 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   if (!look_at_opening(solved) && gives_way_)
     result.status = inelastic::worse(result.status, inelastic::Status::INFEASIBLE);
 
+  step_.gives_way = false;
   problem.contacts = contacts;
   step_.rows.resize(contacts.size());
   step_.contacts.resize(number_of_contacts);

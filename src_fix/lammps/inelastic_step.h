@@ -80,6 +80,8 @@ struct StepState {
   bool keeps_overlaps = false;
   // Nor are they in a step in which the network has no room for it. (fix_inelastic)
   bool waits = false;
+  // Bad overlaps may become as deep as the deepest while they are pushed apart. (push_apart)
+  bool gives_way = false;
   double largest_overlap = 0.0;    // [length] at the start (overlap_watch)
   // [length] the overlap at the end beyond the regular ones (constraints; gap_rules,
   // wall_constraints)

@@ -512,6 +512,8 @@ class _Part:
             )
         most = np.maximum(earlier, last.deepest + PUSHED * sizes)
         deeper = depth[beyond] - np.where(earlier > REGULAR * self.eps, most, 0.0) > bound[beyond]
+        # What a step has left too deep stays as long as there is no room to give it back.
+        deeper &= depth[beyond] > earlier + ROUND_OFF * self.lengths(frame)
         for k in np.flatnonzero(deeper):
             if shape is None:
                 deeper[k] = not self.are_entangled(last, i[beyond[k]], j[beyond[k]])
@@ -1291,18 +1293,20 @@ class _Part:
         speed = min(u[deep].max(initial=0.0), REGULAR * self.eps / self.longest)
         change = new.h * np.linalg.norm(velocity - before, axis=1)
         lightest = np.where(movable, 1 / new.mass, 0.0)
-        per_force = kick * self.to_v * new.h * (lightest[i] + np.where(pair, lightest[j], 0.0))
-        load = np.abs(listed["force"]) * per_force
+        load = np.abs(impulse) * new.h * (lightest[i] + np.where(pair, lightest[j], 0.0))
         large = np.maximum(change[i], change[other]) + new.h * np.abs(u_before) + load / 50000
+        # What the first guess, the forces of the step before, would do.
+        guessed = self.forces_before(new, last) * kick * self.to_v * new.h / new.mass
+        guessed[~movable] = 0.0
+        large += guessed[i] + np.where(pair, guessed[j], 0.0)
         target = np.minimum(self.eps, ACCURACY * large) + 100 * ROUND_OFF * (
             self.lengths(new) + new.h * np.abs(u)
         )
         allowed = np.where(impulse > 0, np.abs(impulse) * target / new.h, 0.0)
         # A pull closes by up to the accuracy, 1e-3, of what it stops, or of a tenth of what it did.
-        stops = np.maximum(large, 0.1 * per_force * self.force_before(listed, last))
-        closes = np.maximum(0, listed["gap"]) + np.maximum(self.eps, 16 * ACCURACY * stops)
-        pulls = np.abs(impulse) * closes / new.h
-        allowed += np.where(impulse < 0, pulls, 0.0)
+        closes = np.maximum(0, listed["gap"]) + np.maximum(self.eps, 16 * ACCURACY * large)
+        pulls = impulse < 0
+        allowed[pulls] += np.abs(impulse[pulls]) * closes[pulls] / new.h
         allowed += np.maximum(0, impulse * motion) / new.h
         if "law restitution" in self.facts["words"]:
             turned = np.where(u_before > 0, u_before - np.maximum(0, listed["gap"]) / new.h, 0.0)
@@ -1327,17 +1331,14 @@ class _Part:
         )
 
     @staticmethod
-    def force_before(listed: dict[str, Array], last: _Frame | None) -> Array:
-        """The sizes of the forces of these contacts in the step before; inf where not known."""
+    def forces_before(new: _Frame, last: _Frame | None) -> Array:
+        """The sum of what contacts did to each sphere in the step before; inf where not known."""
         if last is None or last.listed_all is None:
-            return np.full(len(listed["i"]), np.inf)
-        was = last.listed_all
-        keys = zip(was["i"], np.where(was["pair"], was["j"], -1), was["wall"], strict=True)
-        known = dict(zip(keys, np.abs(was["force"]), strict=True))
-        keys = zip(
-            listed["i"], np.where(listed["pair"], listed["j"], -1), listed["wall"], strict=True
-        )
-        return np.array([known.get(key, 0.0) for key in keys])
+            return np.full(len(new.mass), np.inf)
+        was, sums = last.listed_all, np.zeros(len(new.mass))
+        np.add.at(sums, was["i"], np.abs(was["force"]))
+        np.add.at(sums, was["j"][was["pair"]], np.abs(was["force"][was["pair"]]))
+        return sums
 
     def energy_gained(self, new: _Frame, last: _Frame) -> None:
         """(c) What the step before gained; its end tells by how much turning has closed gaps.
@@ -1358,7 +1359,8 @@ class _Part:
             distances = [float(view.distance[0]) for view in seen if view is not None]
             if distances:
                 closed[row] = of.end[row] - min(distances) + new.radius[k]
-        turning = np.maximum(0, of.impulse) * np.maximum(of.curved, closed) / last.h
+        closed = np.where(acts, np.maximum(of.curved, closed), of.curved)
+        turning = np.abs(of.impulse) * closed / last.h
         cluster = of.clusters.of_sphere[of.sphere]
         for spheres, _ in of.clusters:
             mine = cluster == of.clusters.of_sphere[spheres[0]]
