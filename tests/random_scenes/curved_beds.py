@@ -4,7 +4,8 @@ python -m tests.random_scenes.curved_beds --beds 2000 --out beds.jsonl     goes 
 python -m tests.random_scenes.curved_beds --seed 17 --beds 1 --keep        one again
 
 Tubes, annuli, cones and balls of 1.5 to 8 diameters; spheres of one and two sizes, and dimers; EPS
-from 1e-3 to 1e-6 of a radius; with and without `shorten`.
+from 1e-3 to 1e-6 of a radius; with and without `shorten`. Some steps are compared with the exact
+projection, which gives no overlap back.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ import json
 import sys
 import tempfile
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from tests.helpers.bodies import dimer
+from tests.random_scenes.exact_steps import against_exact
 from tests.random_scenes.scene_checker import read_tables
 from tests.random_scenes.scene_generator import (
     CONTACTS,
@@ -35,6 +37,8 @@ from tests.random_scenes.scene_generator import (
 from tests.random_scenes.scene_loop import Programs, Verdict, installed, judge
 
 STEPS = 500
+RECORD_EVERY = 25
+GRAVITY = 1.0
 # At the start grains fill this part of the container, and are so many at most.
 FILLED, MOST_GRAINS = 0.33, 120
 # In the time in which a sphere falls by its radius, of which a step is a part.
@@ -52,7 +56,7 @@ class CurvedBed(SceneDraw):
 
     def scene(self) -> Scene:
         self.units = "lj"
-        self.radius, self.gravity, self.density = 0.5, 1.0, 1.0
+        self.radius, self.gravity, self.density = 0.5, GRAVITY, 1.0
         self.shorten = self.chance(0.5)
         self.timestep = np.sqrt(self.radius / self.gravity) * float(self.random.uniform(*STEP))
         self.solver, self.bad, self.periodic = "sweeps", False, [False] * 3
@@ -168,6 +172,7 @@ class CurvedBed(SceneDraw):
             options += " shorten yes"
             self.note("shorten")
         lines.append("fix before all store/force")
+        options += f" record problem.*.npz every {RECORD_EVERY}"
         lines.append(f"fix contact all inelastic ${{eps}} region {words}{options}")
         lines += computes(self.has_bodies, self.walls)
         self.settings = "\n".join(lines) + "\n"
@@ -184,24 +189,42 @@ def curved_bed(seed: int) -> Scene:
     raise NoPlaceError
 
 
-def carried(folder: Path, gravity: float) -> float:
+def carried(folder: Path) -> float:
     """By what part of the weight the forces of walls are off in the last step."""
     particles = read_tables(folder / "particles.01.dump")[-1]
     contacts = read_tables(folder / "contacts.01.dump", CONTACTS)[-1]
-    weight = gravity * particles["mass"].sum()
+    weight = GRAVITY * particles["mass"].sum()
     walls = contacts["id2"] < 0
     lifted = (contacts["force"] * contacts["ny"])[walls].sum()
     return float(abs(lifted / weight - 1))
 
 
-def judge_bed(seed: int, folder: Path, programs: Programs) -> tuple[Verdict, float]:
-    """Run a bed and check each of its steps; return also by what its walls miss the weight.
+@dataclass(frozen=True)
+class Judged:
+    """A bed: what its steps showed, and what is left of it.
 
-    That is NaN where the run has ended in an error.
+    Attributes
+    ----------
+    carried : by what part of its weight the walls miss it; NaN after an error
+    compared : how many steps were compared with exact projections
+    off : the largest velocity error of a grain there, over what it may be
     """
-    verdict = judge(seed, folder, programs, scene=curved_bed(seed), keep=True)
+
+    verdict: Verdict
+    carried: float
+    compared: int
+    off: float
+
+
+def judge_bed(seed: int, folder: Path, programs: Programs) -> Judged:
+    """Run a bed and check each of its steps."""
+    scene = curved_bed(seed)
+    verdict = judge(seed, folder, programs, scene=scene, keep=True)
     assert verdict is not None
-    return verdict, carried(folder, 1.0) if verdict.ended == "ended" else np.nan
+    exact = against_exact(folder, scene.facts["shapes"], GRAVITY, scene.facts["timestep"])
+    verdict = replace(verdict, problems=[*verdict.problems, *exact.problems])
+    missed = carried(folder) if verdict.ended == "ended" else np.nan
+    return Judged(verdict, missed, exact.compared, exact.worst)
 
 
 def main() -> int:
@@ -221,20 +244,27 @@ def main() -> int:
     for seed in range(given.seed, given.seed + given.beds):
         if seed in done:
             continue
-        verdict, off = judge_bed(seed, folder / str(seed), programs)
+        bed = judge_bed(seed, folder / str(seed), programs)
+        verdict = bed.verdict
         row = {
             "seed": seed,
             "words": list(verdict.words),
             "ended": verdict.ended,
             "problems": list(verdict.problems),
-            "carried": off,
+            "carried": bed.carried,
+            "compared": bed.compared,
+            "off": bed.off,
             "seconds": verdict.seconds,
         }
         done[seed] = row
         if given.out is not None:
             with given.out.open("a") as file:
                 file.write(json.dumps(row) + "\n")
-        print(f"{verdict.line()}; walls carry the weight to {off:.3g}", flush=True)
+        print(
+            f"{verdict.line()}; walls carry the weight to {bed.carried:.3g}; in {bed.compared} "
+            f"steps a grain is off by up to {bed.off:.3g} of what it may",
+            flush=True,
+        )
         if not (given.keep or verdict.problems):
             for path in (folder / str(seed)).iterdir():
                 path.unlink()

@@ -263,6 +263,16 @@ class _Gained:
     curved: Array
 
 
+@dataclass(frozen=True)
+class _Seen:
+    """A wall of a shape, seen from one position."""
+
+    shape: Shape
+    distance: float
+    normal: Array
+    curved: bool
+
+
 @dataclass(eq=False)
 class _Frame:
     """One step: what was read, and what follows from it."""
@@ -293,6 +303,7 @@ class _Frame:
     # What the step adds to energies, and the list of its contacts.
     gained: _Gained | None = None
     listed_all: dict[str, Any] | None = None
+    members: list[tuple[int, Array, Array]] | None = None
     # The list, the linearised gaps at the end of the step, and where these are exact.
     listed: dict[str, Any] | None = None
     ends: Array = field(default_factory=lambda: np.zeros(0))
@@ -646,27 +657,36 @@ class _Part:
                 return view
         return None
 
+    def seen_from(self, x: Array, walls: Array, time: float) -> list[list[_Seen]]:
+        """What the shapes show of wall number `walls` from each position, as seen_by()."""
+        found: list[list[_Seen]] = [[] for _ in walls]
+        for shape in self.shapes if len(walls) else []:
+            open_rows = np.ones(len(walls), dtype=bool)
+            for view in views(shape, x, time):
+                for row in np.flatnonzero(open_rows & (walls == view.number)).tolist():
+                    distance = float(view.distance[row])
+                    found[row].append(_Seen(shape, distance, view.normal[row], view.curved))
+                    open_rows[row] = False
+        return found
+
     def wall_contacts(self, frame: _Frame, listed: dict[str, Array]) -> None:
         """Normals and gaps of walls, where these are not tangent planes added for the end."""
         slack = 10 * ROUND_OFF * self.lengths(frame)
-        for row in np.flatnonzero(~listed["pair"]):
+        rows = np.flatnonzero(~listed["pair"])
+        seen = self.seen_from(frame.x[listed["i"][rows]], listed["wall"][rows], frame.time)
+        for row, found in zip(rows.tolist(), seen, strict=True):
             k, number = listed["i"][row], listed["wall"][row]
-            found = [
-                (shape, view)
-                for shape in self.shapes
-                if (view := self.seen_by(shape, number, frame.x[k : k + 1], frame.time))
-            ]
             if len(found) != 1:
                 self.wrong("wall", f"there are {len(found)} walls {number}")
                 continue
-            shape, view = found[0]
-            same = np.linalg.norm(view.normal[0] - listed["n"][row]) < 1e-9
+            shape, view = found[0].shape, found[0]
+            same = np.linalg.norm(view.normal - listed["n"][row]) < 1e-9
             planar = shape["inside"] and not view.curved and not turns(shape)
             body = frame.molecule[k] > 0
             if planar and not same:
                 self.wrong("normal of a wall", f"wall {number}, sphere {int(frame.id[k])}")
             if same and not turns(shape) and (planar or not (body or moves(shape))):
-                gap = view.distance[0] - frame.radius[k]
+                gap = view.distance - frame.radius[k]
                 self.close("gap at a wall", listed["gap"][row], gap, slack + 1e-9 * abs(gap))
 
     # --- forces
@@ -925,8 +945,14 @@ class _Part:
         inverse = np.where(values > 1e-10 * values.max(), 1 / np.maximum(values, 1e-300), 0.0)
         return np.asarray(axes @ (inverse * (axes.T @ momentum)))
 
-    def members(self, frame: _Frame) -> Iterator[tuple[int, Array, Array]]:
+    def members(self, frame: _Frame) -> list[tuple[int, Array, Array]]:
         """Each row of the bodies' dump, its spheres, and their arms from the centre of mass."""
+        if frame.members is None:
+            frame.members = list(self.find_members(frame))
+        return frame.members
+
+    def find_members(self, frame: _Frame) -> Iterator[tuple[int, Array, Array]]:
+        """Find what members() keeps."""
         assert frame.bodies is not None
         for row, molecule in enumerate(frame.bodies["mol"]):
             mine = np.flatnonzero(frame.molecule == molecule)
@@ -941,6 +967,7 @@ class _Part:
         assert new.bodies is not None
         order = np.argsort(new.bodies["mol"])
         new.bodies = Table(new.step, new.bodies.box, new.bodies.columns, new.bodies.rows[order])
+        new.members = None
         count = len(order)
         force, moment, sizes = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 2))
         for row, mine, arm in self.members(new):
@@ -1267,8 +1294,14 @@ class _Part:
             for row, mine, arm in self.members(new):
                 v, momentum = new.body_v[row], new.body_l[row]
                 mass = new.bodies["mass"][row]
-                v_before = v - added[mine].sum(axis=0) / mass
-                l_before = momentum - np.cross(arm, added[mine]).sum(axis=0)
+                impulses = added[mine]
+                contacts = kick * self.to_v * listed["total"][mine]
+                besides = np.linalg.norm((impulses - contacts).sum(axis=0))
+                if besides <= ROUND_OFF * np.linalg.norm(impulses, axis=1).sum():
+                    # Where it is not stopped the rest is a moment that LAMMPS's integrator needs.
+                    impulses = contacts
+                v_before = v - impulses.sum(axis=0) / mass
+                l_before = momentum - np.cross(arm, impulses).sum(axis=0)
                 spin = self.spin(new, mine, arm, momentum)
                 spin_before = self.spin(new, mine, arm, l_before)
                 before[mine] = v_before + np.cross(spin_before, arm)
@@ -1353,12 +1386,12 @@ class _Part:
         i, j, pair = listed["i"], listed["j"], listed["pair"]
         end = np.linalg.norm(self.apart(new, i, j), axis=1) - new.radius[i] - new.radius[j]
         closed[pair] = of.end[pair] - end[pair]
-        for row in np.flatnonzero(acts & ~pair).tolist():
-            wall, k = int(listed["wall"][row]), i[row]
-            seen = [self.seen_by(s, wall, new.x[k : k + 1], new.time) for s in self.shapes]
-            distances = [float(view.distance[0]) for view in seen if view is not None]
-            if distances:
-                closed[row] = of.end[row] - min(distances) + new.radius[k]
+        rows = np.flatnonzero(acts & ~pair)
+        seen = self.seen_from(new.x[i[rows]], listed["wall"][rows], new.time)
+        for row, found in zip(rows.tolist(), seen, strict=True):
+            if found:
+                nearest = min(view.distance for view in found)
+                closed[row] = of.end[row] - nearest + new.radius[i[row]]
         closed = np.where(acts, np.maximum(of.curved, closed), of.curved)
         turning = np.abs(of.impulse) * closed / last.h
         cluster = of.clusters.of_sphere[of.sphere]

@@ -1042,6 +1042,7 @@ class SceneDraw:
             "pressure_of_energy": to_pressure,
             "periodic": self.periodic,
             "shapes": self.shapes,
+            "timestep": self.timestep,
             "walls": self.walls,
             "inertia": self.inertia,
             "solver": self.solver,
