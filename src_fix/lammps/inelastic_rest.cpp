@@ -196,6 +196,7 @@ long Rest::hold(const HoldStill::Constraints &constraints, double least_length)
 void Rest::decide()
 {
   fates_.assign(motions_.size(), Fate::MOVES);
+  held_in_trial_.assign(motions_.size(), Directions{});
   held_.assign(step_.problem.particles, 0);
   unit_.assign(step_.problem.particles, 0.0);
   for (std::size_t k = 0; k < fates_.size(); ++k) {
@@ -304,9 +305,10 @@ bool Rest::judge_trial(bool solved, const std::vector<ClusterMotion> &of_coarser
     fates_[k] = Fate::FAILS;
     if (!solved || !is_quiet(cluster) || moves(cluster)) continue;
     // What was at rest before the last step did not slip then.
-    if (was_at_rest(cluster) || !slips(cluster, of_coarser[k]))
+    if (was_at_rest(cluster) || !slips(cluster, of_coarser[k])) {
       fates_[k] = Fate::PASSES;
-    else
+      held_in_trial_[k] = cluster.held;
+    } else
       undecided = 1.0;
   }
   mark_held(Fate::PASSES);
@@ -411,7 +413,9 @@ std::vector<double> Rest::common_velocities(const std::vector<double> &velocity,
     const double *const s = &sums[SUMS * k];
     const std::array<double, 3> mean = {s[MOMENTUM] / s[MASS], s[MOMENTUM + 1] / s[MASS],
                                         s[MOMENTUM + 2] / s[MASS]};
-    const std::array<double, 3> of_cluster = motions_[k].held.without(mean);
+    // Contacts of the step may have no force any more in the trial, and then hold nothing.
+    const Directions &held = fates_[k] == Fate::PASSES ? held_in_trial_[k] : motions_[k].held;
+    const std::array<double, 3> of_cluster = held.without(mean);
     std::copy_n(of_cluster.begin(), 3, &common[3 * i]);
   }
   return common;

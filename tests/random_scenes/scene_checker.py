@@ -864,9 +864,11 @@ class _Part:
                 alike[mine] &= not resting[row]
                 # What a push has left in bodies in a line is still being taken away.
                 alike[mine] &= not (self.has_pushed and self.is_in_line(arm))
-                # The round-off of a moment, of forces as far out as the surface, over short arms.
+                # The round-off of a moment, of forces as far out as the surface, over short arms;
+                # all spheres share it.
                 longest = np.linalg.norm(arm, axis=1).max()
-                slack[mine] *= 1 + new.radius[mine].max() / max(longest, 1e-300)
+                over = 1 + new.radius[mine].max() / max(longest, 1e-300)
+                slack[mine] = over * slack[mine].max()
         other = (np.abs(given - wanted) > slack[:, None]).any(axis=1)
         new.stopped = self.stopped(clusters, alike & other, of_grain, sizes)
         self.report.seen["stopped spheres"] += int((other & (new.stopped | ~alike)).sum())
@@ -1354,8 +1356,10 @@ class _Part:
             self.lengths(new) + new.h * np.abs(u)
         )
         allowed = np.where(impulse > 0, np.abs(impulse) * target / new.h, 0.0)
-        # A pull closes by up to the accuracy, 1e-3, of what it stops, or of a tenth of what it did.
-        closes = np.maximum(0, listed["gap"]) + np.maximum(self.eps, 16 * ACCURACY * large)
+        # A pull closes by up to the accuracy, 1e-3, of what it stops, or of a tenth of what it did,
+        # or by as much as turning surfaces would part.
+        closes = np.maximum(self.eps, np.maximum(16 * ACCURACY * large, new.h * u_before))
+        closes += np.maximum(0, listed["gap"])
         pulls = impulse < 0
         allowed[pulls] += np.abs(impulse[pulls]) * closes[pulls] / new.h
         allowed += np.maximum(0, impulse * motion) / new.h
