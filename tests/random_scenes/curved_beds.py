@@ -46,7 +46,7 @@ GRAVITY = 1.0
 FILLED, MOST_GRAINS = 0.33, 120
 # In the time in which a sphere falls by its radius, of which a step is a part.
 STEP = (0.05, 0.2)
-# Without `shorten`, in which a fall from the top ends within so many radii.
+# Without `shorten`, in which a fall from the top ends within so many of the smallest radii.
 STEP_AT_MOST = (0.3, 1.0)
 # Of the weight, what floor and walls may be off by at the end.
 CARRIED = 0.01
@@ -146,7 +146,7 @@ class CurvedBed(SceneDraw):
         if not self.shorten:
             # As far as two go in a step that fall from the top and meet.
             fall = float(np.sqrt(2 * self.gravity * height))
-            most = self.radius * float(self.random.uniform(*STEP_AT_MOST)) / fall
+            most = self.smallest * float(self.random.uniform(*STEP_AT_MOST)) / fall
             self.timestep = min(self.timestep, most)
             self.skin = max(self.skin, 3 * self.timestep * fall)
         self.arm = max(float(np.linalg.norm(o, axis=1).max()) for o, _ in self.to_place)
@@ -159,6 +159,7 @@ class CurvedBed(SceneDraw):
         super().place()
         self.spheres.kind = [FREE] * len(self.spheres.r)
         self.words = [word for word in self.words if word not in NOT_HERE]
+        self.spheres.density[:] = self.density
         # Where steps may be shorter the grains fly about at first; others fall.
         if not self.shorten:
             self.spheres.v[:] = self.spheres.w[:] = 0.0
