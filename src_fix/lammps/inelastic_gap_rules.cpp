@@ -161,9 +161,7 @@ bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
   // Where bad overlaps give way to one another one may become as deep as the deepest.
   const bool gives_way = bad && step_.gives_way;
   const double allowed = gives_way ? -step_.largest_overlap : bad ? contact.gap_now : 0.0;
-  // Regular overlaps beside a bad one are kept to within the residual, in steps of any length.
-  const double regular = (REGULAR_OVERLAP + (step_.bad_start ? 1.0 : 0.0)) * tolerance;
-  step_.excess = std::max(step_.excess, allowed - gap_at_end - regular);
+  step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
   const double wanted = gives_way ? allowed : bad ? wanted_gap(contact) : 0.0;
   const double deepest_kept = deepest(contact, RELINEARISE_BEYOND * tolerance);
   return wanted - gap_at_end > std::min(deepest_kept, REGULAR_OVERLAP * tolerance);
