@@ -10,37 +10,25 @@
 // idle: iterations leave them out until they are looked at and found to be near. The others are
 // working. Each rank chooses for itself; nothing is communicated for it.
 //
-// Constraints and slots (inelastic_unknowns.h) are packed as normals with gaps, diagonal entries,
-// compliances and least changes, one for each constraint, and vectors, one for each slot.
 // Everything has units in which the largest length is near 1, so that single precision can hold it.
 
 #pragma once
 
-#include "inelastic_contact_problem.h"
-#include "inelastic_host.h"
-#include "inelastic_packed_kernels.h"
-#include "inelastic_packed_targets.h"
+#include "inelastic_momentum.h"
+#include "inelastic_packed_constraints.h"
+#include "inelastic_packed_movers.h"
+#include "inelastic_search.h"
 
 #include <array>
 #include <vector>
 
 namespace inelastic {
 
-// The weights of the momentum in inelastic_accelerated_gradient.h.
-struct Weights {
-  double along, beyond, back;
-};
-
 template <typename Real> class PackedIterations {
  public:
-  // Packs a problem, whose impulses are the start. `diagonal` is that of A, `gap` has the gaps w of
-  // these impulses, one number per constraint each (inelastic_contact_problem.h). Constraints
-  // without an impulse whose gap is above `idle_gap` [length] are idle. `change` are the changes of
-  // velocity by these impulses (GapOperator::change), and the targets were judged with them. No
-  // target is above the tolerance [length].
-  void prepare(const ContactProblem &problem, const std::vector<double> &diagonal,
-               const std::vector<double> &gap, double idle_gap, const Scales &scales,
-               const ContactTargets &targets, const std::vector<double> &change, double tolerance);
+  // Packs a problem, whose impulses are the start. Constraints without an impulse whose gap is above
+  // `idle_gap` [length] are idle.
+  void prepare(const Start &start, double idle_gap);
 
   // Changes of velocity, and with them the targets, move most in the first iterations of a search.
   static bool sets_targets(long iteration)
@@ -70,7 +58,7 @@ template <typename Real> class PackedIterations {
 
   // Ends an iteration: computes the changes of velocity of the present impulses. Collective. The
   // host must know which ghosts are in constraints (Host::choose_ghosts).
-  void finish(Host &host);
+  void finish(Host &host) { movers_.move(host); }
 
   // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units. Makes
   // the working ones idle that have no impulse and gaps above it, where they are more than a few.
@@ -93,38 +81,16 @@ template <typename Real> class PackedIterations {
   static constexpr long TARGETS_EVERY = 20;
 
   using Vector = packed::Vector<Real>;
-  using Set = HalfLine<Real>;
-
-  struct Constraints {
-    std::vector<std::size_t> source;    // the place in the problem
-    std::vector<packed::Ends> ends;
-    std::vector<Vector> normal;    // the fourth number: the gap of the impulses at the start
-    std::vector<Real> diagonal, compliance;
-    std::vector<Set> set;                                    // of the changes since the start
-    std::vector<Real> least_target, part, inverse_target;    // inelastic_contact_targets.h
-
-    std::size_t size() const { return source.size(); }
-    void resize(std::size_t count);
-    // Copies constraint k of `other` to place `to`.
-    void copy(const Constraints &other, std::size_t k, std::size_t to);
-  };
-
-  void pack(const ContactSet &contacts, const std::vector<std::size_t> &places,
-            const std::vector<double> &diagonal, const std::vector<double> &gap,
-            const Scales &scales, const ContactTargets &targets, Constraints &packed);
   void wake(const std::vector<std::size_t> &near, const Real *gap);
   void set_idle();
-  void add_up_walls(Host &host);
-  void pack_bodies(const RigidBodies &bodies, double mobility_unit);
-  bool pack_rod(const RigidBodies &bodies, std::size_t b, double mobility_unit);
-  void pack_body(const RigidBodies &bodies, std::size_t b, double mobility_unit);
   void unpack(const std::vector<Real> &change, const Scales &scales,
               std::vector<double> &impulse) const;
-
-  Constraints working_, idle_;
   // Returns the arrays of numbers that iterations change, one for each working constraint.
   std::array<std::vector<Real> *, 3> states() { return {&unbound_, &change_before_, &gap_before_}; }
 
+  PackedConstraints<Real> working_, idle_;
+  PackedMovers<Real> movers_;
+  PackedTargets<Real> targets_;
   // As in packed::Pass
   std::vector<Real> unbound_, change_before_, gap_before_;
   std::vector<double> start_;                    // impulses, in the order of the problem
@@ -133,15 +99,7 @@ template <typename Real> class PackedIterations {
   double inverse_diagonals_ = 0.0;               // their sum over all constraints
   std::vector<Vector> looked_;                   // gaps of the idle ones, four in each
   int looks_ = 0;                                // since the start of the search
-  Real idle_gap_ = 0;                            // above it a constraint without an impulse is idle
-  std::vector<Real> inverse_mass_;               // per slot; 1 for particles in bodies
-  std::vector<Vector> sum_, velocity_;
-  int first_wall_ = 0;         // the slot of the first wall
-  bool walls_move_ = false;    // by impulses
-  PackedTargets<Real> targets_;
-  std::vector<packed::Rod<Real>> rods_;
-  std::vector<packed::Body<Real>> bodies_;       // bodies that are no rods
-  std::vector<packed::Member<Real>> members_;    // of all bodies, as in RigidBodies::member
+  Real idle_gap_ = 0;    // above it a constraint without an impulse is idle
 };
 
 }    // namespace inelastic

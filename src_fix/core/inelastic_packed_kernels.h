@@ -27,6 +27,20 @@ template <typename Real> struct alignas(4 * sizeof(Real)) Vector {
   Lanes lanes;
 };
 
+template <typename Real>
+void set_lanes(Vector<Real> &vector, double x, double y, double z, double fourth)
+{
+  vector.lanes =
+      typename Vector<Real>::Lanes{static_cast<Real>(x), static_cast<Real>(y),
+                                   static_cast<Real>(z), static_cast<Real>(fourth)};
+}
+
+// The place of a slot's vector in an array, in bytes, and the slot at a place.
+template <typename Real> std::uint32_t place(int slot)
+{ return static_cast<std::uint32_t>(slot * sizeof(Vector<Real>)); }
+template <typename Real> std::size_t index(std::uint32_t place)
+{ return place / sizeof(Vector<Real>); }
+
 // The vectors of a constraint's two slots (inelastic_unknowns.h) are at these places, in bytes from
 // the start of an array, as addresses take them.
 struct Ends {

@@ -21,34 +21,25 @@ namespace {
   template <typename Real> Real length(const typename packed::Vector<Real>::Lanes &a)
   { return std::sqrt(square<Real>(a)); }
 
-  template <typename Real>
-  void set_lanes(packed::Vector<Real> &vector, double x, double y, double z)
-  {
-    vector.lanes = typename packed::Vector<Real>::Lanes{static_cast<Real>(x), static_cast<Real>(y),
-                                                        static_cast<Real>(z), Real(0)};
-  }
-
 }    // namespace
 
-template <typename Real>
-void PackedTargets<Real>::begin(const ContactProblem &problem, const Scales &scales,
-                                const ContactTargets &targets, const std::vector<double> &change,
-                                double tolerance)
+template <typename Real> void PackedTargets<Real>::begin(const Start &start)
 {
+  const ContactProblem &problem = start.problem;
   const auto slots = static_cast<std::size_t>(problem.slots());
-  const double per_length = problem.timestep / scales.length;
-  const std::vector<double> &guess = targets.change_by_guess();
+  const double per_length = problem.timestep / start.scales.length;
+  const std::vector<double> &change = start.change, &guess = start.targets.change_by_guess();
   at_start_.resize(slots);
   since_guess_.resize(slots);
   for (std::size_t i = 0; i < slots; ++i) {
     const double *const v = &change[3 * i], *const g = &guess[3 * i];
-    set_lanes(at_start_[i], per_length * v[0], per_length * v[1], per_length * v[2]);
-    set_lanes(since_guess_[i], per_length * (v[0] - g[0]), per_length * (v[1] - g[1]),
-              per_length * (v[2] - g[2]));
+    packed::set_lanes(at_start_[i], per_length * v[0], per_length * v[1], per_length * v[2], 0.0);
+    packed::set_lanes(since_guess_[i], per_length * (v[0] - g[0]), per_length * (v[1] - g[1]),
+                      per_length * (v[2] - g[2]), 0.0);
   }
   mobile_.resize(slots);
   for (std::size_t i = 0; i < slots; ++i) mobile_[i] = problem.is_mobile(static_cast<int>(i));
-  most_ = static_cast<Real>(tolerance / scales.length);
+  most_ = static_cast<Real>(start.tolerance / start.scales.length);
   kept_.assign(slots, Vector{});
   kept_before_ = kept_;
   set(kept_);

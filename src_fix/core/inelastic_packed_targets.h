@@ -7,9 +7,8 @@
 
 #pragma once
 
-#include "inelastic_contact_problem.h"
-#include "inelastic_contact_targets.h"
 #include "inelastic_packed_kernels.h"
+#include "inelastic_start.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -17,22 +16,12 @@
 
 namespace inelastic {
 
-// The units of packed numbers. Both are powers of two, so that a scene in other units takes the
-// same steps bit by bit.
-struct Scales {
-  double length;     // [length]
-  double impulse;    // [mass length / time]
-};
-
 template <typename Real> class PackedTargets {
  public:
   using Vector = packed::Vector<Real>;
 
-  // Begins a search. `change` are the changes of velocity by the impulses at its start
-  // (GapOperator::change), and the targets were judged with them. No target is above the tolerance
-  // [length].
-  void begin(const ContactProblem &problem, const Scales &scales, const ContactTargets &targets,
-             const std::vector<double> &change, double tolerance);
+  // Begins a search.
+  void begin(const Start &start);
 
   // Takes the velocities of which targets are a part.
   void set(const std::vector<Vector> &velocity);
