@@ -32,7 +32,7 @@ void ConjugateGradients::begin(const ContactProblem &problem, const std::vector<
   for (std::size_t c = 0; c < count; ++c) {
     root_[c] = std::sqrt(diagonal[c]);
     x_[c] = contacts.impulse[c] * root_[c];
-    least_[c] = contacts.set[c].least * root_[c];
+    least_[c] = contacts.set[c].idle() * root_[c];
   }
   curvature_ = 1.0;
 }
@@ -47,7 +47,7 @@ void ConjugateGradients::give_impulses(ContactProblem &problem) const
   ContactSet &contacts = problem.contacts;
   // A held impulse is its least one to the last bit.
   for (std::size_t c = 0; c < x_.size(); ++c)
-    contacts.impulse[c] = is_free(c) ? x_[c] / root_[c] : contacts.set[c].least;
+    contacts.impulse[c] = is_free(c) ? x_[c] / root_[c] : contacts.set[c].idle();
 }
 
 void ConjugateGradients::multiply(const ContactProblem &problem, const std::vector<double> &by,

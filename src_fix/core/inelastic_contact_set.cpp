@@ -34,7 +34,7 @@ void ContactSet::clear()
 
 void ContactSet::add(int first_particle, int second_slot, const double *unit_normal,
                      double gap_value, double impulse_guess, double compliance_value,
-                     double least_impulse, double refinement_value)
+                     const HalfLine<double> &admissible, double refinement_value)
 {
   first.push_back(first_particle);
   second.push_back(second_slot);
@@ -42,14 +42,21 @@ void ContactSet::add(int first_particle, int second_slot, const double *unit_nor
   gap.push_back(gap_value);
   impulse.push_back(impulse_guess);
   compliance.push_back(compliance_value);
-  set.push_back({least_impulse});
+  set.push_back(admissible);
   refinement.push_back(refinement_value);
 }
 
 void ContactSet::add_of(const ContactSet &other, std::size_t c)
 {
   add(other.first[c], other.second[c], &other.normal[3 * c], other.gap[c], 0.0, other.compliance[c],
-      other.set[c].least, other.refinement[c]);
+      other.set[c], other.refinement[c]);
+}
+
+bool ContactSet::has_springs() const
+{
+  return std::any_of(compliance.begin(), compliance.end(), [](double c) {
+    return c > 0.0;
+  });
 }
 
 void ContactSet::forget_impulses(std::size_t from)

@@ -49,8 +49,11 @@ struct ContactSet {
   std::size_t size() const { return gap.size(); }
   void clear();
   void add(int first_particle, int second_slot, const double *unit_normal, double gap_value,
-           double impulse_guess, double compliance_value = 0.0, double least_impulse = 0.0,
-           double refinement_value = 1.0);
+           double impulse_guess, double compliance_value = 0.0,
+           const HalfLine<double> &admissible = {}, double refinement_value = 1.0);
+
+  // Tells whether any contact has a compliance.
+  bool has_springs() const;
 
   // Adds constraint c of another set as it is, but for its impulse, which is zero.
   void add_of(const ContactSet &other, std::size_t c);

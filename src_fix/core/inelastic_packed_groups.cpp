@@ -5,12 +5,13 @@
 
 namespace inelastic {
 
-template <typename Group> void PackedGroups<Group>::clear(int nobody)
+template <typename Group> void PackedGroups<Group>::clear(int nobody, bool has_springs)
 {
   groups.clear();
   rest.clear();
   colour_end_.clear();
   nobody_ = nobody;
+  has_springs_ = has_springs;
 }
 
 template <typename Group> std::size_t PackedGroups<Group>::used() const
@@ -35,7 +36,7 @@ template <typename Group> void PackedGroups<Group>::clear_lane(std::size_t place
   const int lane = static_cast<int>(place % WIDTH);
   to.first[lane] = to.second[lane] =
       static_cast<std::uint32_t>(nobody_ * sizeof(typename Group::State));
-  for (swept::Eight *const numbers : {&to.give, &to.least, &to.now, &to.before, &to.inverse_target})
+  for (swept::Eight *const numbers : {&to.idle, &to.now, &to.before, &to.inverse_target})
     (*numbers)[lane] = 0.0f;
   to.gap[lane] = 1.0f;
   if constexpr (HAS_BODIES<Group>) {
@@ -45,7 +46,7 @@ template <typename Group> void PackedGroups<Group>::clear_lane(std::size_t place
   }
   others.source[lane] = swept::NONE;
   others.first[lane] = others.second[lane] = 0;
-  others.root[lane] = others.part[lane] = 0.0f;
+  others.root[lane] = others.give[lane] = others.part[lane] = 0.0f;
   others.least_target[lane] = 1.0f;    // any that can be divided by
 }
 
@@ -86,8 +87,7 @@ void PackedGroups<Group>::copy(const PackedGroups &from, std::size_t source, std
   b.first[j] = a.first[i];
   b.second[j] = a.second[i];
   b.gap[j] = a.gap[i];
-  b.give[j] = a.give[i];
-  b.least[j] = a.least[i];
+  b.idle[j] = a.idle[i];
   b.now[j] = a.now[i];
   b.before[j] = a.before[i];
   b.inverse_target[j] = a.inverse_target[i];
@@ -101,6 +101,7 @@ void PackedGroups<Group>::copy(const PackedGroups &from, std::size_t source, std
   rest_b.first[j] = rest_a.first[i];
   rest_b.second[j] = rest_a.second[i];
   rest_b.root[j] = rest_a.root[i];
+  rest_b.give[j] = rest_a.give[i];
   rest_b.least_target[j] = rest_a.least_target[i];
   rest_b.part[j] = rest_a.part[i];
 }
@@ -118,7 +119,7 @@ template <typename Group>
 void PackedGroups<Group>::leave_out(const std::vector<std::size_t> &places)
 {
   PackedGroups kept;
-  kept.clear(nobody_);
+  kept.clear(nobody_, has_springs_);
   auto next = places.begin();
   std::size_t begin = 0;
   std::vector<std::size_t> of_colour;

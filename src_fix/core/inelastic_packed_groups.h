@@ -23,7 +23,7 @@ template <typename Group> class PackedGroups {
   std::vector<swept::Rest> rest;
 
   // Empties all. Lanes that are empty have the states of nobody, a mover that nothing moves.
-  void clear(int nobody);
+  void clear(int nobody, bool has_springs);
   std::size_t lanes() const { return groups.size() * WIDTH; }
   bool is_empty(std::size_t place) const
   { return rest_of(place).source[place % WIDTH] == swept::NONE; }
@@ -32,6 +32,8 @@ template <typename Group> class PackedGroups {
 
   Group &group(std::size_t place) { return groups[place / WIDTH]; }
   const Group &group(std::size_t place) const { return groups[place / WIDTH]; }
+  // As the passes of inelastic_sweep_kernels.h take them.
+  const swept::Rest *springs() const { return has_springs_ ? rest.data() : nullptr; }
   swept::Rest &rest_of(std::size_t place) { return rest[place / WIDTH]; }
   const swept::Rest &rest_of(std::size_t place) const { return rest[place / WIDTH]; }
 
@@ -53,6 +55,7 @@ template <typename Group> class PackedGroups {
 
   std::vector<std::size_t> colour_end_;    // in groups, one after the other
   int nobody_ = 0;
+  bool has_springs_ = false;    // some constraint has a compliance
 };
 
 }    // namespace inelastic

@@ -11,6 +11,9 @@ namespace {
   // At most so many lanes for each constraint, beside a group for each colour.
   constexpr std::size_t MOST_LANES = 2;
 
+  bool is_loaded(const swept::Lanes &group, int lane)
+  { return HalfLine<float>::above(group.idle[lane]).is_loaded(group.now[lane]); }
+
 }    // namespace
 
 template <typename Group>
@@ -27,7 +30,9 @@ bool PackedSweeps<Group>::prepare(const Start &start, double idle_gap, Host &hos
   for (std::size_t c = 0; c < start.gap.size(); ++c)
     (contacts.is_loaded(c) || !(start.gap[c] > idle_gap) ? near : far).push_back(c);
   shared_.find(problem, near, host);
-  for (Packed *const some : {&at_cuts_, &inside_, &idle_}) some->clear(movers_.number());
+  const bool has_springs = contacts.has_springs();
+  for (Packed *const some : {&at_cuts_, &inside_, &idle_})
+    some->clear(movers_.number(), has_springs);
   const std::size_t lanes = pack(true, near) + pack(false, near);
   far_ = std::move(far);
   begin_search();
@@ -105,7 +110,7 @@ void PackedSweeps<Group>::write(std::size_t c, Packed &packed, std::size_t place
   const double whole = given_->diagonal[c] + shared_.from_other_ranks(problem, c);
   // All is divided by the same number, which is kept in single precision.
   rest.root[lane] = static_cast<float>(std::sqrt(whole * unit));
-  group.give[lane] = static_cast<float>(contacts.compliance[c] / whole);
+  rest.give[lane] = static_cast<float>(contacts.compliance[c] / whole);
   movers_.write_rows(problem, c, static_cast<double>(rest.root[lane]), group, lane);
   rest.source[lane] = c;
   rest.first[lane] = contacts.first[c];
@@ -125,8 +130,8 @@ void PackedSweeps<Group>::write_start(Packed &packed, std::size_t place) const
   const double per_length = 1.0 / scales.length;
   const auto root = static_cast<double>(rest.root[lane]);
   group.gap[lane] = static_cast<float>(given_->gap[c] * per_length / root);
-  group.least[lane] =
-      static_cast<float>(of_impulses_[c].changes_of(start_[c]).least / scales.impulse * root);
+  group.idle[lane] =
+      static_cast<float>(of_impulses_[c].changes_of(start_[c]).idle() / scales.impulse * root);
   group.now[lane] = group.before[lane] = 0.0f;
   rest.least_target[lane] = static_cast<float>(given_->targets.least()[c] * per_length);
   rest.part[lane] = static_cast<float>(given_->targets.part()[c]);
@@ -139,7 +144,8 @@ swept::Swept PackedSweeps<Group>::sweep(double along, double blur, Host &host)
   swept::lead_on(states_, before_, by);
   swept::Swept swept;
   const auto visit = [&](Packed &some, std::size_t from, std::size_t to) {
-    swept::sweep(some.groups.data() + from, to - from, states_.data(), by, blurred, swept);
+    const swept::Rest *const springs = some.springs() ? some.springs() + from : nullptr;
+    swept::sweep(some.groups.data() + from, springs, to - from, states_.data(), by, blurred, swept);
   };
   const std::size_t at_cuts = at_cuts_.groups.size(), inside = inside_.groups.size();
   // Ranks of the first turn begin with their constraints at cuts, those of the second visit theirs
@@ -208,7 +214,7 @@ template <typename Group> double PackedSweeps<Group>::moved_since_kept(double ac
       const Group &group = some->groups[g];
       const swept::Rest &rest = some->rest[g];
       for (int lane = 0; lane < WIDTH; ++lane) {
-        if (!(group.now[lane] > group.least[lane])) continue;
+        if (!is_loaded(group, lane)) continue;
         const int i = rest.first[lane], j = rest.second[lane];
         most = std::max(most,
                         targets_.moved(i, j) /
@@ -245,7 +251,7 @@ template <typename Group> float PackedSweeps<Group>::looked_gap(std::size_t plac
 template <typename Group> void PackedSweeps<Group>::wake_near()
 {
   looked_.resize(idle_.groups.size());
-  swept::look(idle_.groups, idle_.rest.data(), states_.data(), looked_.data());
+  swept::look(idle_.groups, idle_.rest.data(), idle_.springs(), states_.data(), looked_.data());
   std::vector<std::size_t> near;
   std::size_t empty = 0;
   for (std::size_t place = 0; place < idle_.lanes(); ++place) {
@@ -291,7 +297,8 @@ float PackedSweeps<Group>::look_at(const Packed &packed, std::vector<Unloaded> &
 {
   looked_.resize(packed.groups.size());
   const float residual =
-      swept::look(packed.groups, packed.rest.data(), states_.data(), looked_.data());
+      swept::look(packed.groups, packed.rest.data(), packed.springs(), states_.data(),
+                  looked_.data());
   for (std::size_t g = 0; g < packed.groups.size(); ++g)
     for (unsigned lanes = looked_[g].unloaded; lanes != 0; lanes &= lanes - 1) {
       const std::size_t place = g * WIDTH + __builtin_ctz(lanes);
@@ -337,7 +344,7 @@ void PackedSweeps<Group>::impulses(const Scales &scales, std::vector<double> &im
       const Group &group = some->groups[g];
       const swept::Rest &rest = some->rest[g];
       for (int lane = 0; lane < WIDTH; ++lane) {
-        if (rest.source[lane] == swept::NONE || !(group.now[lane] > group.least[lane])) continue;
+        if (rest.source[lane] == swept::NONE || !is_loaded(group, lane)) continue;
         const std::size_t c = rest.source[lane];
         impulse[c] = of_impulses_[c].project(
             start_[c] + scales.impulse * static_cast<double>(group.now[lane] / rest.root[lane]));

@@ -44,8 +44,8 @@ template <typename Group> class PackedSweeps {
   double unsolved(double blur) const
   {
     const auto by = static_cast<float>(blur);
-    return std::max(swept::find_unsolved(at_cuts_.groups, states_.data(), by),
-                    swept::find_unsolved(inside_.groups, states_.data(), by));
+    return std::max(find_unsolved(at_cuts_, by),
+                    find_unsolved(inside_, by));
   }
 
   // Computes the states from the impulses: sums of many changes drift in single precision.
@@ -78,6 +78,8 @@ template <typename Group> class PackedSweeps {
     float gap;
   };
 
+  double find_unsolved(const Packed &packed, float blur) const
+  { return swept::find_unsolved(packed.groups, packed.springs(), states_.data(), blur); }
   ConstraintColours colour(const std::vector<int> &first, const std::vector<int> &second) const;
   std::size_t pack(bool at_cuts, const std::vector<std::size_t> &constraints);
   void write(std::size_t c, Packed &packed, std::size_t place) const;

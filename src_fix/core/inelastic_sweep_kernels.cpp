@@ -1,8 +1,10 @@
 #include "inelastic_sweep_kernels.h"
 
+#include "inelastic_admissible_set.h"
 #include "inelastic_vectorise.h"
 
 #include <algorithm>
+#include <type_traits>
 
 namespace inelastic::swept {
 
@@ -239,9 +241,25 @@ namespace {
     return most;
   }
 
-  template <typename Size, typename Group>
-  INELASTIC_INLINE void sweep_all(Group *groups, std::size_t count, typename Group::State *states,
-                                  float along, float blur, Swept &swept)
+  using Set = HalfLine<float>;
+
+  // Writes the gaps of constraints with some impulses, of which `opened` is what all make of them.
+  template <typename Size, bool SPRINGS, typename Group>
+  INELASTIC_INLINE void find_gap(const Group &group, const Rest *springs, int from,
+                                 const typename Size::Numbers &impulse,
+                                 const typename Size::Numbers &opened,
+                                 typename Size::Numbers &gap)
+  {
+    if constexpr (SPRINGS)
+      gap = part<Size>(group.gap, from) + part<Size>(springs->give, from) * impulse + opened;
+    else
+      gap = part<Size>(group.gap, from) + opened;
+  }
+
+  template <typename Size, bool SPRINGS, typename Group>
+  INELASTIC_INLINE void sweep_all(Group *groups, const Rest *springs, std::size_t count,
+                                  typename Group::State *states, float along, float blur,
+                                  Swept &swept)
   {
     using V = typename Size::Numbers;
     V uphill = {}, most = {}, of_target = {}, farthest = {};
@@ -249,14 +267,13 @@ namespace {
       Group &group = groups[g];
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
         Loaded<Group, Size> loaded;
-        V opened;
+        V opened, gap, next;
         opening(group, from, states, loaded, opened);
         const V now = part<Size>(group.now, from);
         const V led = now + along * (now - part<Size>(group.before, from));
-        const V free =
-            led - (part<Size>(group.gap, from) + part<Size>(group.give, from) * led + opened);
-        const V &least = part<Size>(group.least, from);
-        const V next = free > least ? free : least;
+        find_gap<Size, SPRINGS>(group, SPRINGS ? springs + g : nullptr, from, led, opened, gap);
+        const V free = led - gap;
+        Set::project(free, part<Size>(group.idle, from), next);
         const V change = next - led;
         uphill -= change * (next - now);
         const V size = change > 0 ? change : -change;
@@ -276,28 +293,30 @@ namespace {
     swept.farthest = std::max(swept.farthest, largest_of<Size>(farthest));
   }
 
-  template <typename Size, typename Group>
-  INELASTIC_INLINE double unsolved_of_all(const std::vector<Group> &groups,
+  template <typename Size, bool SPRINGS, typename Group>
+  INELASTIC_INLINE double unsolved_of_all(const std::vector<Group> &groups, const Rest *springs,
                                           const typename Group::State *states, float blur)
   {
     using V = typename Size::Numbers;
     V unsolved = {};
-    for (const Group &group : groups)
+    for (const Group &group : groups) {
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
         Loaded<Group, Size> loaded;
-        V opened;
+        V opened, gap, open;
         opening(group, from, states, loaded, opened);
         const V &now = part<Size>(group.now, from);
-        const V gap = part<Size>(group.gap, from) + part<Size>(group.give, from) * now + opened;
-        const V under_force = now > part<Size>(group.least, from) ? gap : -gap;
-        const V left = under_force > -gap ? under_force : -gap;
+        find_gap<Size, SPRINGS>(group, springs, from, now, opened, gap);
+        Set::find_open(now, part<Size>(group.idle, from), gap, open);
+        const V left = open > -gap ? open : -gap;
         const V ratio = (left - blur) * part<Size>(group.inverse_target, from);
         unsolved = ratio > unsolved ? ratio : unsolved;
       }
+      if constexpr (SPRINGS) ++springs;
+    }
     return largest_of<Size>(unsolved);
   }
 
-  template <typename Size, typename Group>
+  template <typename Size, bool SPRINGS, typename Group>
   INELASTIC_INLINE float look_at_all(const std::vector<Group> &groups, const Rest *rest,
                                      const typename Group::State *states, Looked *looked)
   {
@@ -307,19 +326,20 @@ namespace {
       unsigned unloaded = 0;
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
         Loaded<Group, Size> loaded;
-        V opened;
+        V opened, scaled, open;
         opening(group, from, states, loaded, opened);
-        const V &now = part<Size>(group.now, from), &least = part<Size>(group.least, from);
-        const V gap = (part<Size>(group.gap, from) + part<Size>(group.give, from) * now + opened) *
-            part<Size>(rest->root, from);
+        const V &now = part<Size>(group.now, from), &idle = part<Size>(group.idle, from);
+        find_gap<Size, SPRINGS>(group, rest, from, now, opened, scaled);
+        const V gap = scaled * part<Size>(rest->root, from);
         part<Size>(looked->gap, from) = gap;
-        const V under_force = now > least ? gap : -gap;
-        const V left = under_force > -gap ? under_force : -gap;
+        Set::find_open(now, idle, gap, open);
+        const V left = open > -gap ? open : -gap;
         residual = left > residual ? left : residual;
         const V &before = part<Size>(group.before, from);
         const V most = now > before ? now : before, fewest = now < before ? now : before;
         for (int k = 0; k < Size::COUNT; ++k)
-          unloaded |= unsigned{most[k] == 0.0f && fewest[k] == 0.0f && !(now[k] > least[k])}
+          unloaded |= unsigned{most[k] == 0.0f && fewest[k] == 0.0f &&
+                               !Set::above(idle[k]).is_loaded(now[k])}
               << (from + k);
       }
       looked->unloaded = static_cast<std::uint8_t>(unloaded);
@@ -398,16 +418,26 @@ namespace {
   }
 
   // The passes over groups of each kind, by vectors of eight and of four numbers.
-#define INELASTIC_PASSES(GROUP)                                                            \
-  INELASTIC_CLONES void wide_sweep(GROUP *groups, std::size_t count, GROUP::State *states, \
-                                   float along, float blur, Swept &swept)                  \
-  { sweep_all<Wide>(groups, count, states, along, blur, swept); }                          \
-  INELASTIC_CLONES double wide_unsolved(const std::vector<GROUP> &groups,                  \
-                                        const GROUP::State *states, float blur)            \
-  { return unsolved_of_all<Wide>(groups, states, blur); }                                  \
-  INELASTIC_CLONES float wide_look(const std::vector<GROUP> &groups, const Rest *rest,     \
-                                   const GROUP::State *states, Looked *looked)             \
-  { return look_at_all<Wide>(groups, rest, states, looked); }                              \
+#define INELASTIC_PASSES(GROUP, SPRINGS)                                                       \
+  INELASTIC_CLONES void wide_sweep(std::bool_constant<SPRINGS>, GROUP *groups,                 \
+                                   const Rest *springs, std::size_t count,                     \
+                                   GROUP::State *states, float along, float blur, Swept &swept) \
+  { sweep_all<Wide, SPRINGS>(groups, springs, count, states, along, blur, swept); }            \
+  INELASTIC_CLONES double wide_unsolved(std::bool_constant<SPRINGS>,                           \
+                                        const std::vector<GROUP> &groups, const Rest *springs, \
+                                        const GROUP::State *states, float blur)                \
+  { return unsolved_of_all<Wide, SPRINGS>(groups, springs, states, blur); }                    \
+  INELASTIC_CLONES float wide_look(std::bool_constant<SPRINGS>,                                \
+                                   const std::vector<GROUP> &groups, const Rest *rest,         \
+                                   const GROUP::State *states, Looked *looked)                 \
+  { return look_at_all<Wide, SPRINGS>(groups, rest, states, looked); }
+
+  INELASTIC_PASSES(ParticleGroup, false)
+  INELASTIC_PASSES(ParticleGroup, true)
+  INELASTIC_PASSES(BodyGroup, false)
+  INELASTIC_PASSES(BodyGroup, true)
+
+#define INELASTIC_OTHER_PASSES(GROUP)                                                      \
   INELASTIC_CLONES void wide_targets(GROUP *groups, const Rest *rest, std::size_t count,   \
                                      const float *changed, float most)                     \
   { set_all_targets<Wide>(groups, rest, count, changed, most); }                           \
@@ -415,30 +445,57 @@ namespace {
                                  GROUP::State *states)                                     \
   { add_all<Wide>(groups, when, states); }
 
-  INELASTIC_PASSES(ParticleGroup)
-  INELASTIC_PASSES(BodyGroup)
+  INELASTIC_OTHER_PASSES(ParticleGroup)
+  INELASTIC_OTHER_PASSES(BodyGroup)
+
+  template <typename Springs, typename Group>
+  void sweep(Springs, Group *groups, const Rest *springs, std::size_t count,
+             typename Group::State *states, float along, float blur, Swept &swept)
+  {
+    if (is_wide())
+      wide_sweep(Springs{}, groups, springs, count, states, along, blur, swept);
+    else
+      sweep_all<Narrow, Springs::value>(groups, springs, count, states, along, blur, swept);
+  }
+
+  template <typename Springs, typename Group>
+  double find_unsolved(Springs, const std::vector<Group> &groups, const Rest *springs,
+                       const typename Group::State *states, float blur)
+  {
+    return is_wide() ? wide_unsolved(Springs{}, groups, springs, states, blur)
+                     : unsolved_of_all<Narrow, Springs::value>(groups, springs, states, blur);
+  }
+
+  template <typename Springs, typename Group>
+  float look(Springs, const std::vector<Group> &groups, const Rest *rest,
+             const typename Group::State *states, Looked *looked)
+  {
+    return is_wide() ? wide_look(Springs{}, groups, rest, states, looked)
+                     : look_at_all<Narrow, Springs::value>(groups, rest, states, looked);
+  }
 
 }    // namespace
 
 #define INELASTIC_CHOICES(GROUP)                                                                 \
-  void sweep(GROUP *groups, std::size_t count, GROUP::State *states, float along, float blur,    \
-             Swept &swept)                                                                       \
+  void sweep(GROUP *groups, const Rest *springs, std::size_t count, GROUP::State *states,        \
+             float along, float blur, Swept &swept)                                              \
   {                                                                                              \
-    if (is_wide())                                                                               \
-      wide_sweep(groups, count, states, along, blur, swept);                                     \
+    if (springs)                                                                                 \
+      sweep(std::true_type{}, groups, springs, count, states, along, blur, swept);               \
     else                                                                                         \
-      sweep_all<Narrow>(groups, count, states, along, blur, swept);                              \
+      sweep(std::false_type{}, groups, springs, count, states, along, blur, swept);              \
   }                                                                                              \
-  double find_unsolved(const std::vector<GROUP> &groups, const GROUP::State *states, float blur) \
+  double find_unsolved(const std::vector<GROUP> &groups, const Rest *springs,                    \
+                       const GROUP::State *states, float blur)                                   \
   {                                                                                              \
-    return is_wide() ? wide_unsolved(groups, states, blur)                                       \
-                     : unsolved_of_all<Narrow>(groups, states, blur);                            \
+    return springs ? find_unsolved(std::true_type{}, groups, springs, states, blur)              \
+                   : find_unsolved(std::false_type{}, groups, springs, states, blur);            \
   }                                                                                              \
-  float look(const std::vector<GROUP> &groups, const Rest *rest, const GROUP::State *states,     \
-             Looked *looked)                                                                     \
+  float look(const std::vector<GROUP> &groups, const Rest *rest, const Rest *springs,            \
+             const GROUP::State *states, Looked *looked)                                         \
   {                                                                                              \
-    return is_wide() ? wide_look(groups, rest, states, looked)                                   \
-                     : look_at_all<Narrow>(groups, rest, states, looked);                        \
+    return springs ? look(std::true_type{}, groups, rest, states, looked)                        \
+                   : look(std::false_type{}, groups, rest, states, looked);                      \
   }                                                                                              \
   void set_targets(GROUP *groups, const Rest *rest, std::size_t count, const float *changed,     \
                    float most)                                                                   \

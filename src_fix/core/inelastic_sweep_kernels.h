@@ -30,8 +30,7 @@ constexpr int WIDTH = 8;    // constraints in a group
 struct alignas(32) Lanes {
   std::uint32_t first[WIDTH], second[WIDTH];    // places of the two states, in bytes
   Eight gap;       // at the end of the step with the impulses at the start
-  Eight give;      // the compliance over D
-  Eight least;     // the least change of the impulse
+  Eight idle;      // of the set of admissible changes of the impulse (inelastic_admissible_set.h)
   Eight now;       // x, the change of the impulse
   Eight before;    // x before the last sweep
   Eight inverse_target;
@@ -58,6 +57,7 @@ struct BodyGroup : Lanes {
 // What a sweep does not read of the constraints of a group.
 struct alignas(32) Rest {
   Eight root;                                   // of D
+  Eight give;                                   // the compliance over D
   Eight least_target, part;                     // of PackedTargets::target
   std::size_t source[WIDTH];                    // the place in the problem; NONE in an empty lane
   std::uint32_t first[WIDTH], second[WIDTH];    // slots
@@ -75,17 +75,18 @@ struct Swept {
 
 // Visits the constraints of `count` groups, each from its impulse led on by `along` times its last
 // change, and adds to `swept`. The states must have been led on alike. Changes below `blur`, in
-// scaled units, may be round-off.
-void sweep(ParticleGroup *groups, std::size_t count, ParticleGroup::State *states, float along,
-           float blur, Swept &swept);
-void sweep(BodyGroup *groups, std::size_t count, BodyGroup::State *states, float along, float blur,
-           Swept &swept);
+// scaled units, may be round-off. Here and below `springs` are the groups' Rest if some constraints
+// have a compliance, and nullptr if none has.
+void sweep(ParticleGroup *groups, const Rest *springs, std::size_t count,
+           ParticleGroup::State *states, float along, float blur, Swept &swept);
+void sweep(BodyGroup *groups, const Rest *springs, std::size_t count, BodyGroup::State *states,
+           float along, float blur, Swept &swept);
 
 // Returns, between two sweeps, the largest residual, beyond the blur, as a part of its target.
-double find_unsolved(const std::vector<ParticleGroup> &groups, const ParticleGroup::State *states,
-                     float blur);
-double find_unsolved(const std::vector<BodyGroup> &groups, const BodyGroup::State *states,
-                     float blur);
+double find_unsolved(const std::vector<ParticleGroup> &groups, const Rest *springs,
+                     const ParticleGroup::State *states, float blur);
+double find_unsolved(const std::vector<BodyGroup> &groups, const Rest *springs,
+                     const BodyGroup::State *states, float blur);
 
 // What a look at a group finds.
 struct alignas(32) Looked {
@@ -94,10 +95,10 @@ struct alignas(32) Looked {
 };
 
 // Looks at all groups; returns their largest residual, as a length in packed units.
-float look(const std::vector<ParticleGroup> &groups, const Rest *rest,
+float look(const std::vector<ParticleGroup> &groups, const Rest *rest, const Rest *springs,
            const ParticleGroup::State *states, Looked *looked);
-float look(const std::vector<BodyGroup> &groups, const Rest *rest, const BodyGroup::State *states,
-           Looked *looked);
+float look(const std::vector<BodyGroup> &groups, const Rest *rest, const Rest *springs,
+           const BodyGroup::State *states, Looked *looked);
 
 // Sets the targets of `count` groups as PackedTargets::target has them, from its `changed` and
 // `most`.

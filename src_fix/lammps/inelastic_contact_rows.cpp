@@ -34,7 +34,7 @@ void ContactRows::add(Contact contact, double wall_motion, int i, int j, const d
   rules_.begin(contact, last ? *last : FirstGuess{}, wall_motion, i, j, normal);
   const Row row = {static_cast<int>(step_.contacts.size()), wall_motion};
   step_.problem.contacts.add(i, j, normal, rules_.effective_gap(contact) - wall_motion,
-                             step_.impulse_per_force * contact.force, 0.0, contact.asked.set.least,
+                             step_.impulse_per_force * contact.force, 0.0, contact.asked.set,
                              contact.refinement());
   step_.contacts.push_back(contact);
   step_.rows.push_back(row);

@@ -216,7 +216,7 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     // Surfaces that part are asked for no less than that.
     if (contact.asked.parts && contacts.gap[c] <= linear_gap) continue;
     allowed = LEFT * tolerance;
-    if (contacts.impulse[c] > 0.0) contacts.set[c].least = 0.0;
+    if (contacts.impulse[c] > 0.0) contacts.set[c] = {};
     const bool first_time = row.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
     contacts.gap[c] = first_time ? lessened : linear_gap;
     row.as_at_start = false;
@@ -241,7 +241,7 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
       return 0;
     if (contacts.impulse[c] > 0.0) {
       // Surfaces that approach across a gap need no pull, and no push before they touch.
-      contacts.set[c].least = 0.0;
+      contacts.set[c] = {};
     } else {
       gap = std::min(gap, most_closed(contact) - row.wall_motion);
       if (gap <= contacts.gap[c]) return 0;

@@ -149,8 +149,8 @@ inelastic::SolverResult HoldStill::project(const Held &held)
     contacts.add_of(problem.contacts, c);
     contacts.gap.back() = std::min(problem.contacts.gap[c] + problem.timestep * along, ends_within);
     // With the step's own impulse the contact still pushes, or pulls by no more than it may.
-    const auto changes = problem.contacts.set[c].changes_of(problem.contacts.impulse[c]);
-    contacts.set.back() = {std::min(0.0, changes.least)};
+    contacts.set.back() =
+        problem.contacts.set[c].changes_of(problem.contacts.impulse[c]).after(0.0);
     source.push_back(c);
   }
   inelastic::SolverLimits limits;

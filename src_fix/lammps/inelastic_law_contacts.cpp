@@ -57,7 +57,7 @@ void LawContacts::ask(Contact &contact, double wall_motion, int i, int j, const 
       seen(contact, i, j, normal, speed_before - speed_of_wall, predicted_speed),
       state.remembered.data());
   check(demand, i);
-  demand.set.least = std::min(0.0, demand.set.least + taken_before(state));
+  demand.set = demand.set.after(taken_before(state));
   // The velocities at the start of a run are half way through a collision of the last step, if they
   // are those with which it ended. (Spheres of bodies turn a little.)
   constexpr double SAME = 0.05;
@@ -76,11 +76,12 @@ void LawContacts::check(const Demand &demand, int i)
 {
   const bool parts = !demand.parts ||
       (demand.parting_speed >= 0.0 && std::isfinite(demand.parting_speed));
-  if (parts && demand.set.least <= 0.0 && std::isfinite(demand.set.least)) return;
+  const double least = demand.set.idle();
+  if (parts && least <= 0.0 && std::isfinite(least)) return;
   step_.problem_found = fmt::format(
       "law {} asks a contact of atom {} to part with the speed {} and to carry an impulse of at "
       "least {}: a speed must be a number of at least 0, a least impulse one of at most 0",
-      step_.settings.law_words, atom->tag[i], demand.parting_speed, demand.set.least);
+      step_.settings.law_words, atom->tag[i], demand.parting_speed, least);
 }
 
 // The contact as the law sees it. [length / time] The speeds are those with which the surfaces

@@ -16,7 +16,7 @@ double *LawEntry::pack(double *out) const
   out = std::copy(normal.begin(), normal.end(), out);
   *out++ = demand.parts ? 1.0 : 0.0;
   *out++ = demand.parting_speed;
-  *out++ = demand.set.least;
+  *out++ = demand.set.idle();
   *out++ = impulse;
   *out++ = speed;
   return std::copy(remembered.begin(), remembered.end(), out);
@@ -28,7 +28,7 @@ const double *LawEntry::unpack(const double *in)
   for (double &component : normal) component = *in++;
   demand.parts = *in++ != 0.0;
   demand.parting_speed = *in++;
-  demand.set.least = *in++;
+  demand.set = inelastic::HalfLine<double>::above(*in++);
   impulse = *in++;
   speed = *in++;
   for (double &value : remembered) value = *in++;

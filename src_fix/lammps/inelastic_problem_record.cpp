@@ -199,7 +199,7 @@ void ProblemRecord::write(const inelastic::ProjectionResult &result) const
   Table of_contacts = contacts();
   if (step_.settings.law)
     of_contacts.push_back({"least_impulse", 1, Column::REAL, [this](int c, double *out) {
-                             *out = step_.problem.contacts.set[c].least;
+                             *out = step_.problem.contacts.set[c].idle();
                            }});
   const bool has_bodies = step_.has_bodies;
   if (has_bodies)

@@ -43,8 +43,14 @@ struct ContactState {
   std::array<int, 2> type;         // LAMMPS's atom types; 0 for a wall
 };
 
-// What a contact asks for in a step: the gap, and which impulses it may carry.
+// What a contact asks for in a step: the gap, and which impulses it may carry. By itself that of the
+// inelastic law: the surfaces do not overlap, and the contact pushes alone.
 struct Demand {
+  // The contact may pull, by up to an impulse [mass length / time], >= 0.
+  static Demand pulls(double up_to) { return {false, 0.0, HalfLine<double>::pulls(up_to)}; }
+  // The surfaces part at least with a speed s [length / time], >= 0.
+  static Demand parts_with(double speed) { return {true, speed, {}}; }
+
   // Whether s is asked for, too: w is then the smaller one of the two gaps above
   bool parts = false;
   double parting_speed = 0.0;    // s [length / time], >= 0

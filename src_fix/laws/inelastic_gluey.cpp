@@ -8,7 +8,7 @@
 namespace inelastic {
 
 Demand Gluey::ask(const ContactState &, const double *remembered) const
-{ return {false, 0.0, {remembered[0]}}; }
+{ return Demand::pulls(-remembered[0]); }
 
 bool Gluey::remember(const Impulse &impulse, double *remembered) const
 {

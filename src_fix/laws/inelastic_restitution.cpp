@@ -13,7 +13,7 @@ Demand Restitution::ask(const ContactState &contact, const double *) const
   const double approach = std::min(-before, -predicted);
   const bool collides = contact.gap + contact.timestep * predicted < 0.0;
   if (coefficient_ == 0.0 || !collides || !(approach > std::abs(predicted - before))) return {};
-  return {true, coefficient_ * approach, {}};
+  return Demand::parts_with(coefficient_ * approach);
 }
 
 std::unique_ptr<ContactLaw> make_restitution(const std::vector<std::string> &words,
