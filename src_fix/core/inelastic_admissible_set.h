@@ -74,8 +74,8 @@ template <typename Real> class HalfLine {
 
   // Returns the set of what may be added to an impulse.
   HalfLine changes_of(Real impulse) const { return HalfLine(least_ - impulse); }
-  // Returns the set of a contact that has pulled by so much of what it may; of changes, the set that
-  // holds no change, too.
+  // Returns the set of a contact that has pulled by so much of what it may; of changes, the set
+  // that holds no change, too.
   HalfLine after(Real pulled) const { return HalfLine(std::min(Real(0), least_ + pulled)); }
 
   // Returns the set of the same impulses in another unit and precision.
@@ -89,9 +89,8 @@ template <typename Real> class HalfLine {
                                                             Vector &nearest)
   { nearest = free > idle ? free : idle; }
   template <typename Vector>
-  static inline __attribute__((always_inline)) void find_open(const Vector &impulse,
-                                                              const Vector &idle,
-                                                              const Vector &gap, Vector &open)
+  static inline __attribute__((always_inline)) void
+  find_open(const Vector &impulse, const Vector &idle, const Vector &gap, Vector &open)
   { open = impulse > idle ? gap : -gap; }
 
  private:

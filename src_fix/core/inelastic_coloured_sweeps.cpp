@@ -105,8 +105,7 @@ End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Gro
   return End::GO_ON;
 }
 
-template <typename Group>
-End ColouredSweeps::search(PackedSweeps<Group> &sweeps, Solve &solve)
+template <typename Group> End ColouredSweeps::search(PackedSweeps<Group> &sweeps, Solve &solve)
 {
   const SolverLimits &limits = solve.limits;
   double refused = sweeps.prepare(solve.start(), solve.idle_gap(), solve.host) ? 0.0 : 1.0;

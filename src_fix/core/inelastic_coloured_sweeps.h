@@ -1,6 +1,6 @@
 // This search makes Gauss-Seidel sweeps on the dual problem of inelastic_contact_problem.h, each
-// constraint after the other, with momentum and adaptive restart (inelastic_momentum.h). In impulses
-// scaled by the root of the diagonal of A, sweep k starts from
+// constraint after the other, with momentum and adaptive restart (inelastic_momentum.h). In
+// impulses scaled by the root of the diagonal of A, sweep k starts from
 //
 //   led_k = x_k + along_k (x_k - x_k-1)
 //

@@ -1,5 +1,5 @@
-// Colours of constraints: those of one colour have no mover in common, so that they can be worked on
-// together. (A mover is a particle that turns with nothing, or a body.)
+// Colours of constraints: those of one colour have no mover in common, so that they can be worked
+// on together. (A mover is a particle that turns with nothing, or a body.)
 
 #pragma once
 

@@ -1,6 +1,7 @@
 #include "inelastic_contact_targets.h"
 
 #include "inelastic_solver_limits.h"
+#include "inelastic_target_formula.h"
 #include "inelastic_vector3.h"
 
 #include <algorithm>
@@ -117,12 +118,13 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double by_velocity =
         part_[c] * std::min(of_slot[contacts.first[c]], of_slot[contacts.second[c]]);
-    const double resolved = resolved_[c] = std::max(least_[c], by_velocity);
-    const double target = std::min(limits.tolerance, resolved);
+    double target;
+    find_free_target(by_velocity, least_[c], resolved_[c]);
+    bound_target(resolved_[c], limits.tolerance, target);
     const Residual residual = contacts.residual(c, gap.data());
     const double left = counts == Counts::ALL ? residual.largest() : residual.feasibility;
     maxima[0] = std::max(maxima[0], left / target);
-    maxima[2] = std::max(maxima[2], part_[c] * left / resolved);
+    maxima[2] = std::max(maxima[2], part_[c] * left / resolved_[c]);
     if (contacts.is_loaded(c) || gap[c] < NEAR * limits.tolerance)
       maxima[1] = std::max(maxima[1], target);
   }

@@ -1,5 +1,5 @@
-// When sweeps are interrupted: the residual, which takes half a sweep, is looked at only when it may
-// be within its targets, and what is idle, or drifts by round-off, now and then.
+// When sweeps are interrupted: the residual, which takes half a sweep, is looked at only when it
+// may be within its targets, and what is idle, or drifts by round-off, now and then.
 
 #pragma once
 
@@ -15,8 +15,7 @@ class Looks {
   explicit Looks(long sweeps) : next_(sweeps + 1) {}
 
   // `of_target` is that of swept::Swept.
-  bool is_time(long sweep, double of_target) const
-  { return sweep >= next_ && of_target <= hint_; }
+  bool is_time(long sweep, double of_target) const { return sweep >= next_ && of_target <= hint_; }
 
   // Takes what a look has found.
   void see(long sweep, double of_target, double unsolved)

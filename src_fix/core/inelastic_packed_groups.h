@@ -12,8 +12,7 @@
 
 namespace inelastic {
 
-template <typename Group>
-constexpr bool HAS_BODIES = std::is_same_v<Group, swept::BodyGroup>;
+template <typename Group> constexpr bool HAS_BODIES = std::is_same_v<Group, swept::BodyGroup>;
 
 template <typename Group> class PackedGroups {
  public:
@@ -37,8 +36,8 @@ template <typename Group> class PackedGroups {
   swept::Rest &rest_of(std::size_t place) { return rest[place / WIDTH]; }
   const swept::Rest &rest_of(std::size_t place) const { return rest[place / WIDTH]; }
 
-  // Adds groups for constraints with these colours, in which those of the last colour have one each.
-  // Returns the place of each constraint.
+  // Adds groups for constraints with these colours, in which those of the last colour have one
+  // each. Returns the place of each constraint.
   std::vector<std::size_t> add(const ConstraintColours &colours);
   // Makes the number of lanes the least that is enough for so many; more ones are empty.
   void resize_for(std::size_t lanes);

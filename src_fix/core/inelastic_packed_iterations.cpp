@@ -67,9 +67,10 @@ packed::Passed PackedIterations<Real>::advance(const Weights &weights, double st
   packed::Passed passed = packed::advance_impulses(packed::Pass<Real, HalfLine>{
       working_.size(), working_.ends.data(), working_.normal.data(), working_.diagonal.data(),
       working_.compliance.data(), working_.set.data(), working_.inverse_target.data(),
-      movers_.velocity().data(), unbound_.data(), change_before_.data(), gap_before_.data(), movers_.sum(),
-      static_cast<Real>(step), static_cast<Real>(step_before_), static_cast<Real>(weights.along),
-      static_cast<Real>(weights.beyond), static_cast<Real>(weights.back), static_cast<Real>(blur)});
+      movers_.velocity().data(), unbound_.data(), change_before_.data(), gap_before_.data(),
+      movers_.sum(), static_cast<Real>(step), static_cast<Real>(step_before_),
+      static_cast<Real>(weights.along), static_cast<Real>(weights.beyond),
+      static_cast<Real>(weights.back), static_cast<Real>(blur)});
   step_before_ = step;
   // Where gaps change by no more than round-off, squares of the changes tell nothing.
   const double round_off = ROUND_OFFS * std::numeric_limits<Real>::epsilon() * passed.farthest;

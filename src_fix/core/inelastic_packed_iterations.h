@@ -26,8 +26,8 @@ namespace inelastic {
 
 template <typename Real> class PackedIterations {
  public:
-  // Packs a problem, whose impulses are the start. Constraints without an impulse whose gap is above
-  // `idle_gap` [length] are idle.
+  // Packs a problem, whose impulses are the start. Constraints without an impulse whose gap is
+  // above `idle_gap` [length] are idle.
   void prepare(const Start &start, double idle_gap);
 
   // Changes of velocity, and with them the targets, move most in the first iterations of a search.
@@ -99,7 +99,7 @@ template <typename Real> class PackedIterations {
   double inverse_diagonals_ = 0.0;               // their sum over all constraints
   std::vector<Vector> looked_;                   // gaps of the idle ones, four in each
   int looks_ = 0;                                // since the start of the search
-  Real idle_gap_ = 0;    // above it a constraint without an impulse is idle
+  Real idle_gap_ = 0;                            // above it a constraint without an impulse is idle
 };
 
 }    // namespace inelastic

@@ -30,9 +30,8 @@ template <typename Real> struct alignas(4 * sizeof(Real)) Vector {
 template <typename Real>
 void set_lanes(Vector<Real> &vector, double x, double y, double z, double fourth)
 {
-  vector.lanes =
-      typename Vector<Real>::Lanes{static_cast<Real>(x), static_cast<Real>(y),
-                                   static_cast<Real>(z), static_cast<Real>(fourth)};
+  vector.lanes = typename Vector<Real>::Lanes{static_cast<Real>(x), static_cast<Real>(y),
+                                              static_cast<Real>(z), static_cast<Real>(fourth)};
 }
 
 // The place of a slot's vector in an array, in bytes, and the slot at a place.

@@ -99,15 +99,14 @@ void PackedMovers<Real>::pack_bodies(const RigidBodies &bodies, double mobility_
 
 // Returns false if the body is no rod.
 template <typename Real>
-bool PackedMovers<Real>::pack_rod(const RigidBodies &bodies, std::size_t b,
-                                      double mobility_unit)
+bool PackedMovers<Real>::pack_rod(const RigidBodies &bodies, std::size_t b, double mobility_unit)
 {
   RodShape shape;
   if (!is_rod<Real>(bodies, b, shape)) return false;
   packed::Rod<Real> rod;
   const double root = std::sqrt(shape.across * mobility_unit);
   packed::set_lanes(rod.axis, shape.axis[0], shape.axis[1], shape.axis[2],
-            bodies.inverse_mass[b] * mobility_unit);
+                    bodies.inverse_mass[b] * mobility_unit);
   for (int k = 0; k < 2; ++k) {
     rod.arm[k] = static_cast<Real>(shape.arm[k] * root);
     rod.particle[k] = packed::place<Real>(bodies.member[bodies.start[b] + k]);
@@ -118,8 +117,7 @@ bool PackedMovers<Real>::pack_rod(const RigidBodies &bodies, std::size_t b,
 
 // The arms of a body are in units of their own, a power of two near the largest of them.
 template <typename Real>
-void PackedMovers<Real>::pack_body(const RigidBodies &bodies, std::size_t b,
-                                       double mobility_unit)
+void PackedMovers<Real>::pack_body(const RigidBodies &bodies, std::size_t b, double mobility_unit)
 {
   packed::Body<Real> body;
   body.first = bodies.start[b];
@@ -135,7 +133,7 @@ void PackedMovers<Real>::pack_body(const RigidBodies &bodies, std::size_t b,
   const int columns[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
   for (int d = 0; d < 3; ++d)
     packed::set_lanes(body.inverse_inertia[d], a[columns[d][0]] * inertia_unit,
-              a[columns[d][1]] * inertia_unit, a[columns[d][2]] * inertia_unit, 0.0);
+                      a[columns[d][1]] * inertia_unit, a[columns[d][2]] * inertia_unit, 0.0);
   for (int k = body.first; k < body.end; ++k) {
     packed::Member<Real> &member = members_[k];
     const double *const arm = &bodies.arm[3 * k];

@@ -23,8 +23,8 @@ template <typename Real> class PackedMovers {
   Vector *sum() { return sum_.data(); }
   const std::vector<Vector> &velocity() const { return velocity_; }
 
-  // Computes the changes of velocity by the sums. Collective. The host must know which ghosts are in
-  // constraints (Host::choose_ghosts).
+  // Computes the changes of velocity by the sums. Collective. The host must know which ghosts are
+  // in constraints (Host::choose_ghosts).
   void move(Host &host);
 
  private:

@@ -296,9 +296,8 @@ template <typename Group>
 float PackedSweeps<Group>::look_at(const Packed &packed, std::vector<Unloaded> &unloaded)
 {
   looked_.resize(packed.groups.size());
-  const float residual =
-      swept::look(packed.groups, packed.rest.data(), packed.springs(), states_.data(),
-                  looked_.data());
+  const float residual = swept::look(packed.groups, packed.rest.data(), packed.springs(),
+                                     states_.data(), looked_.data());
   for (std::size_t g = 0; g < packed.groups.size(); ++g)
     for (unsigned lanes = looked_[g].unloaded; lanes != 0; lanes &= lanes - 1) {
       const std::size_t place = g * WIDTH + __builtin_ctz(lanes);

@@ -2,8 +2,8 @@
 // class packs a problem, sweeps, and unpacks impulses.
 //
 // Constraints are coloured in the order of the problem (inelastic_constraint_colours.h), those at
-// cuts between ranks (inelastic_shared_movers.h) and all others apart. Each rank sweeps over its own
-// constraints.
+// cuts between ranks (inelastic_shared_movers.h) and all others apart. Each rank sweeps over its
+// own constraints.
 //
 // The unknown is the change of the impulses since the start of the search, as in
 // inelastic_packed_iterations.h; so are working and idle constraints.
@@ -25,9 +25,9 @@ namespace inelastic {
 
 template <typename Group> class PackedSweeps {
  public:
-  // Packs a problem, whose impulses are the start. Constraints without an impulse whose gap is above
-  // `idle_gap` [length] are idle. Returns false where so many constraints have one mover in common
-  // that groups would be mostly empty. Collective; what is returned is this rank's answer.
+  // Packs a problem, whose impulses are the start. Constraints without an impulse whose gap is
+  // above `idle_gap` [length] are idle. Returns false where so many constraints have one mover in
+  // common that groups would be mostly empty. Collective; what is returned is this rank's answer.
   bool prepare(const Start &start, double idle_gap, Host &host);
 
   // Begins another search from the impulses of the last one, which are those of the problem now, as
@@ -44,8 +44,7 @@ template <typename Group> class PackedSweeps {
   double unsolved(double blur) const
   {
     const auto by = static_cast<float>(blur);
-    return std::max(find_unsolved(at_cuts_, by),
-                    find_unsolved(inside_, by));
+    return std::max(find_unsolved(at_cuts_, by), find_unsolved(inside_, by));
   }
 
   // Computes the states from the impulses: sums of many changes drift in single precision.

@@ -9,6 +9,7 @@
 
 #include "inelastic_packed_kernels.h"
 #include "inelastic_start.h"
+#include "inelastic_target_formula.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -33,10 +34,18 @@ template <typename Real> class PackedTargets {
   // Returns the target of a constraint between two slots. `least` and `part` are those of
   // ContactTargets, in packed units.
   Real target(std::size_t first, std::size_t second, Real least, Real part) const
-  { return std::min(most_, free_target(first, second, least, part)); }
+  {
+    Real bounded;
+    bound_target(free_target(first, second, least, part), most_, bounded);
+    return bounded;
+  }
   // Returns the same without the bound by the tolerance.
   Real free_target(std::size_t first, std::size_t second, Real least, Real part) const
-  { return std::max(least, part * std::min(changed_[first], changed_[second])); }
+  {
+    Real free;
+    find_free_target(part * std::min(changed_[first], changed_[second]), least, free);
+    return free;
+  }
 
   // Keeps velocities; the last two that were kept can be compared with.
   void keep(const std::vector<Vector> &velocity);

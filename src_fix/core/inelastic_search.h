@@ -1,5 +1,5 @@
-// A search for the impulses of a problem: one way to look for them, from wherever the one before has
-// come to. A chain of searches is a solver (inelastic_search_chain.h).
+// A search for the impulses of a problem: one way to look for them, from wherever the one before
+// has come to. A chain of searches is a solver (inelastic_search_chain.h).
 
 #pragma once
 

@@ -27,11 +27,16 @@ Status SearchChain::run(Solve &solve, bool single_precision)
     }
   }
   switch (end) {
-    case End::SOLVED: return Status::CONVERGED;
-    case End::INFEASIBLE: return Status::INFEASIBLE;
-    case End::NOT_FINITE: return Status::NOT_FINITE;
-    case End::ROUND_OFF: return Status::ROUND_OFF;
-    case End::GO_ON: break;
+    case End::SOLVED:
+      return Status::CONVERGED;
+    case End::INFEASIBLE:
+      return Status::INFEASIBLE;
+    case End::NOT_FINITE:
+      return Status::NOT_FINITE;
+    case End::ROUND_OFF:
+      return Status::ROUND_OFF;
+    case End::GO_ON:
+      break;
   }
   return Status::OUT_OF_ITERATIONS;
 }

@@ -46,13 +46,12 @@ class Solve {
   // at most its target. Collective.
   bool judge();
 
-  // Sets the targets of impulses whose gaps are known. Returns the largest residual as a part of its
-  // target. Collective.
+  // Sets the targets of impulses whose gaps are known. Returns the largest residual as a part of
+  // its target. Collective.
   double set_targets();
 
   // Sets the gaps of the impulses. Collective.
-  void find_gaps()
-  { kept_.gap_operator.apply(problem, impulse().data(), kept_.gap.data(), host); }
+  void find_gaps() { kept_.gap_operator.apply(problem, impulse().data(), kept_.gap.data(), host); }
 
   // Chooses the ghosts that are in constraints of this rank, and all members of a body of which one
   // is, if no search has done so. Most ghosts are in none. Collective.
@@ -70,8 +69,7 @@ class Solve {
   bool solve_slow_modes();
 
   // Tells whether the residual has not come down for so long that it is worth to look why.
-  bool is_on_plateau() const
-  { return plateau.lasts(result.iterations, Network::LEAST_ON_PLATEAU); }
+  bool is_on_plateau() const { return plateau.lasts(result.iterations, Network::LEAST_ON_PLATEAU); }
 
   // Returns after how many iterations without progress a search ends. Collective.
   long most_on_plateau() { return find_network(problem, host).most_on_plateau(); }

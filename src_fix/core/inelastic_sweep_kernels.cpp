@@ -1,6 +1,7 @@
 #include "inelastic_sweep_kernels.h"
 
 #include "inelastic_admissible_set.h"
+#include "inelastic_target_formula.h"
 #include "inelastic_vectorise.h"
 
 #include <algorithm>
@@ -247,8 +248,7 @@ namespace {
   template <typename Size, bool SPRINGS, typename Group>
   INELASTIC_INLINE void find_gap(const Group &group, const Rest *springs, int from,
                                  const typename Size::Numbers &impulse,
-                                 const typename Size::Numbers &opened,
-                                 typename Size::Numbers &gap)
+                                 const typename Size::Numbers &opened, typename Size::Numbers &gap)
   {
     if constexpr (SPRINGS)
       gap = part<Size>(group.gap, from) + part<Size>(springs->give, from) * impulse + opened;
@@ -362,9 +362,10 @@ namespace {
           less[k] = std::min(changed[rest[g].first[from + k]], changed[rest[g].second[from + k]]);
         const V &least = part<Size>(rest[g].least_target, from);
         const V by_velocity = part<Size>(rest[g].part, from) * less;
-        const V free = by_velocity > least ? by_velocity : least;
-        part<Size>(groups[g].inverse_target, from) =
-            part<Size>(rest[g].root, from) / (free < bound ? free : bound);
+        V free, target;
+        find_free_target(by_velocity, least, free);
+        bound_target(free, bound, target);
+        part<Size>(groups[g].inverse_target, from) = part<Size>(rest[g].root, from) / target;
       }
   }
 
@@ -418,18 +419,17 @@ namespace {
   }
 
   // The passes over groups of each kind, by vectors of eight and of four numbers.
-#define INELASTIC_PASSES(GROUP, SPRINGS)                                                       \
-  INELASTIC_CLONES void wide_sweep(std::bool_constant<SPRINGS>, GROUP *groups,                 \
-                                   const Rest *springs, std::size_t count,                     \
-                                   GROUP::State *states, float along, float blur, Swept &swept) \
-  { sweep_all<Wide, SPRINGS>(groups, springs, count, states, along, blur, swept); }            \
-  INELASTIC_CLONES double wide_unsolved(std::bool_constant<SPRINGS>,                           \
-                                        const std::vector<GROUP> &groups, const Rest *springs, \
-                                        const GROUP::State *states, float blur)                \
-  { return unsolved_of_all<Wide, SPRINGS>(groups, springs, states, blur); }                    \
-  INELASTIC_CLONES float wide_look(std::bool_constant<SPRINGS>,                                \
-                                   const std::vector<GROUP> &groups, const Rest *rest,         \
-                                   const GROUP::State *states, Looked *looked)                 \
+#define INELASTIC_PASSES(GROUP, SPRINGS)                                                          \
+  INELASTIC_CLONES void wide_sweep(std::bool_constant<SPRINGS>, GROUP *groups,                    \
+                                   const Rest *springs, std::size_t count, GROUP::State *states,  \
+                                   float along, float blur, Swept &swept)                         \
+  { sweep_all<Wide, SPRINGS>(groups, springs, count, states, along, blur, swept); }               \
+  INELASTIC_CLONES double wide_unsolved(std::bool_constant<SPRINGS>,                              \
+                                        const std::vector<GROUP> &groups, const Rest *springs,    \
+                                        const GROUP::State *states, float blur)                   \
+  { return unsolved_of_all<Wide, SPRINGS>(groups, springs, states, blur); }                       \
+  INELASTIC_CLONES float wide_look(std::bool_constant<SPRINGS>, const std::vector<GROUP> &groups, \
+                                   const Rest *rest, const GROUP::State *states, Looked *looked)  \
   { return look_at_all<Wide, SPRINGS>(groups, rest, states, looked); }
 
   INELASTIC_PASSES(ParticleGroup, false)
@@ -437,12 +437,12 @@ namespace {
   INELASTIC_PASSES(BodyGroup, false)
   INELASTIC_PASSES(BodyGroup, true)
 
-#define INELASTIC_OTHER_PASSES(GROUP)                                                      \
-  INELASTIC_CLONES void wide_targets(GROUP *groups, const Rest *rest, std::size_t count,   \
-                                     const float *changed, float most)                     \
-  { set_all_targets<Wide>(groups, rest, count, changed, most); }                           \
-  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,              \
-                                 GROUP::State *states)                                     \
+#define INELASTIC_OTHER_PASSES(GROUP)                                                    \
+  INELASTIC_CLONES void wide_targets(GROUP *groups, const Rest *rest, std::size_t count, \
+                                     const float *changed, float most)                   \
+  { set_all_targets<Wide>(groups, rest, count, changed, most); }                         \
+  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,            \
+                                 GROUP::State *states)                                   \
   { add_all<Wide>(groups, when, states); }
 
   INELASTIC_OTHER_PASSES(ParticleGroup)
@@ -476,34 +476,34 @@ namespace {
 
 }    // namespace
 
-#define INELASTIC_CHOICES(GROUP)                                                                 \
-  void sweep(GROUP *groups, const Rest *springs, std::size_t count, GROUP::State *states,        \
-             float along, float blur, Swept &swept)                                              \
-  {                                                                                              \
-    if (springs)                                                                                 \
-      sweep(std::true_type{}, groups, springs, count, states, along, blur, swept);               \
-    else                                                                                         \
-      sweep(std::false_type{}, groups, springs, count, states, along, blur, swept);              \
-  }                                                                                              \
-  double find_unsolved(const std::vector<GROUP> &groups, const Rest *springs,                    \
-                       const GROUP::State *states, float blur)                                   \
-  {                                                                                              \
-    return springs ? find_unsolved(std::true_type{}, groups, springs, states, blur)              \
-                   : find_unsolved(std::false_type{}, groups, springs, states, blur);            \
-  }                                                                                              \
-  float look(const std::vector<GROUP> &groups, const Rest *rest, const Rest *springs,            \
-             const GROUP::State *states, Looked *looked)                                         \
-  {                                                                                              \
-    return springs ? look(std::true_type{}, groups, rest, states, looked)                        \
-                   : look(std::false_type{}, groups, rest, states, looked);                      \
-  }                                                                                              \
-  void set_targets(GROUP *groups, const Rest *rest, std::size_t count, const float *changed,     \
-                   float most)                                                                   \
-  {                                                                                              \
-    is_wide() ? wide_targets(groups, rest, count, changed, most)                                 \
-              : set_all_targets<Narrow>(groups, rest, count, changed, most);                     \
-  }                                                                                              \
-  void add_impulses(const std::vector<GROUP> &groups, When when, GROUP::State *states)           \
+#define INELASTIC_CHOICES(GROUP)                                                             \
+  void sweep(GROUP *groups, const Rest *springs, std::size_t count, GROUP::State *states,    \
+             float along, float blur, Swept &swept)                                          \
+  {                                                                                          \
+    if (springs)                                                                             \
+      sweep(std::true_type{}, groups, springs, count, states, along, blur, swept);           \
+    else                                                                                     \
+      sweep(std::false_type{}, groups, springs, count, states, along, blur, swept);          \
+  }                                                                                          \
+  double find_unsolved(const std::vector<GROUP> &groups, const Rest *springs,                \
+                       const GROUP::State *states, float blur)                               \
+  {                                                                                          \
+    return springs ? find_unsolved(std::true_type{}, groups, springs, states, blur)          \
+                   : find_unsolved(std::false_type{}, groups, springs, states, blur);        \
+  }                                                                                          \
+  float look(const std::vector<GROUP> &groups, const Rest *rest, const Rest *springs,        \
+             const GROUP::State *states, Looked *looked)                                     \
+  {                                                                                          \
+    return springs ? look(std::true_type{}, groups, rest, states, looked)                    \
+                   : look(std::false_type{}, groups, rest, states, looked);                  \
+  }                                                                                          \
+  void set_targets(GROUP *groups, const Rest *rest, std::size_t count, const float *changed, \
+                   float most)                                                               \
+  {                                                                                          \
+    is_wide() ? wide_targets(groups, rest, count, changed, most)                             \
+              : set_all_targets<Narrow>(groups, rest, count, changed, most);                 \
+  }                                                                                          \
+  void add_impulses(const std::vector<GROUP> &groups, When when, GROUP::State *states)       \
   { is_wide() ? wide_add(groups, when, states) : add_all<Narrow>(groups, when, states); }
 
 INELASTIC_CHOICES(ParticleGroup)

@@ -128,7 +128,7 @@ long Constraints::add_violated()
 void Constraints::adapt_margin(double reach)
 {
   constexpr double MORE = 1.1, FEWER = 0.95;
-  const double least = 4.0 * step_.settings.tolerance;
+  const double least = step_.eps(in_eps::MARGIN);
   is_start_ = is_start_ && step_.bad_start;
   margin_ *= came_back_ ? MORE : FEWER;
   margin_ = std::clamp(margin_, least, std::max(least, reach));

@@ -55,7 +55,7 @@ double EnergyWatch::fastest_given_back()
     if (contact.asked.parts) maxima[1] = 1.0;
   ranks_.reduce(nullptr, 0, maxima, 2);
   parts_ = parts_ || maxima[1] > 0.0;
-  return std::min(maxima[0], REGULAR_OVERLAP * step_.settings.tolerance / step_.regular_timestep);
+  return std::min(maxima[0], step_.eps(in_eps::REGULAR) / step_.regular_timestep);
 }
 
 // Adds up masses, and what contacts do, cluster by cluster. Collective.

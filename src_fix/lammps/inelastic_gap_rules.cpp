@@ -10,14 +10,13 @@ using namespace Inelastic_NS;
 
 namespace {
 
-// In tolerances: a smaller overlap at the end of the step changes no constraint.
-constexpr double RELINEARISE_BEYOND = 1.0;
-// In tolerances: a contact is closed, whatever its exact gap, within this distance from touching.
-constexpr double CLOSED = 0.5;
-// Beyond that a contact closes in a step by at most this part of what it has to stop.
+using in_eps::ALLOWED;
+using in_eps::CLOSED;
+using in_eps::LEFT;
+using in_eps::REGULAR;
+
+// A gap beyond CLOSED closes in a step by at most this part of what the contact has to stop.
 constexpr double CLOSING = 0.01;
-// In tolerances: what a pair of free spheres that would end too deep is first asked to leave.
-constexpr double LEFT = 0.75;
 
 }    // namespace
 
@@ -69,7 +68,7 @@ double GapRules::closed_gap(const Contact &contact, double last, double most_clo
   const double tolerance = step_.settings.tolerance;
   const double gap = std::max(0.0, contact.gap_now);
   if (contact.force > 0.0 && gap <= tolerance)
-    return gap - std::clamp(gap - CLOSED * tolerance, 0.0, most_closing);
+    return gap - std::clamp(gap - step_.eps(CLOSED), 0.0, most_closing);
   // The tolerance may have been lowered.
   const bool parted = last == Contact::NOT_CLOSED || last > tolerance || gap > last + tolerance;
   return parted ? Contact::NOT_CLOSED : std::min(gap, last);
@@ -90,13 +89,12 @@ double GapRules::contact_gap(const Contact &contact) const
 // once: with the next step's it could become a bad start.
 double GapRules::given_back(const Contact &contact) const
 {
-  constexpr double FULL = 0.8;    // tolerances
-  const double tolerance = step_.settings.tolerance;
-  const double beyond = -contact.gap_now - CLOSED * tolerance;
+  const double beyond = -contact.gap_now - step_.eps(CLOSED);
   if (beyond <= 0.0 || step_.keeps_overlaps) return 0.0;
-  const double x = beyond / ((FULL - CLOSED) * tolerance);
+  const double x = beyond / step_.eps(in_eps::WHOLE - CLOSED);
   const double softly = step_.settings.accuracy * contact.to_stop * x * std::max(1.0, x * x);
-  return std::min({beyond, std::max(softly, -contact.gap_now - tolerance), most_given_back()});
+  return std::min(
+      {beyond, std::max(softly, -contact.gap_now - step_.eps(ALLOWED)), most_given_back()});
 }
 
 // Returns the most of an overlap that is given back in the step [length]: at a speed that does not
@@ -104,8 +102,7 @@ double GapRules::given_back(const Contact &contact) const
 double GapRules::most_given_back() const
 {
   if (step_.keeps_overlaps) return 0.0;
-  return REGULAR_OVERLAP * step_.settings.tolerance * step_.problem.timestep /
-      step_.regular_timestep;
+  return step_.eps(REGULAR) * step_.problem.timestep / step_.regular_timestep;
 }
 
 // Returns the gap that is wanted at the end of the step [length], or where it gives back more of an
@@ -118,7 +115,7 @@ double GapRules::limited(const Contact &contact, double wanted) const
 double GapRules::held_gap(const Contact &contact) const
 {
   if (contact.gap_now <= 0.0) return -given_back(contact);
-  const double open = std::max(0.0, contact.gap_now - CLOSED * step_.settings.tolerance);
+  const double open = std::max(0.0, contact.gap_now - step_.eps(CLOSED));
   return std::min(open, most_closed(contact));
 }
 
@@ -142,29 +139,25 @@ double GapRules::effective_gap(const Contact &contact) const
     return contact.asked.parts ? std::min(closed, parted) : closed;
   }
   const double limit = PUSH_LIMIT * contact.size * step_.problem.timestep / step_.regular_timestep;
-  return std::max(gap, -std::max(limit, REGULAR_OVERLAP * step_.settings.tolerance));
+  return std::max(gap, -std::max(limit, step_.eps(REGULAR)));
 }
 
 double GapRules::wanted_gap(const Contact &contact) const
 {
-  constexpr double MOST_LEFT = 0.5;    // tolerances
   const double wanted = contact.gap_now - effective_gap(contact);
-  return overlaps_.is_bad(contact.gap_now)
-      ? wanted
-      : limited(contact, std::max(wanted, -MOST_LEFT * step_.settings.tolerance));
+  return overlaps_.is_bad(contact.gap_now) ? wanted
+                                           : limited(contact, std::max(wanted, -step_.eps(CLOSED)));
 }
 
 bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
 {
-  const double tolerance = step_.settings.tolerance;
   const bool bad = overlaps_.is_bad(contact.gap_now);
   // Where bad overlaps give way to one another one may become as deep as the deepest.
   const bool gives_way = bad && step_.gives_way;
   const double allowed = gives_way ? -step_.largest_overlap : bad ? contact.gap_now : 0.0;
-  step_.excess = std::max(step_.excess, allowed - gap_at_end - REGULAR_OVERLAP * tolerance);
+  step_.excess = std::max(step_.excess, allowed - gap_at_end - step_.eps(REGULAR));
   const double wanted = gives_way ? allowed : bad ? wanted_gap(contact) : 0.0;
-  const double deepest_kept = deepest(contact, RELINEARISE_BEYOND * tolerance);
-  return wanted - gap_at_end > std::min(deepest_kept, REGULAR_OVERLAP * tolerance);
+  return wanted - gap_at_end > std::min(deepest(contact, step_.eps(ALLOWED)), step_.eps(REGULAR));
 }
 
 double GapRules::closed_by_turning(std::size_t c) const
@@ -174,8 +167,7 @@ double GapRules::closed_by_turning(std::size_t c) const
   const double gap = step_.problem.contacts.gap[c];
   const double linear_gap = contact.gap_now - row.wall_motion;
   // The gaps of free spheres that keep_within_tolerance() changes ask for overlaps alone.
-  if (row.as_at_start || gap == linear_gap || gap == linear_gap + LEFT * step_.settings.tolerance)
-    return 0.0;
+  if (row.as_at_start || gap == linear_gap || gap == linear_gap + step_.eps(LEFT)) return 0.0;
   return std::max(0.0, linear_gap - wanted_gap(contact) - gap);
 }
 
@@ -193,16 +185,15 @@ double GapRules::deepest(const Contact &contact, double allowed) const
 long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
-  const double tolerance = step_.settings.tolerance;
   // Once a constraint has to change, later ones that are near the tolerance change with it: in a
   // chain each would otherwise need a round of its own.
-  double allowed = tolerance;
+  double allowed = step_.eps(ALLOWED);
   long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     Row &row = step_.rows[c];
     const Contact &contact = step_.contact_of(c);
     const double linear_gap = contact.gap_now - row.wall_motion;
-    const double lessened = linear_gap + LEFT * tolerance;
+    const double lessened = linear_gap + step_.eps(LEFT);
     // Gaps that were set by the end of the step are kept there by follow().
     if (!row.as_at_start && contacts.gap[c] != lessened) continue;
     if (contacts.gap[c] == linear_gap || overlaps_.is_bad(contact.gap_now)) continue;
@@ -215,7 +206,7 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     if (stays && (at_end <= allowed || may_be_open)) continue;
     // Surfaces that part are asked for no less than that.
     if (contact.asked.parts && contacts.gap[c] <= linear_gap) continue;
-    allowed = LEFT * tolerance;
+    allowed = step_.eps(LEFT);
     if (contacts.impulse[c] > 0.0) contacts.set[c] = {};
     const bool first_time = row.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
     contacts.gap[c] = first_time ? lessened : linear_gap;
@@ -236,7 +227,7 @@ long GapRules::hold(std::size_t c, double gap_at_end, double opening, double alo
     gap = std::min(gap, contact.gap_now - row.wall_motion);
     if (step_.relinearisations > MAX_RELINEARISATIONS) return 0;
   } else {
-    if (gap_at_end <= RELINEARISE_BEYOND * tolerance || !step_.holds(c) || along < LEAST_ALONG ||
+    if (gap_at_end <= tolerance || !step_.holds(c) || along < LEAST_ALONG ||
         step_.relinearisations > MAX_RELINEARISATIONS / 2)
       return 0;
     if (contacts.impulse[c] > 0.0) {
@@ -299,8 +290,7 @@ long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
   if (too_deep && gap >= contacts.gap[c] && !overlaps_.is_bad(contact.gap_now))
     gap = std::min(gap, exact_gap + std::min(wanted_gap(contact), 0.0));
   if (!too_deep) {
-    const bool worth_it = contacts.impulse[c] > 0.0 &&
-        gap - contacts.gap[c] > RELINEARISE_BEYOND * step_.settings.tolerance &&
+    const bool worth_it = contacts.impulse[c] > 0.0 && gap - contacts.gap[c] > step_.eps(ALLOWED) &&
         step_.relinearisations <= MAX_RELINEARISATIONS / 2;
     if (!worth_it) return 0;
   }

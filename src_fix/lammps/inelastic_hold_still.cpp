@@ -12,9 +12,9 @@ using namespace Inelastic_NS;
 
 namespace {
 
-// The moving particles were solved for already: only where they would end deeper by so many
-// tolerances, because others are at rest, do their velocities change.
-constexpr double DEEPER = 0.1;
+// The moving particles were solved for already: only where they would end deeper than this, because
+// others are at rest, do their velocities change.
+using in_eps::ADDED_BESIDE_REST;
 // Where more iterations would be needed, moving particles have no room beside those at rest:
 // nothing is stopped in the step.
 constexpr long MOST_ITERATIONS = 300;
@@ -85,8 +85,7 @@ bool HoldStill::has_room(const Held &held) const
       opening +=
           contacts.normal[3 * c + d] * (step_.velocity[3 * i + d] - step_.velocity[3 * j + d]);
     const double closing = -step_.problem.timestep * opening;
-    if (closing > 0.0 && closing - contacts.gap[c] > DEEPER * step_.settings.tolerance)
-      return false;
+    if (closing > 0.0 && closing - contacts.gap[c] > step_.eps(ADDED_BESIDE_REST)) return false;
   }
   return true;
 }
@@ -145,7 +144,7 @@ inelastic::SolverResult HoldStill::project(const Held &held)
       }
     }
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
-        (1.0 - DEEPER) * step_.settings.tolerance;
+        step_.eps(in_eps::ALLOWED - ADDED_BESIDE_REST);
     contacts.add_of(problem.contacts, c);
     contacts.gap.back() = std::min(problem.contacts.gap[c] + problem.timestep * along, ends_within);
     // With the step's own impulse the contact still pushes, or pulls by no more than it may.
@@ -154,7 +153,7 @@ inelastic::SolverResult HoldStill::project(const Held &held)
     source.push_back(c);
   }
   inelastic::SolverLimits limits;
-  limits.tolerance = DEEPER * step_.settings.tolerance;
+  limits.tolerance = step_.eps(ADDED_BESIDE_REST);
   limits.max_iterations = std::min(MOST_ITERATIONS, step_.settings.max_iterations);
   const inelastic::SolverResult result = solver_->solve(moving_, limits, ranks_);
   if (result.status != inelastic::Status::CONVERGED) return result;

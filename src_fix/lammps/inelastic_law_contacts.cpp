@@ -148,7 +148,7 @@ bool LawContacts::is_pushed_apart(std::size_t c) const
                                      problem.contacts.second[c], &problem.contacts.normal[3 * c]);
   const double gap =
       step_.contact_of(c).gap_now - step_.rows[c].wall_motion + problem.timestep * speed;
-  return gap > REGULAR_OVERLAP * step_.settings.tolerance;
+  return gap > step_.eps(in_eps::REGULAR);
 }
 
 // Both atoms of a contact remember it: a partner that remembers nothing is another one with the

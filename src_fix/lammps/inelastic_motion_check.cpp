@@ -23,8 +23,8 @@ using inelastic::norm;
 
 namespace {
 
-constexpr double EXPECTED_IN_EPS = 1.0e-7;       // how well the predicted motion must be met ...
-constexpr double EXPECTED_RELATIVE = 1.0e-12;    // ... beside the round-off of what it comes from
+// The round-off of a predicted motion, as a part of what it comes from.
+constexpr double EXPECTED_RELATIVE = 1.0e-12;
 
 }    // namespace
 
@@ -154,7 +154,7 @@ std::string MotionCheck::compare(int i) const
   const double round_off = EXPECTED_RELATIVE *
       (norm(atom->x[i]) + step_.largest_radius + h * (norm(expected_v) + largest_change_)) *
       (movers_.any_turns() ? state_.momenta().round_off_growth(i) : 1.0);
-  const double allowed = (frozen ? 1.0 : EXPECTED_IN_EPS) * step_.settings.tolerance + round_off;
+  const double allowed = step_.eps(frozen ? in_eps::ALLOWED : in_eps::PREDICTED) + round_off;
   const double position_error = norm(off);
   const double velocity_error = frozen ? 0.0 : h * norm(faster);
   if (position_error <= allowed && velocity_error <= allowed) return "";

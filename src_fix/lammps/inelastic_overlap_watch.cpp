@@ -71,9 +71,7 @@ void OverlapWatch::end_step(bool certain, double pushed)
 {
   pushes_in_velocity_ = step_.bad_start || pushed_before_;
   pushed_before_ = step_.bad_start;
-  // In tolerances: the next start knows an overlap by other sums than this end.
-  constexpr double ROUND_OFF = 0.1;
-  left_ = certain ? (REGULAR_OVERLAP + ROUND_OFF) * step_.settings.tolerance +
+  left_ = certain ? step_.eps(in_eps::REGULAR + in_eps::KNOWN_OTHERWISE) +
           (step_.bad_start ? std::max(step_.largest_overlap, pushed) : 0.0) + step_.excess
                   : EXTREME;
 }

@@ -23,7 +23,7 @@ class OverlapWatch : protected Pointers {
   void begin_step();
 
   // A bad start: more than a step may leave behind.
-  bool is_bad(double gap) const { return gap < -REGULAR_OVERLAP * step_.settings.tolerance; }
+  bool is_bad(double gap) const { return gap < -step_.eps(in_eps::REGULAR); }
 
   // Takes the gap [length] of atom i at the start of the step: with another atom (`partner` is its
   // ID) or with a wall (minus the wall's number).

@@ -7,6 +7,7 @@
 #include "inelastic_contact.h"
 #include "inelastic_contact_problem.h"
 #include "inelastic_settings.h"
+#include "inelastic_thresholds.h"
 #include "inelastic_vector3.h"
 
 #include "atom.h"
@@ -27,9 +28,6 @@ enum class Kick { HALF, WHOLE };
 // pushed apart in a second one.
 enum class Phase { CONTACT, PUSH };
 
-// An overlap of up to this many tolerances is regular: a step may leave it behind. A larger one is
-// a bad start.
-constexpr double REGULAR_OVERLAP = 2.0;
 // The largest push out of a bad start in a step of regular length, as a part of the sum of radii.
 constexpr double PUSH_LIMIT = 0.05;
 // Two centres that are nearer to one another than this part of the sum of radii have no normal.
@@ -124,6 +122,9 @@ struct Step : RunState, StepState {
               &StepState::motion_of_bodies);
   }
 
+  // A threshold [length], by its factor of EPS (inelastic_thresholds.h).
+  double eps(double factor) const { return factor * settings.tolerance; }
+
   // The part of a whole kick for which the forces act.
   double kicks() const { return kick == Kick::WHOLE ? 1.0 : 0.5; }
 
@@ -156,7 +157,7 @@ struct Step : RunState, StepState {
     const std::size_t i = 3 * static_cast<std::size_t>(problem.contacts.first[c]);
     const std::size_t j = 3 * static_cast<std::size_t>(problem.contacts.second[c]);
     const double between[3] = {v[i] - v[j], v[i + 1] - v[j + 1], v[i + 2] - v[j + 2]};
-    return (gap < -REGULAR_OVERLAP * settings.tolerance ? 0.0 : gap) - rows[c].wall_motion +
+    return (gap < -eps(in_eps::REGULAR) ? 0.0 : gap) - rows[c].wall_motion +
         problem.timestep * inelastic::dot(&problem.contacts.normal[3 * c], between);
   }
 

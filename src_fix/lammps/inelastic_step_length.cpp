@@ -371,7 +371,7 @@ bool StepLength::accepts(bool solved, const std::string &named, const std::strin
                update->ntimestep, part);
   // What a step that is not solved leaves too deep a shorter one may leave, too. Regular overlaps
   // beside bad ones are kept to within the residual, in steps of any length.
-  const double kept = step_.bad_start ? step_.settings.tolerance : 0.0;
+  const double kept = step_.bad_start ? step_.eps(in_eps::KEPT - in_eps::REGULAR) : 0.0;
   if (part >= 1.0 || (may_shorten && solved && step_.excess > kept)) {
     shorten(0.5, named);
     return false;
