@@ -102,6 +102,10 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
     (r"further than the neighbour list reaches", lambda facts: not facts["shorten"]),
     (r"Bodies spin by up to .* radians in this step", lambda facts: not facts["shorten"]),
     (
+        r"The contact law asks more surfaces to part.* close in, and leave no room",
+        lambda facts: facts["closing"] or not facts["shorten"],
+    ),
+    (
         r"The contact law asks more surfaces to part",
         # A grain that appears where there is no room for it has none in a shorter step either.
         lambda facts: not facts["shorten"] or facts["bad_start"] or "created" in facts["words"],
