@@ -110,30 +110,13 @@ double GapRules::most_given_back() const
 double GapRules::limited(const Contact &contact, double wanted) const
 { return contact.gap_now < 0.0 ? std::min(wanted, contact.gap_now + most_given_back()) : wanted; }
 
-// Does the same for a contact that may pull, which counts as under a force whatever its last one
-// was.
-double GapRules::held_gap(const Contact &contact) const
-{
-  if (contact.gap_now <= 0.0) return -given_back(contact);
-  const double open = std::max(0.0, contact.gap_now - step_.eps(CLOSED));
-  return std::min(open, most_closed(contact));
-}
-
-// Returns the most by which the step may close the gap of a held contact [length]: the accuracy's
-// part of what it has to stop, or as much as the surfaces would part without contacts, which adds
-// nothing to the kinetic energy.
-double GapRules::most_closed(const Contact &contact) const
-{
-  return std::max(step_.settings.accuracy * contact.to_stop,
-                  step_.problem.timestep * contact.predicted_speed);
-}
-
 double GapRules::effective_gap(const Contact &contact) const
 {
   const double gap = contact.gap_now;
   if (step_.phase == Phase::CONTACT) {
     if (overlaps_.is_bad(gap)) return 0.0;
-    if (contact.asked.set.may_pull()) return held_gap(contact);
+    if (contact.asked.set.may_pull())
+      return gap <= 0.0 ? -given_back(contact) : held_.gap(contact);
     const double closed = contact_gap(contact);
     const double parted = -step_.problem.timestep * contact.asked.parting_speed;
     return contact.asked.parts ? std::min(closed, parted) : closed;
@@ -149,14 +132,22 @@ double GapRules::wanted_gap(const Contact &contact) const
                                            : limited(contact, std::max(wanted, -step_.eps(CLOSED)));
 }
 
-bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end)
+// Returns the overlap that a bad one may end with [length], as a gap: one that gives way to others
+// may become as deep as the deepest.
+double GapRules::bad_kept(const Contact &contact) const
+{ return step_.gives_way ? -step_.largest_overlap : contact.gap_now; }
+
+void GapRules::note_end(const Contact &contact, double gap_at_end)
 {
-  const bool bad = overlaps_.is_bad(contact.gap_now);
-  // Where bad overlaps give way to one another one may become as deep as the deepest.
-  const bool gives_way = bad && step_.gives_way;
-  const double allowed = gives_way ? -step_.largest_overlap : bad ? contact.gap_now : 0.0;
+  const double allowed = overlaps_.is_bad(contact.gap_now) ? bad_kept(contact) : 0.0;
   step_.excess = std::max(step_.excess, allowed - gap_at_end - step_.eps(REGULAR));
-  const double wanted = gives_way ? allowed : bad ? wanted_gap(contact) : 0.0;
+}
+
+bool GapRules::ends_too_deep(const Contact &contact, double gap_at_end) const
+{
+  double wanted = 0.0;
+  if (overlaps_.is_bad(contact.gap_now))
+    wanted = step_.gives_way ? bad_kept(contact) : wanted_gap(contact);
   return wanted - gap_at_end > std::min(deepest(contact, step_.eps(ALLOWED)), step_.eps(REGULAR));
 }
 
@@ -214,36 +205,6 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     ++changed;
   }
   return changed;
-}
-
-long GapRules::hold(std::size_t c, double gap_at_end, double opening, double along)
-{
-  const double tolerance = step_.settings.tolerance;
-  inelastic::ContactSet &contacts = step_.problem.contacts;
-  Row &row = step_.rows[c];
-  const Contact &contact = step_.contact_of(c);
-  double gap = gap_at_end - opening;
-  if (gap_at_end < -tolerance) {
-    gap = std::min(gap, contact.gap_now - row.wall_motion);
-    if (step_.relinearisations > MAX_RELINEARISATIONS) return 0;
-  } else {
-    if (gap_at_end <= tolerance || !step_.holds(c) || along < LEAST_ALONG ||
-        step_.relinearisations > MAX_RELINEARISATIONS / 2)
-      return 0;
-    if (contacts.impulse[c] > 0.0) {
-      // Surfaces that approach across a gap need no pull, and no push before they touch.
-      contacts.set[c] = {};
-    } else {
-      gap = std::min(gap, most_closed(contact) - row.wall_motion);
-      if (gap <= contacts.gap[c]) return 0;
-    }
-  }
-  if (contacts.gap[c] == gap) return 0;
-  // The whole way at once, unlike approach(): what is still open after the rounds that may close it
-  // would stay so under a force.
-  contacts.gap[c] = gap;
-  row.as_at_start = false;
-  return 1;
 }
 
 // Changes the gap of constraint c towards `wanted`, for which the present velocity asks. A body may

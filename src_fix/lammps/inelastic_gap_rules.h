@@ -5,6 +5,7 @@
 #define INELASTIC_GAP_RULES_H
 
 #include "inelastic_first_guess.h"
+#include "inelastic_held_contacts.h"
 #include "inelastic_overlap_watch.h"
 #include "inelastic_step.h"
 
@@ -16,14 +17,11 @@ namespace LAMMPS_NS::Inelastic_NS {
 
 class GapRules {
  public:
-  GapRules(Step &step, OverlapWatch &overlaps) : step_(step), overlaps_(overlaps) {}
+  GapRules(Step &step, OverlapWatch &overlaps) : step_(step), held_(step), overlaps_(overlaps) {}
 
-  // Rounds of a step that may change the gaps of constraints. Each one squares the error where a
-  // body turns little; one that turns by a radian takes up to twenty.
-  static constexpr int MAX_RELINEARISATIONS = 40;
-  // The cosine of the angle, 60 degrees, by which a normal may turn in a step for its gap to be
-  // made exact.
-  static constexpr double LEAST_ALONG = 0.5;
+  // As for held contacts (inelastic_held_contacts.h).
+  static constexpr int MAX_RELINEARISATIONS = HeldContacts::MOST_ROUNDS;
+  static constexpr double LEAST_ALONG = HeldContacts::LEAST_ALONG;
 
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Contact &contact) const;
@@ -41,10 +39,13 @@ class GapRules {
   // overlap need not be given back in one step, and but for bad starts by at most half a tolerance.
   double wanted_gap(const Contact &contact) const;
 
-  // Tells whether the end of the step is so deep that the constraint must change. Notes the excess,
-  // too (StepState). A bad overlap may stay as deep as it began without an excess, though its
-  // constraint asks for less: where less is not to be had, the step need not be shorter.
-  bool ends_too_deep(const Contact &contact, double gap_at_end);
+  // Notes the excess that a contact ends the step with (StepState). A bad overlap may stay as deep
+  // as it began without one, though its constraint asks for less: where less is not to be had, the
+  // step need not be shorter.
+  void note_end(const Contact &contact, double gap_at_end);
+
+  // Tells whether the end of the step is so deep that the constraint must change.
+  bool ends_too_deep(const Contact &contact, double gap_at_end) const;
 
   // Sets the gap of constraint c to one that is exact for the present velocity, or to the
   // linearised one if that is smaller; approach() says how far it goes there in one round. A gap
@@ -52,14 +53,6 @@ class GapRules {
   // have parted meanwhile, and the step does not depend on how it was found. Returns how many
   // constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
-
-  // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the
-  // step: the exact gap there is `gap_at_end`, the velocities open the linearised one by `opening`
-  // [length], and `along` is the cosine of the angle by which the normal turns. Surfaces that turn
-  // about one another part, though their linearised gap stays; they are closed by no more than
-  // most_closed(). Where they would overlap, at least the linearised gap is asked for, which is
-  // never more than that of two spheres. Not for bad starts. Returns how many constraints changed.
-  long hold(std::size_t c, double gap_at_end, double opening, double along);
 
   // Changes constraints of free spheres whose gaps these velocities leave open, or overlapping, by
   // more than the tolerance, since gaps that count as closed may be open or overlap. Such a
@@ -72,6 +65,7 @@ class GapRules {
   // or walls curve.
   double closed_by_turning(std::size_t c) const;
 
+  HeldContacts &held() { return held_; }
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
@@ -82,13 +76,13 @@ class GapRules {
   double given_back(const Contact &contact) const;
   double most_given_back() const;
   double limited(const Contact &contact, double wanted) const;
-  double held_gap(const Contact &contact) const;
-  double most_closed(const Contact &contact) const;
+  double bad_kept(const Contact &contact) const;
   double deepest(const Contact &contact, double allowed) const;
   // [length] of constraint c with these velocities, along a straight line.
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 
   Step &step_;
+  HeldContacts held_;
   OverlapWatch &overlaps_;
 };
 

@@ -1,7 +1,6 @@
 #include "inelastic_hold_still.h"
 
 #include "inelastic_ghost_exchange.h"
-#include "inelastic_make_solver.h"
 #include "inelastic_mover.h"
 
 #include <algorithm>
@@ -21,8 +20,9 @@ constexpr long MOST_ITERATIONS = 300;
 
 }    // namespace
 
-HoldStill::HoldStill(Step &step, GhostExchange &ranks, Movers &movers) :
-    step_(step), ranks_(ranks), movers_(movers), solver_(inelastic::make_solver("apgd"))
+HoldStill::HoldStill(Step &step, GhostExchange &ranks, Movers &movers,
+                     std::unique_ptr<inelastic::Solver> solver) :
+    step_(step), ranks_(ranks), movers_(movers), solver_(std::move(solver))
 {
 }
 

@@ -1,6 +1,7 @@
 // This room takes the velocities of particles at rest away (inelastic_rest.h). The moving particles
 // beside them were solved for with these velocities: they are projected once more, with the
-// particles at rest as obstacles, so that nothing moves into these.
+// particles at rest as obstacles, so that nothing moves into these. The solver is `apgd`'s: what is
+// to change is little, and searches of another one would end at other bits.
 
 #ifndef INELASTIC_HOLD_STILL_H
 #define INELASTIC_HOLD_STILL_H
@@ -19,7 +20,8 @@ class Movers;
 
 class HoldStill {
  public:
-  HoldStill(Step &step, GhostExchange &ranks, Movers &movers);
+  HoldStill(Step &step, GhostExchange &ranks, Movers &movers,
+            std::unique_ptr<inelastic::Solver> solver);
 
   // What particles are to do, ghosts included: one mark per particle that is held, and the velocity
   // that it is to have, 3 per particle [length / time].

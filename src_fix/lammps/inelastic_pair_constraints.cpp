@@ -265,13 +265,14 @@ long PairConstraints::relinearise()
     if (contact.is_with_wall() || !(may_hold || step_.is_member(i) || step_.is_member(j))) continue;
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
+    rules_.note_end(contact, gap);
     const bool too_deep = rules_.ends_too_deep(contact, gap);
     // A push leaves held pairs as they are, unless it turns a pair back: the gap that was set to
     // make room for its turning would then be an overlap.
     const bool follows = step_.phase == Phase::CONTACT || gap < -step_.settings.tolerance;
     if (may_hold && follows && !rules_.overlaps().is_bad(contact.gap_now)) {
       const double along = dot(&contacts.normal[3 * c], away) / norm(away);
-      changed += rules_.hold(c, gap, opening(c), along);
+      changed += rules_.held().follow(c, gap, opening(c), along);
       continue;
     }
     if (!(step_.is_member(i) || step_.is_member(j))) continue;

@@ -2,6 +2,7 @@
 
 #include "inelastic_atom_state.h"
 #include "inelastic_ghost_exchange.h"
+#include "inelastic_make_solver.h"
 #include "inelastic_mover.h"
 
 #include "atom.h"
@@ -62,7 +63,7 @@ constexpr double ROUND_OFF = 1.0e-12;
 
 Rest::Rest(LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state, Movers &movers) :
     Pointers(lmp), step_(step), ranks_(ranks), state_(state), motions_(lmp, step, ranks, state),
-    trial_(step, ranks, movers), hold_still_(step, ranks, movers)
+    trial_(step, ranks, movers), hold_still_(step, ranks, movers, inelastic::make_solver("apgd"))
 {
 }
 

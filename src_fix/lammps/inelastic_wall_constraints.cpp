@@ -256,6 +256,7 @@ long WallConstraints::relinearise(double margin)
         const double gap = gap_at_end(view, from.atom);
         // The walls behind a periodic boundary are as exact as others.
         const bool exact = is_image(from) && walls_.exact() && !step_.is_member(from.atom);
+        rules_.note_end(contact, gap);
         const bool too_deep = rules_.ends_too_deep(contact, gap) ||
             (exact && gap < std::min(contact.gap_now, -step_.settings.tolerance));
         if (known && may_hold(existing->second, view.normal))
@@ -286,7 +287,7 @@ long WallConstraints::hold(std::size_t c, double gap_at_end, const double *norma
   const double *const normal = &contacts.normal[3 * c];
   const double opening =
       opening_of(contacts.first[c], step_.contact_of(c).wall(), normal, step_.velocity.data());
-  return rules_.hold(c, gap_at_end, opening, dot(normal, normal_at_end));
+  return rules_.held().follow(c, gap_at_end, opening, dot(normal, normal_at_end));
 }
 
 // Sets constraints again whose walls are not seen from where a body ends (a part of an intersection
@@ -334,7 +335,7 @@ long WallConstraints::add_planes_within(const Viewpoints &beyond)
 
 // Tells whether a sphere has the plane of this wall already and, along it, does not end too deep.
 // To set it anew would only take back what the round has changed of its gap.
-bool WallConstraints::is_kept_by_plane(const Viewpoint &from, const WallView &view)
+bool WallConstraints::is_kept_by_plane(const Viewpoint &from, const WallView &view) const
 {
   const int i = from.atom;
   const auto existing = constraint_.find(key(i, view.wall));

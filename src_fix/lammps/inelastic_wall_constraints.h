@@ -69,7 +69,7 @@ class WallConstraints : protected Pointers {
   long add_planes_within(const Viewpoints &beyond);
   long follow_unseen(const std::unordered_set<std::size_t> &seen, const Viewpoints &beyond);
   bool is_same_plane(std::size_t c, const double *normal) const;
-  bool is_kept_by_plane(const Viewpoint &from, const WallView &view);
+  bool is_kept_by_plane(const Viewpoint &from, const WallView &view) const;
 
   Step &step_;
   GapRules &rules_;
