@@ -1,8 +1,5 @@
 #include "fix_inelastic.h"
 
-#include "inelastic_lammps_versions.h"
-#include "inelastic_make_solver.h"
-
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
@@ -16,25 +13,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <limits>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
 using namespace FixConst;
-
-namespace {
-
-constexpr int MAX_ROUNDS = 100;    // of adding constraints; a handful is usual
-
-std::string first_word(const std::string &words)
-{ return words.substr(0, words.find(' ')); }
-
-// The first number of what restart files hold. In files of version 0.1 it is a time, in those of
-// development versions after it EARLIER_LAYOUT.
-constexpr double LAYOUT = -3.0, EARLIER_LAYOUT = -2.0;
-
-}    // namespace
 
 FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), settings_(read_settings(lmp, narg, arg, groupbit)), step_(settings_),
@@ -42,13 +24,11 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
     spheres_(lmp, step_, ranks_, state_), walls_(lmp, settings_.regions),
     constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
-    solver_(inelastic::make_solver(settings_.solver)),
-    push_apart_(lmp, step_, constraints_, ranks_, movers_), length_(lmp, step_, ranks_),
-    rest_(lmp, step_, ranks_, state_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
-    hard_(lmp, step_, ranks_), energy_(lmp, step_, constraints_.rules(), ranks_, movers_),
-    unsolved_(lmp, step_, constraints_, hard_, ranks_, movers_), squeezed_(lmp, step_, ranks_),
-    output_(lmp, step_, ranks_), unrest_(lmp, step_, output_), summary_(lmp, step_, clock_),
-    record_(lmp, step_, ranks_)
+    length_(lmp, step_, ranks_), files_(lmp, step_, length_), rest_(lmp, step_, ranks_, state_, movers_),
+    prediction_(lmp, step_, walls_, laws_, movers_, rest_, clock_),
+    check_(lmp, this, step_, ranks_, state_, movers_), output_(lmp, step_, ranks_),
+    unrest_(lmp, step_, output_), summary_(lmp, step_, clock_),
+    trials_(lmp, step_, constraints_, length_, prediction_, movers_, ranks_, summary_, clock_)
 {
   movers_.add(&spheres_);
   if (bodies_) movers_.add(bodies_.get());
@@ -58,7 +38,7 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     error->all(FLERR, "Fix inelastic needs spheres with a radius: use atom_style sphere");
   if (!atom->tag_enable) error->all(FLERR, "Fix inelastic needs atom IDs: use atom_modify id yes");
   announce_to_lammps();
-  find_lost_memory();
+  files_.find_lost_memory(id, style);
   begin_summary();
 
   FixInelastic::grow_arrays(atom->nmax);
@@ -98,43 +78,18 @@ void FixInelastic::announce_to_lammps()
   restart_global = restart_peratom = laws_.has_law() ? 1 : 0;
 }
 
-// LAMMPS gives what a restart file holds to the fix with the same ID alone, and tells nobody before
-// the end of the first run. Without a law there is little to lose.
-void FixInelastic::find_lost_memory() const
-{
-  if (!laws_.has_law()) return;
-  for (int k = 0; k < modify->nfix_restart_peratom; ++k)
-    if (strcmp(style_in_restart_file(modify, k), style) == 0 &&
-        strcmp(id_in_restart_file(modify, k), id) != 0)
-      error->all(FLERR,
-                 "Fix inelastic: the restart file holds what contacts remember for fix {}: give "
-                 "this fix the same ID, in place of {}",
-                 id_in_restart_file(modify, k), id);
-}
-
 FixInelastic::~FixInelastic()
 {
   if (copymode) return;
   // LAMMPS is ending where there is no update any more.
   if (update) {
     length_.restore();
-    warn_of_lost_memory();
+    files_.warn_of_lost_memory(id, output_.vector(ContactOutput::HELD_CONTACTS));
   }
   atom->delete_callback(id, Atom::GROW);
   atom->delete_callback(id, Atom::RESTART);
   // The output owns them.
   array_atom = array_local = nullptr;
-}
-
-void FixInelastic::warn_of_lost_memory() const
-{
-  const double contacts = output_.vector(ContactOutput::HELD_CONTACTS);
-  if (contacts > 0.0 && comm->me == 0)
-    error->warning(
-        FLERR,
-        "Fix inelastic: with fix {} ends what law {} remembers of {:.0f} contacts: a fix "
-        "that is defined anew begins without it",
-        id, settings_.law_words, contacts);
 }
 
 int FixInelastic::setmask()
@@ -186,7 +141,7 @@ void FixInelastic::begin_run()
   constraints_.begin_run(length_.smallest_radius());
   length_.begin_run();
   constraints_.overlaps().begin_run();
-  squeezed_.begin_run();
+  trials_.begin_run();
   begin_summary();
 }
 
@@ -319,8 +274,7 @@ void FixInelastic::check_volume()
 void FixInelastic::begin_summary()
 {
   summary_.begin(length_.shortened_steps());
-  hard_.begin_run();
-  energy_.begin_run();
+  trials_.begin_summary();
   constraints_.overlaps().begin_count();
 }
 
@@ -346,8 +300,8 @@ void FixInelastic::advance(int vflag, Kick kick)
   length_.restore();
   step_.begin(kick);
   check_.before_step();
-  inelastic::ProjectionResult result = solve();
-  if (rest_.look(result)) refine(result);
+  inelastic::ProjectionResult result = trials_.solve();
+  if (rest_.look(result) && trials_.refine(result)) rest_.look_again();
   {
     const PhaseClock::Within solving(clock_, PhaseClock::SOLVE);
     const HoldStill::Constraints constraints = {[this] {
@@ -356,201 +310,18 @@ void FixInelastic::advance(int vflag, Kick kick)
                                                 [this] {
                                                   return constraints_.excess();
                                                 }};
-    result.iterations += rest_.hold(constraints, least_length());
+    result.iterations += rest_.hold(constraints, trials_.least_length());
   }
   finish(result);
-}
-
-// Solves the step once more, from its solution, where contacts are to be known better
-// (inelastic_rest.h).
-void FixInelastic::refine(inelastic::ProjectionResult &result)
-{
-  const inelastic::ProjectionResult refined = project(settings_.max_iterations - result.iterations);
-  result.iterations += refined.iterations;
-  result.status = refined.status;
-  result.residual = refined.residual;
-  result.accurate = refined.accurate;
-  result.unresolved = refined.unresolved;
-  if (refined.status == inelastic::Status::CONVERGED) {
-    rest_.look_again();
-    return;
-  }
-  summary_.add_unconverged();
-  unsolved_.report(result);
-}
-
-// Finds the velocities of the step, whose length may become shorter on the way.
-inelastic::ProjectionResult FixInelastic::solve()
-{
-  length_.begin_step();
-  unsolved_.begin_step();
-  hard_.begin_step();
-  step_.keeps_overlaps = constraints_.overlaps().pushed_before();
-  step_.waits = energy_.waits_on();
-  while (true) {
-    step_.keeps_overlaps = step_.keeps_overlaps || step_.waits;
-    unsolved_.begin_trial();
-    length_.fit_to_list();
-    predict();
-    rest_.compare_loads();
-    constraints_.collect();
-    constraints_.overlaps().share();
-    // Beside bad overlaps, which count as touching and may leave no room, regular ones are kept.
-    const bool keeps = step_.waits || step_.bad_start;
-    if (keeps != step_.keeps_overlaps) {
-      step_.keeps_overlaps = keeps;
-      continue;
-    }
-    inelastic::ProjectionResult result = project(settings_.max_iterations);
-    if (settings_.record_every > 0 && step_.kick == Kick::WHOLE &&
-        update->ntimestep % settings_.record_every == 0)
-      record_.write(result);
-    if (step_.bad_start)
-      push_apart_.run(result, [this](long iterations) {
-        return project(iterations);
-      });
-    else
-      push_apart_.skip();
-    if (push_apart_.in_vain()) unsolved_.report_jam(push_apart_.left());
-    if (solves_again(result)) continue;
-    const bool solved = result.status == inelastic::Status::CONVERGED;
-    if (solved && !step_.bad_start && walls_.any_moves())
-      squeezed_.look();
-    else
-      squeezed_.skip();
-    if (length_.accepts(solved, unsolved_.named(), squeezed_.said())) return result;
-  }
-}
-
-// Tells whether the step, of which this came out, is to be solved again: it gives nothing back, or
-// is shorter, now. Errors: it is not solved, or adds energy, and nothing of this helps.
-bool FixInelastic::solves_again(inelastic::ProjectionResult &result)
-{
-  // Where the step may be without room for what it gives back, it gives nothing back.
-  if (result.status != inelastic::Status::CONVERGED && !step_.bad_start && !step_.waits &&
-      energy_.gives_back()) {
-    waits_for_room();
-    return true;
-  }
-  // What can hardly be solved looks solved in a step that is short enough, in which EPS is more
-  // than anything moves.
-  const bool hardly = hard_.has_shortened() && hard_.is_hardly_solved(result);
-  if (result.status != inelastic::Status::CONVERGED || hardly) {
-    const bool no_room = result.status == inelastic::Status::INFEASIBLE;
-    if (no_room) unsolved_.note_no_room();
-    // Gaps at the end of the step, or speeds at which surfaces part, may be had together in a
-    // shorter one. Any other step takes fewer iterations when it is shorter; with warn a run that
-    // has few of them goes on, as it is.
-    const bool law_parts = unsolved_.law_parts();
-    if ((no_room || !settings_.warn_only || constraints_.relinearised() || law_parts || hardly) &&
-        halves(law_parts)) {
-      hard_.note_shortened();
-      return true;
-    }
-    summary_.add_unconverged();
-    unsolved_.report(result);
-  }
-  // A step that is not solved, or pushes a bad start apart, says so itself.
-  if (result.status != inelastic::Status::CONVERGED || step_.bad_start) return false;
-  if (adds_too_much(result)) {
-    if (!step_.waits) {
-      waits_for_room();
-      return true;
-    }
-    if (halves(false)) {
-      hard_.note_shortened();
-      return true;
-    }
-    unsolved_.report_energy(energy_.times_too_much());
-  }
-  return energy_.law_adds() && halves(true);
-}
-
-// Overlaps stay as deep as they are in the step, which has no room to give them back.
-void FixInelastic::waits_for_room()
-{
-  energy_.note_no_room();
-  step_.waits = true;
-}
-
-// Halves the step if the keyword allows it, and tells whether.
-bool FixInelastic::halves(bool law_parts)
-{
-  if (!length_.may_shorten_unsolved(law_parts)) return false;
-  length_.shorten(0.5, unsolved_.named());
-  return true;
-}
-
-// Tells whether contacts add more energy than they may. Where they do though nothing is given back,
-// they are not solved as far as they have to be: the step is first solved to its targets here.
-bool FixInelastic::adds_too_much(inelastic::ProjectionResult &result)
-{
-  if (!energy_.adds_too_much(solver_->targets().resolved())) return false;
-  if (!step_.waits || result.accurate) return true;
-  const inelastic::ProjectionResult better = project(settings_.max_iterations, true);
-  result.iterations += better.iterations;
-  result.residual = better.residual;
-  result.accurate = better.accurate;
-  result.unresolved = better.unresolved;
-  return better.status != inelastic::Status::CONVERGED ||
-      energy_.adds_too_much(solver_->targets().resolved());
-}
-
-// Every other fix and force has done its work: sets the velocities that the step would end with.
-void FixInelastic::predict()
-{
-  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
-  const int nall = atom->nlocal + atom->nghost;
-  inelastic::ContactProblem &problem = step_.problem;
-  step_.impulse_per_force = step_.kicks() * update->dt * force->ftm2v;
-  problem.timestep = update->dt;
-  problem.resize(nall, walls_.number_of_walls());
-  for (int i = 0; i < nall; ++i)
-    problem.inverse_mass[i] = step_.is_mobile(atom, i) ? 1.0 / mass_of(atom, i) : 0.0;
-  if (laws_.has_law()) {
-    step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
-    movers_.find_velocity_before(step_.velocity_before);
-  }
-  movers_.predict();
-}
-
-// [length] What is shorter is round-off of positions.
-double FixInelastic::least_length() const
-{ return std::numeric_limits<double>::epsilon() * length_.smallest_radius(); }
-
-inelastic::ProjectionResult FixInelastic::project(long max_iterations, bool to_targets)
-{
-  const PhaseClock::Within within(clock_, PhaseClock::SOLVE);
-  // No step goes further than the list reaches: it is shortened, or it is an error.
-  constexpr double BEYOND_REACH = 10.0;
-  const double reach = (settings_.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
-  inelastic::SolverLimits limits = {settings_.tolerance, max_iterations, reach};
-  limits.least_length = least_length();
-  // The accuracy is that of momentum, and a push is none.
-  if (step_.phase == Phase::CONTACT) {
-    // Bodies turn: their constraints are linearised anew in many rounds, of which only the last
-    // ones matter.
-    constexpr double COARSE = 32.0;
-    limits.accuracy = settings_.accuracy;
-    limits.to_targets = to_targets;
-    if (step_.has_bodies) limits.coarseness = COARSE;
-  }
-  const inelastic::ProjectionResult result = inelastic::project(
-      step_.problem, constraints_, *solver_, limits, MAX_ROUNDS, ranks_, step_.velocity);
-  if (result.status != inelastic::Status::CONVERGED) unsolved_.note_worst(result);
-  summary_.add_solve(result.iterations);
-  return result;
 }
 
 // The step is solved: gives it to LAMMPS, to the output, and to the next step.
 void FixInelastic::finish(const inelastic::ProjectionResult &result)
 {
-  hard_.end_step(result);
-  energy_.end_step();
+  trials_.end_step(result);
   unrest_.end_step();
   OverlapWatch &overlaps = constraints_.overlaps();
   overlaps.warn_of_unexpected();
-  squeezed_.warn();
   {
     const PhaseClock::Within within(clock_, PhaseClock::APPLY);
     if (laws_.has_law()) laws_.take_impulses();
@@ -563,7 +334,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
     check_.after_step(output_.largest_change());
   }
   const bool solved = result.status == inelastic::Status::CONVERGED;
-  overlaps.end_step(solved && constraints_.entangled().empty(), push_apart_.deepest_at_end());
+  overlaps.end_step(solved && constraints_.entangled().empty(), trials_.push_apart().deepest_at_end());
   restart_peratom = overlaps.pushes_in_velocity() || laws_.has_law();
   restart_global = length_.is_shortened() || laws_.has_law();
   {
@@ -587,7 +358,7 @@ void FixInelastic::post_run()
   restart_peratom = laws_.has_law();
   unrest_.look();
   summary_.log(length_.shortened_steps(), constraints_.overlaps().unexpected_steps(),
-               hard_.counts(), push_apart_.left(), energy_, unrest_);
+               trials_.counts(), trials_.push_apart().left(), trials_.energy(), unrest_);
   begin_summary();
 }
 
@@ -643,9 +414,7 @@ int FixInelastic::pack_restart(int i, double *buffer)
 
 void FixInelastic::unpack_restart(int i, int nth)
 {
-  const bool written = !law_in_restart_.empty();
-  const bool same_law = first_word(law_in_restart_) == first_word(settings_.law_words);
-  state_.unpack_restart(i, nth, written, laws_.has_law() && same_law);
+  state_.unpack_restart(i, nth, files_.has_memory(), laws_.has_law() && files_.is_of_same_law());
 }
 
 int FixInelastic::size_restart(int i)
@@ -654,44 +423,14 @@ int FixInelastic::size_restart(int i)
 int FixInelastic::maxsize_restart()
 { return state_.largest_restart_size(); }
 
-// A file that is written while a step is shortened holds its time step: the regular one goes along.
-// One of a run with a law names the law, whose memory goes along with the atoms. In other files
-// there is nothing of this fix.
 void FixInelastic::write_restart(FILE *file)
 {
-  if (comm->me != 0) return;
-  const std::string law = laws_.has_law() ? settings_.law_words : "";
-  const double numbers[4] = {LAYOUT, update->dt, step_.regular_timestep,
-                             static_cast<double>(law.size())};
-  const int size = sizeof(numbers) + static_cast<int>(law.size());
-  fwrite(&size, sizeof(size), 1, file);
-  fwrite(numbers, sizeof(numbers), 1, file);
-  fwrite(law.data(), 1, law.size(), file);
+  if (comm->me == 0) files_.write(file);
 }
 
-// A time step that was set since the file was read stays. LAMMPS calls this before
-// unpack_restart().
+// LAMMPS calls this before unpack_restart().
 void FixInelastic::restart(char *buffer)
-{
-  double numbers[4];
-  std::memcpy(numbers, buffer, sizeof(double));
-  const bool earlier = numbers[0] != LAYOUT && numbers[0] != EARLIER_LAYOUT;
-  std::memcpy(numbers + (earlier ? 1 : 0), buffer, (earlier ? 2 : 4) * sizeof(double));
-  if (update->dt == numbers[1] && numbers[1] != numbers[2])
-    length_.set_regular_timestep(numbers[2]);
-  if (earlier) return;
-  law_in_restart_.assign(buffer + sizeof(numbers), static_cast<std::size_t>(numbers[3]));
-  if (numbers[0] == EARLIER_LAYOUT && !law_in_restart_.empty())
-    error->all(FLERR,
-               "Fix inelastic: the restart file is of an earlier development version, and what its "
-               "contacts remember cannot be read: make it again with this version");
-  const bool same_law = first_word(law_in_restart_) == first_word(settings_.law_words);
-  if (law_in_restart_.empty() || same_law || comm->me != 0) return;
-  error->warning(FLERR,
-                 "Fix inelastic: the restart file holds what contacts remember by law {}, which "
-                 "is dropped: this fix has law {}",
-                 law_in_restart_, settings_.law_words.empty() ? "inelastic" : settings_.law_words);
-}
+{ files_.read(buffer); }
 
 double FixInelastic::memory_usage()
 {

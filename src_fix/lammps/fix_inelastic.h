@@ -19,31 +19,26 @@ FixStyle(inelastic,FixInelastic);
 #include "inelastic_atom_state.h"
 #include "inelastic_constraints.h"
 #include "inelastic_contact_output.h"
-#include "inelastic_energy_watch.h"
 #include "inelastic_ghost_exchange.h"
-#include "inelastic_hard_steps.h"
 #include "inelastic_law_contacts.h"
 #include "inelastic_motion_check.h"
 #include "inelastic_phase_clock.h"
-#include "inelastic_problem_record.h"
-#include "inelastic_push_apart.h"
+#include "inelastic_prediction.h"
 #include "inelastic_region_walls.h"
 #include "inelastic_rest.h"
+#include "inelastic_restart_files.h"
 #include "inelastic_rigid_motion.h"
 #include "inelastic_run_summary.h"
 #include "inelastic_settings.h"
-#include "inelastic_solver.h"
 #include "inelastic_sphere_motion.h"
-#include "inelastic_squeezed_grains.h"
 #include "inelastic_step.h"
 #include "inelastic_step_length.h"
+#include "inelastic_step_trials.h"
 #include "inelastic_unrest.h"
-#include "inelastic_unsolved_step.h"
 
 #include "fix.h"
 
 #include <memory>
-#include <string>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -98,24 +93,17 @@ class FixInelastic : public Fix {
   Inelastic_NS::Movers movers_;    // the free spheres, then the bodies
   Inelastic_NS::RegionWalls walls_;
   Inelastic_NS::Constraints constraints_;
-  std::unique_ptr<inelastic::Solver> solver_;
-  Inelastic_NS::PushApart push_apart_;
   Inelastic_NS::StepLength length_;
+  Inelastic_NS::RestartFiles files_;
   Inelastic_NS::Rest rest_;
+  Inelastic_NS::Prediction prediction_;
   Inelastic_NS::MotionCheck check_;
-  Inelastic_NS::HardSteps hard_;
-  Inelastic_NS::EnergyWatch energy_;
-  Inelastic_NS::UnsolvedStep unsolved_;
-  Inelastic_NS::SqueezedGrains squeezed_;
   Inelastic_NS::ContactOutput output_;
   Inelastic_NS::Unrest unrest_;
   Inelastic_NS::RunSummary summary_;
-  Inelastic_NS::ProblemRecord record_;
-  std::string law_in_restart_;    // the law whose memory a restart file holds; empty for none
+  Inelastic_NS::StepTrials trials_;
 
   void announce_to_lammps();
-  void find_lost_memory() const;
-  void warn_of_lost_memory() const;
   void begin_run();
   void check_scene();
   void find_frozen();
@@ -124,15 +112,6 @@ class FixInelastic : public Fix {
   void check_volume();
   void begin_summary();
   void advance(int vflag, Inelastic_NS::Kick kick);
-  inelastic::ProjectionResult solve();
-  void refine(inelastic::ProjectionResult &result);
-  void predict();
-  double least_length() const;
-  inelastic::ProjectionResult project(long max_iterations, bool to_targets = false);
-  bool solves_again(inelastic::ProjectionResult &result);
-  void waits_for_room();
-  bool halves(bool law_parts);
-  bool adds_too_much(inelastic::ProjectionResult &result);
   void finish(const inelastic::ProjectionResult &result);
 };
 
