@@ -28,7 +28,7 @@ GapOperator::ImpulseNorm GapOperator::impulse_norm(const ContactProblem &problem
   // round-off that is left of a particle's sum is squared.
   std::vector<double> sum(change_.size(), 0.0);
   problem.contacts.add_impulses(impulse, sum.data());
-  host.sum_over_ghosts(sum.data());
+  host.sum_over_ghosts(sum.data(), 3);
   find_change(problem, impulse, host);
   ImpulseNorm result = {0.0, 0.0};
   std::vector<char> pushed(problem.slots(), 0);

@@ -14,9 +14,12 @@ namespace inelastic {
 
 class Host {
  public:
-  // Adds the values of all ghosts of a particle to its owner's, then gives the sum to every ghost.
-  // There are 3 numbers per particle.
-  virtual void sum_over_ghosts(double *per_particle) = 0;
+  // At most so many numbers per particle, in the functions below that take them.
+  static constexpr int MOST_NUMBERS = 6;
+
+  // Adds the values of all ghosts of a particle to its owner's, then gives the sum to every ghost,
+  // for each of some numbers per particle.
+  virtual void sum_over_ghosts(double *per_particle, int numbers) = 0;
 
   // Returns whether any rank has ghosts. If none has, choose_ghosts need not be called.
   virtual bool has_ghosts() const = 0;
@@ -54,9 +57,9 @@ class Host {
   // often as all others hear its turn.
   virtual void hear(int turn, float *per_particle) = 0;
 
-  // Gives every ghost the value of its owner, 3 numbers per particle. Programs that set up a
-  // problem need it: the ghosts must have predicted velocities too.
-  virtual void share_with_ghosts(double *per_particle) = 0;
+  // Gives every ghost the values of its owner. Programs that set up a problem need it: the ghosts
+  // must have predicted velocities too.
+  virtual void share_with_ghosts(double *per_particle, int numbers) = 0;
 
   // Replaces a few numbers by their sums over all ranks and others by their maxima, in one
   // communication.
@@ -68,7 +71,7 @@ class Host {
 
 class SerialHost final : public Host {
  public:
-  void sum_over_ghosts(double *) override {}
+  void sum_over_ghosts(double *, int) override {}
   void sum_over_ranks(double *, int) override {}
   bool has_ghosts() const override { return false; }
   int turns() const override { return 1; }
@@ -79,7 +82,7 @@ class SerialHost final : public Host {
   void choose_told(const std::vector<char> &, bool) override {}
   void tell(const float *) override {}
   void hear(int, float *) override {}
-  void share_with_ghosts(double *) override {}
+  void share_with_ghosts(double *, int) override {}
   void reduce(double *, int, double *, int) override {}
 };
 

@@ -14,21 +14,11 @@ namespace {
     return reinterpret_cast<float *>(vectors.data());
   }
 
-  // Returns sums over all ranks of `numbers` numbers per slot. Collective.
-  std::vector<double> of_all_ranks(const std::vector<double> &mine, std::size_t numbers, Host &host)
+  // Returns sums over all ranks of some numbers per slot. Collective.
+  std::vector<double> of_all_ranks(std::vector<double> mine, std::size_t numbers, Host &host)
   {
-    const std::size_t slots = mine.size() / numbers;
-    std::vector<double> all = mine, three(3 * slots);
-    for (std::size_t from = 0; from < numbers; from += 3) {
-      const std::size_t count = std::min<std::size_t>(3, numbers - from);
-      for (std::size_t i = 0; i < slots; ++i)
-        for (std::size_t k = 0; k < 3; ++k)
-          three[3 * i + k] = k < count ? mine[numbers * i + from + k] : 0.0;
-      host.sum_over_ghosts(three.data());
-      for (std::size_t i = 0; i < slots; ++i)
-        for (std::size_t k = 0; k < count; ++k) all[numbers * i + from + k] = three[3 * i + k];
-    }
-    return all;
+    host.sum_over_ghosts(mine.data(), static_cast<int>(numbers));
+    return mine;
   }
 
   // Returns what a unit impulse of a constraint adds to its own gap through one of its sides.

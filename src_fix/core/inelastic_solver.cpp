@@ -27,20 +27,20 @@ Residual residual_over_ranks(const double *gap_at_end, const ContactSet &contact
 Network find_network(const ContactProblem &problem, Host &host)
 {
   const ContactSet &contacts = problem.contacts;
-  // 3 per slot: 1, how many contacts act on it, and nothing. Summed up over its images the first is
-  // the number of these.
-  std::vector<double> of_slot(3 * static_cast<std::size_t>(problem.slots()), 0.0);
-  for (std::size_t i = 0; i < of_slot.size(); i += 3) of_slot[i] = 1.0;
+  // 2 per slot: 1, and how many contacts act on it. Summed up over its images the first is the
+  // number of these.
+  std::vector<double> of_slot(2 * static_cast<std::size_t>(problem.slots()), 0.0);
+  for (std::size_t i = 0; i < of_slot.size(); i += 2) of_slot[i] = 1.0;
   Network network;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     if (!contacts.is_loaded(c)) continue;
     network.contacts += 1.0;
     for (const int slot : {contacts.first[c], contacts.second[c]})
-      of_slot[3 * static_cast<std::size_t>(slot) + 1] += 1.0;
+      of_slot[2 * static_cast<std::size_t>(slot) + 1] += 1.0;
   }
-  host.sum_over_ghosts(of_slot.data());
+  host.sum_over_ghosts(of_slot.data(), 2);
   for (int i = 0; i < problem.particles; ++i) {
-    const double *const of_particle = &of_slot[3 * static_cast<std::size_t>(i)];
+    const double *const of_particle = &of_slot[2 * static_cast<std::size_t>(i)];
     if (problem.is_mobile(i) && of_particle[1] > 0.0) network.particles += 1.0 / of_particle[0];
   }
   double sums[2] = {network.contacts, network.particles};

@@ -26,7 +26,7 @@ bool Unknowns::any_wall_moves() const
 
 void Unknowns::velocity_change(double *per_slot, Host &host) const
 {
-  host.sum_over_ghosts(per_slot);
+  host.sum_over_ghosts(per_slot, 3);
   if (any_wall_moves())
     host.sum_over_ranks(per_slot + 3 * static_cast<std::size_t>(particles), 3 * walls);
   const auto divide_by_mass = [&](int slot) {

@@ -113,10 +113,10 @@ std::string BodyMembers::find()
   const int nlocal = atom->nlocal;
   const int nall = nlocal + atom->nghost;
   const int *const body = bodies_of_atoms(fix_);
-  in_body_.assign(3 * static_cast<std::size_t>(nall), 0.0);
+  in_body_.assign(nall, 0.0);
   for (int i = 0; i < nlocal; ++i)
-    in_body_[3 * i] = body[i] >= 0 && step_.in_group(atom, i) ? 1.0 : 0.0;
-  host_.share_with_ghosts(in_body_.data());
+    in_body_[i] = body[i] >= 0 && step_.in_group(atom, i) ? 1.0 : 0.0;
+  host_.share_with_ghosts(in_body_.data(), 1);
 
   std::string message;
   std::vector<int> next(nall, NONE);
@@ -137,7 +137,7 @@ std::vector<int> BodyMembers::first_spheres(std::vector<int> &next, std::string 
 {
   std::vector<int> first;
   for (int i = 0; i < static_cast<int>(next.size()); ++i) {
-    if (!(in_body_[3 * i] > 0.0)) continue;
+    if (!(in_body_[i] > 0.0)) continue;
     const int place = molecules_.place(atom->molecule[i]);
     if (place == MoleculeSizes::NONE) {
       incomplete_[i] = 1;

@@ -126,7 +126,7 @@ void ClusterMotions::measure_resistance()
       of_particle[2] += 1.0;
     }
   }
-  ranks_.sum_over_ghosts(resistance_.data());
+  ranks_.sum_over_ghosts(resistance_.data(), 3);
 }
 
 Motion ClusterMotions::motion_of(int i) const
@@ -353,21 +353,20 @@ void ClusterMotions::measure_slip(double quiet_steps)
     if (cluster.quiet_steps >= quiet_steps) any = 1.0;
   ranks_.reduce(nullptr, 0, &any, 1);
   if (any == 0.0) return;
-  std::vector<double> units(3 * static_cast<std::size_t>(step_.problem.particles), 0.0);
+  std::vector<double> units(step_.problem.particles, 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!counts(i)) continue;
     const Motion motion = motion_of(i);
-    if (is_held(i, motion)) units[3 * static_cast<std::size_t>(i)] = unit(i, motion);
+    if (is_held(i, motion)) units[i] = unit(i, motion);
   }
-  ranks_.share_with_ghosts(units.data());
+  ranks_.share_with_ghosts(units.data(), 1);
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   enum { SQUARES, NUMBER, SUMS };
   std::vector<double> sums(SUMS * clusters_.size(), 0.0), most(clusters_.size(), 0.0);
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const int i = contacts.first[c], j = contacts.second[c];
     if (contacts.impulse[c] == 0.0 || !clusters_.is_mobile(i) || !clusters_.is_mobile(j)) continue;
-    const double one = units[3 * static_cast<std::size_t>(i)];
-    const double other = units[3 * static_cast<std::size_t>(j)];
+    const double one = units[i], other = units[j];
     if ((one > 0.0) == (other > 0.0)) continue;
     const int held = one > 0.0 ? i : j;
     const double speed = std::abs(dot(&contacts.normal[3 * c], own_velocity(held).data()));

@@ -45,7 +45,7 @@ void Clusters::join_local()
   }
 }
 
-// Three numbers per particle: the label, then minus one where another rank, or an image, has a part
+// Two numbers per particle: the label, then minus one where another rank, or an image, has a part
 // of the cluster. Both fall to the least value that any of the cluster's particles has, round by
 // round, in which a ghost and its owned atom agree, and then what is connected on a rank.
 void Clusters::agree_on_labels(std::vector<double> &labels)
@@ -55,8 +55,8 @@ void Clusters::agree_on_labels(std::vector<double> &labels)
     bool changed = false;
     for (int pass = 0; pass < 2; ++pass)
       for (int i = 0; i < count; ++i) {
-        double *const own = &labels[3 * static_cast<std::size_t>(i)];
-        double *const of_root = &labels[3 * static_cast<std::size_t>(root(i))];
+        double *const own = &labels[2 * static_cast<std::size_t>(i)];
+        double *const of_root = &labels[2 * static_cast<std::size_t>(root(i))];
         for (int k = 0; k < 2; ++k) {
           double &from = pass == 0 ? own[k] : of_root[k], &to = pass == 0 ? of_root[k] : own[k];
           if (!(from < to)) continue;
@@ -70,7 +70,7 @@ void Clusters::agree_on_labels(std::vector<double> &labels)
   if (!ranks_.has_ghosts()) return;
   double changed = 1.0;
   while (changed > 0.0) {
-    ranks_.least_over_ghosts(labels.data());
+    ranks_.least_over_ghosts(labels.data(), 2);
     changed = least_of_roots() ? 1.0 : 0.0;
     ranks_.reduce(nullptr, 0, &changed, 1);
   }
@@ -80,19 +80,19 @@ void Clusters::find()
 {
   const int count = step_.problem.particles;
   join_local();
-  std::vector<double> labels(3 * static_cast<std::size_t>(count), 0.0);
+  std::vector<double> labels(2 * static_cast<std::size_t>(count), 0.0);
   for (int i = 0; i < count; ++i) {
-    labels[3 * static_cast<std::size_t>(i)] = static_cast<double>(atom->tag[i]);
+    labels[2 * static_cast<std::size_t>(i)] = static_cast<double>(atom->tag[i]);
     const bool connected = parent_[i] != i;
     if (connected && (i >= atom->nlocal || root(i) >= atom->nlocal))
-      labels[3 * static_cast<std::size_t>(i) + 1] = -1.0;
+      labels[2 * static_cast<std::size_t>(i) + 1] = -1.0;
   }
   // What holds a particle from outside, a frozen one, may be on another rank than its own.
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   for (std::size_t c = 0; c < contacts.size(); ++c)
     for (const int i : {contacts.first[c], contacts.second[c]})
       if (contacts.impulse[c] != 0.0 && is_mobile(i) && i >= atom->nlocal)
-        labels[3 * static_cast<std::size_t>(i) + 1] = -1.0;
+        labels[2 * static_cast<std::size_t>(i) + 1] = -1.0;
   agree_on_labels(labels);
 
   label_.clear();
@@ -101,14 +101,14 @@ void Clusters::find()
   std::unordered_map<double, int> known;
   for (int i = 0; i < count; ++i) {
     if (!is_mobile(i)) continue;
-    const double label = labels[3 * static_cast<std::size_t>(i)];
+    const double label = labels[2 * static_cast<std::size_t>(i)];
     const auto [found, is_new] = known.emplace(label, static_cast<int>(label_.size()));
     if (is_new) {
       label_.push_back(label);
       shared_.push_back(0);
     }
     cluster_[i] = found->second;
-    if (labels[3 * static_cast<std::size_t>(i) + 1] < 0.0) shared_[found->second] = 1;
+    if (labels[2 * static_cast<std::size_t>(i) + 1] < 0.0) shared_[found->second] = 1;
   }
 }
 

@@ -80,7 +80,7 @@ void ContactOutput::clear_sums(bool virial_per_atom)
 {
   const std::size_t size = 3 * static_cast<std::size_t>(step_.problem.slots());
   contact_force_.assign(size, 0.0);
-  contact_count_.assign(size, 0.0);
+  contact_count_.assign(2 * static_cast<std::size_t>(step_.problem.slots()), 0.0);
   if (virial_per_atom) {
     virial_diagonal_.assign(size, 0.0);
     virial_off_diagonal_.assign(size, 0.0);
@@ -108,13 +108,13 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   largest_change_ = std::max(largest_change_,
                              std::abs(problem.contacts.impulse[c]) *
                                  (problem.inverse_mass[i] + problem.inverse_mass[j]));
-  contact_count_[3 * i + is_wall] += 1.0;
+  contact_count_[2 * i + is_wall] += 1.0;
   for (int d = 0; d < 3; ++d) {
     contact_force_[3 * i + d] += strength * n[d];
     contact_force_[3 * j + d] -= strength * n[d];
     if (is_wall) wall_force_[3 * (contact.wall() - 1) + d] -= strength * n[d];
   }
-  if (!is_wall) contact_count_[3 * j] += 1.0;
+  if (!is_wall) contact_count_[2 * j] += 1.0;
   const double to_point = atom->radius[i] + (is_wall ? contact.gap_now : 0.5 * contact.gap_now);
   list_contact(c, strength, to_point);
   if (virial.global || virial.per_atom) {
@@ -166,19 +166,19 @@ void ContactOutput::add_virial(std::size_t c, double weight, const VirialTarget 
 void ContactOutput::share(const VirialTarget &virial)
 {
   if (virial.per_atom) {
-    ranks_.sum_over_ghosts(virial_diagonal_.data());
-    ranks_.sum_over_ghosts(virial_off_diagonal_.data());
+    ranks_.sum_over_ghosts(virial_diagonal_.data(), 3);
+    ranks_.sum_over_ghosts(virial_off_diagonal_.data(), 3);
     for (int i = 0; i < atom->nlocal; ++i)
       for (int k = 0; k < 3; ++k) {
         virial.atoms[i][k] += virial_diagonal_[3 * i + k];
         virial.atoms[i][3 + k] += virial_off_diagonal_[3 * i + k];
       }
   }
-  ranks_.sum_over_ghosts(contact_force_.data());
-  ranks_.sum_over_ghosts(contact_count_.data());
+  ranks_.sum_over_ghosts(contact_force_.data(), 3);
+  ranks_.sum_over_ghosts(contact_count_.data(), 2);
   for (int i = 0; i < atom->nlocal; ++i) {
-    per_atom_[i][0] = contact_count_[3 * i];
-    per_atom_[i][1] = contact_count_[3 * i + 1];
+    per_atom_[i][0] = contact_count_[2 * i];
+    per_atom_[i][1] = contact_count_[2 * i + 1];
     for (int d = 0; d < 3; ++d) per_atom_[i][2 + d] = contact_force_[3 * i + d];
   }
 }

@@ -104,7 +104,8 @@ class ContactOutput : protected Pointers {
   // Contacts of spheres, with walls; of these: pressed ones, and those of which the law remembers
   // something.
   double counts_[4] = {};
-  std::vector<double> contact_force_, contact_count_;    // 3 per slot (inelastic_unknowns.h)
+  // 3 per slot (inelastic_unknowns.h), and 2: contacts with particles, and with walls
+  std::vector<double> contact_force_, contact_count_;
   std::vector<double> virial_diagonal_, virial_off_diagonal_;
   std::vector<double> wall_force_;    // 3 per wall, this rank's share
   std::vector<double> wall_force_total_;

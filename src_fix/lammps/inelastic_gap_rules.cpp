@@ -51,8 +51,7 @@ std::optional<std::array<double, 2>> GapRules::load_changes(int i, int j) const
   if (step_.load_change.empty()) return std::nullopt;
   if (problem.inverse_mass[i] == 0.0) std::swap(i, j);
   if (problem.is_wall(j) || problem.inverse_mass[j] == 0.0) j = i;
-  const double one = step_.load_change[3 * static_cast<std::size_t>(i)];
-  const double other = step_.load_change[3 * static_cast<std::size_t>(j)];
+  const double one = step_.load_change[i], other = step_.load_change[j];
   if (!(one > 0.0 && other > 0.0)) return std::nullopt;
   return std::array<double, 2>{one, other};
 }
@@ -115,8 +114,7 @@ double GapRules::effective_gap(const Contact &contact) const
   const double gap = contact.gap_now;
   if (step_.phase == Phase::CONTACT) {
     if (overlaps_.is_bad(gap)) return 0.0;
-    if (contact.asked.set.may_pull())
-      return gap <= 0.0 ? -given_back(contact) : held_.gap(contact);
+    if (contact.asked.set.may_pull()) return gap <= 0.0 ? -given_back(contact) : held_.gap(contact);
     const double closed = contact_gap(contact);
     const double parted = -step_.problem.timestep * contact.asked.parting_speed;
     return contact.asked.parts ? std::min(closed, parted) : closed;

@@ -65,10 +65,11 @@ int GhostExchange::turn() const
   return comm->nprocs > 1 ? place % 2 : 0;
 }
 
-void GhostExchange::sum_over_ghosts(double *per_particle)
+void GhostExchange::sum_over_ghosts(double *per_particle, int numbers)
 {
   exchanged_ = per_particle;
-  exchange(Exchange::VECTORS, true, true);
+  numbers_ = numbers;
+  exchange(Exchange::SUMS, true, true);
 }
 
 void GhostExchange::sum_over_ranks(double *of_walls, int count)
@@ -79,16 +80,18 @@ void GhostExchange::sum_over_ranks(double *of_walls, int count)
   MPI_Allreduce(mine.data(), of_walls, count, MPI_DOUBLE, MPI_SUM, world);
 }
 
-void GhostExchange::least_over_ghosts(double *per_particle)
+void GhostExchange::least_over_ghosts(double *per_particle, int numbers)
 {
   exchanged_ = per_particle;
+  numbers_ = numbers;
   exchange(Exchange::LEAST, true, true);
 }
 
-void GhostExchange::share_with_ghosts(double *per_particle)
+void GhostExchange::share_with_ghosts(double *per_particle, int numbers)
 {
   exchanged_ = per_particle;
-  exchange(Exchange::VECTORS, false, true);
+  numbers_ = numbers;
+  exchange(Exchange::SUMS, false, true);
 }
 
 void GhostExchange::choose_ghosts(const std::vector<char> &chosen)
@@ -112,12 +115,12 @@ void GhostExchange::sum_over_chosen_ghosts(float *per_particle)
 void GhostExchange::choose_told(const std::vector<char> &chosen, bool images)
 {
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
-  std::vector<double> owner(3 * static_cast<std::size_t>(atom->nlocal + atom->nghost));
+  std::vector<double> owner(2 * static_cast<std::size_t>(atom->nlocal + atom->nghost));
   for (int i = 0; i < atom->nlocal; ++i) {
-    owner[3 * i] = comm->me;
-    owner[3 * i + 1] = i;
+    owner[2 * i] = comm->me;
+    owner[2 * i + 1] = i;
   }
-  share_with_ghosts(owner.data());
+  share_with_ghosts(owner.data(), 2);
   told_particles_.choose(chosen, owner, images, turn());
 }
 
@@ -170,8 +173,9 @@ int GhostExchange::pack_forward(int n, const int *list, double *buffer) const
   if (exchanging_ == Exchange::CHOSEN) return chosen_ghosts_.pack_owned(list, exchanged_, buffer);
   if (exchanging_ == Exchange::CHOSEN_SINGLE)
     return chosen_ghosts_.pack_owned(list, exchanged_single_, buffer);
-  for (int k = 0; k < n; ++k) std::copy_n(exchanged_ + 3 * list[k], 3, buffer + 3 * k);
-  return 3 * n;
+  for (int k = 0; k < n; ++k)
+    std::copy_n(exchanged_ + numbers_ * list[k], numbers_, buffer + numbers_ * k);
+  return numbers_ * n;
 }
 
 void GhostExchange::unpack_forward(int n, int first, const double *buffer)
@@ -182,7 +186,7 @@ void GhostExchange::unpack_forward(int n, int first, const double *buffer)
   else if (exchanging_ == Exchange::CHOSEN_SINGLE)
     chosen_ghosts_.set_ghosts(first, buffer, exchanged_single_);
   else
-    std::copy_n(buffer, 3 * n, exchanged_ + 3 * first);
+    std::copy_n(buffer, numbers_ * n, exchanged_ + numbers_ * first);
 }
 
 int GhostExchange::pack_reverse(int n, int first, double *buffer)
@@ -205,12 +209,12 @@ int GhostExchange::pack_reverse(int n, int first, double *buffer)
       return chosen_ghosts_.pack_ghosts(first, exchanged_, buffer);
     case Exchange::CHOSEN_SINGLE:
       return chosen_ghosts_.pack_ghosts(first, exchanged_single_, buffer);
-    case Exchange::VECTORS:
+    case Exchange::SUMS:
     case Exchange::LEAST:
       break;
   }
-  std::copy_n(exchanged_ + 3 * first, 3 * n, buffer);
-  return 3 * n;
+  std::copy_n(exchanged_ + numbers_ * first, numbers_ * n, buffer);
+  return numbers_ * n;
 }
 
 void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
@@ -233,15 +237,16 @@ void GhostExchange::unpack_reverse(int n, const int *list, const double *buffer)
       chosen_ghosts_.add_to_owned(list, buffer, exchanged_single_);
       return;
     case Exchange::LEAST:
-      for (int k = 0; k < n; ++k)
-        for (int d = 0; d < 3; ++d)
-          exchanged_[3 * list[k] + d] = std::min(exchanged_[3 * list[k] + d], buffer[3 * k + d]);
-      return;
-    case Exchange::VECTORS:
+    case Exchange::SUMS:
       break;
   }
+  const bool sums = exchanging_ == Exchange::SUMS;
   for (int k = 0; k < n; ++k)
-    for (int d = 0; d < 3; ++d) exchanged_[3 * list[k] + d] += buffer[3 * k + d];
+    for (int d = 0; d < numbers_; ++d) {
+      double &owned = exchanged_[numbers_ * list[k] + d];
+      const double told = *buffer++;
+      owned = sums ? owned + told : std::min(owned, told);
+    }
 }
 
 void GhostExchange::reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima)

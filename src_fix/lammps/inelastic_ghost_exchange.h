@@ -34,12 +34,13 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   GhostExchange &operator=(const GhostExchange &) = delete;
 
   // The largest messages, in numbers per atom: LAMMPS sizes its buffers by these.
-  static constexpr int FORWARD_SIZE = 3;
+  static constexpr int FORWARD_SIZE = MOST_NUMBERS;
   static constexpr int REVERSE_SIZE =
       std::max(FirstGuesses::packed_size(FirstGuesses::ENTRIES_PER_MESSAGE),
                LawMemory::packed_size(LawMemory::ENTRIES_PER_MESSAGE));
+  static_assert(REVERSE_SIZE >= MOST_NUMBERS);
 
-  void sum_over_ghosts(double *per_particle) override;
+  void sum_over_ghosts(double *per_particle, int numbers) override;
   void sum_over_ranks(double *of_walls, int count) override;
   void choose_ghosts(const std::vector<char> &chosen) override;
   void sum_over_chosen_ghosts(double *per_particle) override;
@@ -47,15 +48,14 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   void choose_told(const std::vector<char> &chosen, bool images) override;
   void tell(const float *per_particle) override;
   void hear(int turn, float *per_particle) override;
-  void share_with_ghosts(double *per_particle) override;
+  void share_with_ghosts(double *per_particle, int numbers) override;
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override;
   bool has_ghosts() const override;
   int turns() const override;
   int turn() const override;
 
-  // Gives an owned atom and all its ghosts the least of their values, 3 numbers per particle.
-  // Collective.
-  void least_over_ghosts(double *per_particle);
+  // Gives an owned atom and all its ghosts the least of their values. Collective.
+  void least_over_ghosts(double *per_particle, int numbers);
 
   // Adds to each owned atom the contacts that its ghosts remember.
   void gather(FirstGuesses &guesses);
@@ -83,7 +83,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
 
  private:
   // The pack and unpack functions work on one of these.
-  enum class Exchange { VECTORS, LEAST, GUESSES, LAW_MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
+  enum class Exchange { SUMS, LEAST, GUESSES, LAW_MEMORY, CHOICE, CHOSEN, CHOSEN_SINGLE };
 
   void exchange(Exchange what, bool reverse, bool forward);
 
@@ -91,8 +91,9 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   PhaseClock &clock_;
   MPI_Op reduction_;
   MPI_Datatype reduction_type_;
-  Exchange exchanging_ = Exchange::VECTORS;
-  double *exchanged_ = nullptr;          // VECTORS, LEAST: 3 numbers per particle; CHOSEN: 4
+  Exchange exchanging_ = Exchange::SUMS;
+  double *exchanged_ = nullptr;          // SUMS, LEAST, CHOSEN
+  int numbers_ = 3;                      // per particle; CHOSEN: 4
   float *exchanged_single_ = nullptr;    // 4 numbers per particle
   FirstGuesses *exchanged_guesses_ = nullptr;
   LawMemory *exchanged_law_memory_ = nullptr;

@@ -72,14 +72,14 @@ void Rest::compare_loads()
   step_.load_change.clear();
   if (!any_stopped_) return;
   const inelastic::ContactProblem &problem = step_.problem;
-  step_.load_change.assign(3 * static_cast<std::size_t>(problem.particles), 0.0);
+  step_.load_change.assign(problem.particles, 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
     const double before = step_.impulse_per_force * state_.load_at_rest(i);
     if (before == 0.0) continue;
-    const std::size_t first = 3 * static_cast<std::size_t>(i);
-    step_.load_change[first] = norm(&problem.predicted_velocity[first]) / before;
+    step_.load_change[i] =
+        norm(&problem.predicted_velocity[3 * static_cast<std::size_t>(i)]) / before;
   }
-  ranks_.share_with_ghosts(step_.load_change.data());
+  ranks_.share_with_ghosts(step_.load_change.data(), 1);
 }
 
 bool Rest::look(const inelastic::ProjectionResult &result)
@@ -219,23 +219,23 @@ void Rest::mark_held(Fate fate)
     const int k = motions_.clusters().of(static_cast<int>(i));
     if (k != Clusters::NONE && fates_[k] == fate) held_[i] = 0;
   }
-  std::vector<double> marks(3 * held_.size(), 0.0);
+  std::vector<double> marks(held_.size(), 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!motions_.counts(i) || fates_[motions_.clusters().of(i)] != fate) continue;
     const Motion motion = motions_.motion_of(i);
     if (!motions_.is_held(i, motion)) continue;
-    marks[3 * i] = 1.0;
+    marks[i] = 1.0;
     unit_[i] = motions_.unit(i, motion);
   }
-  ranks_.share_with_ghosts(marks.data());
+  ranks_.share_with_ghosts(marks.data(), 1);
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
   for (std::size_t i = 0; i < held_.size(); ++i)
-    if (marks[3 * i] != 0.0) held_[i] = 1;
+    if (marks[i] != 0.0) held_[i] = 1;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const auto first = bodies.member.begin() + bodies.start[b];
     const auto last = bodies.member.begin() + bodies.start[b + 1];
     const bool any = std::any_of(first, last, [&](int i) {
-      return marks[3 * static_cast<std::size_t>(i)] != 0.0;
+      return marks[i] != 0.0;
     });
     if (!any) continue;
     std::for_each(first, last, [this](int i) {
@@ -426,14 +426,13 @@ std::vector<double> Rest::common_velocities(const std::vector<double> &velocity,
 std::vector<char> Rest::touched_particles() const
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
-  std::vector<double> touches(3 * held_.size(), 0.0);
+  std::vector<double> touches(held_.size(), 0.0);
   for (std::size_t c = 0; c < contacts.size(); ++c)
     for (const int i : {contacts.first[c], contacts.second[c]})
-      if (contacts.impulse[c] != 0.0 && !step_.problem.is_wall(i))
-        touches[3 * static_cast<std::size_t>(i)] = 1.0;
-  ranks_.sum_over_ghosts(touches.data());
+      if (contacts.impulse[c] != 0.0 && !step_.problem.is_wall(i)) touches[i] = 1.0;
+  ranks_.sum_over_ghosts(touches.data(), 1);
   std::vector<char> touched(held_.size());
-  for (std::size_t i = 0; i < touched.size(); ++i) touched[i] = touches[3 * i] > 0.0;
+  for (std::size_t i = 0; i < touched.size(); ++i) touched[i] = touches[i] > 0.0;
   const inelastic::RigidBodies &bodies = step_.problem.bodies;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     char any = 0;

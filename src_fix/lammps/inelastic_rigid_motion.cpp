@@ -99,9 +99,9 @@ void RigidMotion::gather_momenta(double kick)
     }
     take_carried(i);
   }
-  ranks_.share_with_ghosts(linear_.data());
-  ranks_.share_with_ghosts(change_.data());
-  ranks_.share_with_ghosts(carried_part_.data());
+  ranks_.share_with_ghosts(linear_.data(), 3);
+  ranks_.share_with_ghosts(change_.data(), 3);
+  ranks_.share_with_ghosts(carried_part_.data(), 3);
 }
 
 // Sets the part of a body's angular momentum that does not act at its members' arms: the first

@@ -34,7 +34,7 @@ void SphereMotion::predict_after(double kick, std::vector<double> &velocity)
       velocity[3 * i + d] = before + kick_per_force * atom->f[i][d];
     }
   }
-  ranks_.share_with_ghosts(velocity.data());
+  ranks_.share_with_ghosts(velocity.data(), 3);
 }
 
 void SphereMotion::apply(const double *)

@@ -60,8 +60,8 @@ struct StepState {
   std::vector<LawState> law_states;
   // 3 per slot, before forces; only with a law (the movers)
   std::vector<double> velocity_before;
-  // 3 per particle, of which the first is the factor by which the forces on one that is at rest
-  // have changed since the last step; 0 where this is not known. Empty if nothing is at rest.
+  // Per particle: the factor by which the forces on one that is at rest have changed since the last
+  // step; 0 where this is not known. Empty if nothing is at rest.
   // (rest)
   std::vector<double> load_change;
 

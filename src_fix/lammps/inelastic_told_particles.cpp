@@ -60,10 +60,10 @@ ToldParticles::Lists ToldParticles::list_particles(const std::vector<char> &chos
                                                    const std::vector<double> &owner)
 {
   const auto particle_of = [&](int atom) {
-    return std::pair(static_cast<int>(owner[3 * atom]), static_cast<int>(owner[3 * atom + 1]));
+    return std::pair(static_cast<int>(owner[2 * atom]), static_cast<int>(owner[2 * atom + 1]));
   };
   atoms_.clear();
-  for (int i = 0; i < static_cast<int>(owner.size() / 3); ++i)
+  for (int i = 0; i < static_cast<int>(owner.size() / 2); ++i)
     if (chosen[i]) atoms_.push_back(i);
   std::sort(atoms_.begin(), atoms_.end(), [&](int i, int j) {
     return std::pair(particle_of(i), i) < std::pair(particle_of(j), j);

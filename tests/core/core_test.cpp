@@ -3,6 +3,7 @@
 // undefined-behaviour sanitizers; the solvers are judged in test_solver*.py. Returns 1 when a check
 // failed.
 
+#include "inelastic_constraint_colours.h"
 #include "inelastic_contact_problem.h"
 #include "inelastic_contact_set.h"
 #include "inelastic_gap_operator.h"
@@ -386,6 +387,51 @@ void test_resize_sets_walls_still()
     }
 }
 
+// Constraints of one colour share nothing that moves, but those of the last one; what nothing moves
+// is shared freely.
+void test_colours()
+{
+  constexpr int LAST = ConstraintColours::LAST, MANY = 80, WALL = 2 * MANY;
+  std::vector<int> first, second;
+  // A chain, a particle in more contacts than there are colours, and a wall in all others.
+  for (int k = 0; k + 1 < MANY; ++k) {
+    first.push_back(k);
+    second.push_back(k + 1);
+  }
+  for (int k = 0; k < MANY; ++k) {
+    first.push_back(MANY);
+    second.push_back(k + 1 < MANY ? MANY + 1 + k : WALL);
+  }
+  for (int k = 0; k < MANY; ++k) {
+    first.push_back(MANY + 1 + k);
+    second.push_back(WALL);
+  }
+  std::vector<char> moves(WALL + 1, 1);
+  moves[WALL] = 0;
+  const ConstraintColours colours(first, second, moves);
+  CHECK_EQUAL(colours.size(), first.size());
+  std::size_t counted = 0;
+  for (int colour = 0; colour <= LAST; ++colour) {
+    std::vector<int> used(moves.size(), 0);
+    std::size_t count = 0;
+    for (std::size_t c = 0; c < first.size(); ++c) {
+      if (colours[c] != colour) continue;
+      ++count;
+      for (const int mover : {first[c], second[c]})
+        if (moves[mover] && colour < LAST) CHECK_EQUAL(used[mover]++, 0);
+    }
+    CHECK_EQUAL(colours.count(colour), count);
+    counted += count;
+  }
+  CHECK_EQUAL(counted, first.size());
+  CHECK_EQUAL(colours[0], 0);
+  CHECK_EQUAL(colours[1], 1);
+  CHECK_EQUAL(colours.count(LAST), static_cast<std::size_t>(MANY - LAST));
+  // With a wall alone in common all have the first colour.
+  const ConstraintColours of_wall({0, 1, 2}, {3, 3, 3}, {1, 1, 1, 0});
+  CHECK_EQUAL(of_wall.count(0), std::size_t{3});
+}
+
 void test_residual()
 {
   const double gaps[5] = {-0.1, 0.2, 0.3, 0.5, 0.4};
@@ -393,7 +439,7 @@ void test_residual()
   const double normal[3] = {0.0, 0.0, 1.0};
   ContactSet contacts;
   const auto add = [&](int c) {
-    contacts.add(0, 1, normal, 0.0, impulses[c], 0.0, least[c]);
+    contacts.add(0, 1, normal, 0.0, impulses[c], 0.0, HalfLine<double>::pulls(-least[c]));
     return residual(gaps, contacts);
   };
   add(0);
@@ -945,6 +991,7 @@ class Ranks {
 
   struct Arrays {
     double *per_particle = nullptr;
+    int numbers = 3;    // per particle
     double *sums = nullptr, *maxima = nullptr;
     int number_of_sums = 0, number_of_maxima = 0;
     const std::vector<char> *chosen = nullptr;    // copies that count; null = all
@@ -976,7 +1023,7 @@ class Ranks {
 
   void sum_over_ghosts()
   {
-    std::vector<double> sums(3 * static_cast<std::size_t>(particles_), 0.0);
+    std::vector<double> sums(arrays_[0].numbers * static_cast<std::size_t>(particles_), 0.0);
     for_each_value(false, [&](double &mine, std::size_t k) {
       sums[k] += mine;
     });
@@ -989,7 +1036,7 @@ class Ranks {
 
   void share_with_ghosts()
   {
-    std::vector<double> owned(3 * static_cast<std::size_t>(particles_), 0.0);
+    std::vector<double> owned(arrays_[0].numbers * static_cast<std::size_t>(particles_), 0.0);
     for_each_value(true, [&](double &mine, std::size_t k) {
       owned[k] = mine;
     });
@@ -1052,9 +1099,10 @@ class Ranks {
       const std::vector<char> *const chosen = arrays_[rank].chosen;
       for (std::size_t i = 0; i < count; ++i) {
         if (chosen && i >= static_cast<std::size_t>(share.owned) && !(*chosen)[i]) continue;
-        for (std::size_t d = 0; d < 3; ++d)
-          visit(arrays_[rank].per_particle[3 * i + d],
-                3 * static_cast<std::size_t>(share.particles[i]) + d);
+        const auto numbers = static_cast<std::size_t>(arrays_[rank].numbers);
+        for (std::size_t d = 0; d < numbers; ++d)
+          visit(arrays_[rank].per_particle[numbers * i + d],
+                numbers * static_cast<std::size_t>(share.particles[i]) + d);
       }
     }
   }
@@ -1080,7 +1128,8 @@ class RankHost final : public Host {
  public:
   RankHost(Ranks &ranks, std::size_t rank) : ranks_(ranks), rank_(rank) {}
 
-  void sum_over_ghosts(double *per_particle) override { sum(per_particle, 3, nullptr); }
+  void sum_over_ghosts(double *per_particle, int numbers) override
+  { sum(per_particle, numbers, numbers, nullptr); }
 
   bool has_ghosts() const override { return true; }
   int turns() const override { return ranks_.turns; }
@@ -1090,8 +1139,8 @@ class RankHost final : public Host {
     chosen_ = chosen;
     ranks_.call("choose_ghosts", rank_, {}, &Ranks::choose_ghosts);
   }
-  void sum_over_chosen_ghosts(double *per_particle) override { sum(per_particle, 4, &chosen_); }
-  void sum_over_chosen_ghosts(float *per_particle) override { sum(per_particle, 4, &chosen_); }
+  void sum_over_chosen_ghosts(double *per_particle) override { sum(per_particle, 4, 3, &chosen_); }
+  void sum_over_chosen_ghosts(float *per_particle) override { sum(per_particle, 4, 3, &chosen_); }
 
   void choose_told(const std::vector<char> &chosen, bool images) override
   {
@@ -1121,39 +1170,42 @@ class RankHost final : public Host {
 
   void sum_over_ranks(double *of_walls, int count) override
   {
-    const Ranks::Arrays arrays = {nullptr, of_walls, nullptr, count, 0};
+    const Ranks::Arrays arrays = {nullptr, 0, of_walls, nullptr, count, 0};
     ranks_.call("sum_over_ranks", rank_, arrays, &Ranks::reduce);
   }
 
-  void share_with_ghosts(double *per_particle) override
+  void share_with_ghosts(double *per_particle, int numbers) override
   {
     Ranks::Arrays arrays;
     arrays.per_particle = per_particle;
+    arrays.numbers = numbers;
     ranks_.call("share_with_ghosts", rank_, arrays, &Ranks::share_with_ghosts);
   }
 
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override
   {
-    const Ranks::Arrays arrays = {nullptr, sums, maxima, number_of_sums, number_of_maxima};
+    const Ranks::Arrays arrays = {nullptr, 0, sums, maxima, number_of_sums, number_of_maxima};
     ranks_.call("reduce " + std::to_string(number_of_sums) + " sums and " +
                     std::to_string(number_of_maxima) + " maxima",
                 rank_, arrays, &Ranks::reduce);
   }
 
  private:
-  template <typename Real> void sum(Real *per_particle, int stride, const std::vector<char> *chosen)
+  template <typename Real>
+  void sum(Real *per_particle, int stride, int numbers, const std::vector<char> *chosen)
   {
     const std::size_t count = ranks_.shares()[rank_].particles.size();
-    std::vector<double> packed(3 * count);
+    std::vector<double> packed(numbers * count);
     for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t d = 0; d < 3; ++d) packed[3 * i + d] = per_particle[stride * i + d];
+      for (int d = 0; d < numbers; ++d) packed[numbers * i + d] = per_particle[stride * i + d];
     Ranks::Arrays arrays;
     arrays.per_particle = packed.data();
+    arrays.numbers = numbers;
     arrays.chosen = chosen;
     ranks_.call("sum_over_ghosts", rank_, arrays, &Ranks::sum_over_ghosts);
     for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t d = 0; d < 3; ++d)
-        per_particle[stride * i + d] = static_cast<Real>(packed[3 * i + d]);
+      for (int d = 0; d < numbers; ++d)
+        per_particle[stride * i + d] = static_cast<Real>(packed[numbers * i + d]);
   }
 
   Ranks &ranks_;
@@ -1246,7 +1298,7 @@ std::vector<RankOutcome> solve_on_ranks(const ContactProblem &whole, Ranks &rank
     threads.emplace_back([&, rank] {
       RankHost host(ranks, rank);
       ContactProblem problem = part_of(whole, ranks.shares()[rank], contacts[rank]);
-      host.share_with_ghosts(problem.predicted_velocity.data());
+      host.share_with_ghosts(problem.predicted_velocity.data(), 3);
       const auto solver = make_solver(solver_name);
       RankOutcome &outcome = outcomes[rank];
       if (hide_contacts) {
@@ -1534,7 +1586,7 @@ void test_periodic_images(bool joined)
     }
     Ranks ranks({share}, COUNT);
     RankHost host(ranks, 0);
-    host.share_with_ghosts(problem.predicted_velocity.data());
+    host.share_with_ghosts(problem.predicted_velocity.data(), 3);
     AllContactsKnown source;
     std::vector<double> velocity;
     const auto solver = make_solver(name);
@@ -1605,6 +1657,7 @@ int main()
   test_empty_problems();
   test_contact_set();
   test_resize_sets_walls_still();
+  test_colours();
   test_residual();
   test_gap_operator();
   test_rigid_bodies();
