@@ -5,7 +5,6 @@
 #include "inelastic_vectorise.h"
 
 #include <algorithm>
-#include <type_traits>
 
 namespace inelastic::swept {
 
@@ -245,18 +244,18 @@ namespace {
   using Set = HalfLine<float>;
 
   // Writes the gaps of constraints with some impulses, of which `opened` is what all make of them.
-  template <typename Size, bool SPRINGS, typename Group>
+  template <typename Size, typename Group>
   INELASTIC_INLINE void find_gap(const Group &group, const Rest *springs, int from,
                                  const typename Size::Numbers &impulse,
                                  const typename Size::Numbers &opened, typename Size::Numbers &gap)
   {
-    if constexpr (SPRINGS)
+    if (springs)
       gap = part<Size>(group.gap, from) + part<Size>(springs->give, from) * impulse + opened;
     else
       gap = part<Size>(group.gap, from) + opened;
   }
 
-  template <typename Size, bool SPRINGS, typename Group>
+  template <typename Size, typename Group>
   INELASTIC_INLINE void sweep_all(Group *groups, const Rest *springs, std::size_t count,
                                   typename Group::State *states, float along, float blur,
                                   Swept &swept)
@@ -271,7 +270,7 @@ namespace {
         opening(group, from, states, loaded, opened);
         const V now = part<Size>(group.now, from);
         const V led = now + along * (now - part<Size>(group.before, from));
-        find_gap<Size, SPRINGS>(group, SPRINGS ? springs + g : nullptr, from, led, opened, gap);
+        find_gap<Size>(group, springs ? springs + g : nullptr, from, led, opened, gap);
         const V free = led - gap;
         Set::project(free, part<Size>(group.idle, from), next);
         const V change = next - led;
@@ -293,7 +292,7 @@ namespace {
     swept.farthest = std::max(swept.farthest, largest_of<Size>(farthest));
   }
 
-  template <typename Size, bool SPRINGS, typename Group>
+  template <typename Size, typename Group>
   INELASTIC_INLINE double unsolved_of_all(const std::vector<Group> &groups, const Rest *springs,
                                           const typename Group::State *states, float blur)
   {
@@ -305,20 +304,21 @@ namespace {
         V opened, gap, open;
         opening(group, from, states, loaded, opened);
         const V &now = part<Size>(group.now, from);
-        find_gap<Size, SPRINGS>(group, springs, from, now, opened, gap);
+        find_gap<Size>(group, springs, from, now, opened, gap);
         Set::find_open(now, part<Size>(group.idle, from), gap, open);
         const V left = open > -gap ? open : -gap;
         const V ratio = (left - blur) * part<Size>(group.inverse_target, from);
         unsolved = ratio > unsolved ? ratio : unsolved;
       }
-      if constexpr (SPRINGS) ++springs;
+      if (springs) ++springs;
     }
     return largest_of<Size>(unsolved);
   }
 
-  template <typename Size, bool SPRINGS, typename Group>
+  template <typename Size, typename Group>
   INELASTIC_INLINE float look_at_all(const std::vector<Group> &groups, const Rest *rest,
-                                     const typename Group::State *states, Looked *looked)
+                                     const Rest *springs, const typename Group::State *states,
+                                     Looked *looked)
   {
     using V = typename Size::Numbers;
     V residual = {};
@@ -329,7 +329,7 @@ namespace {
         V opened, scaled, open;
         opening(group, from, states, loaded, opened);
         const V &now = part<Size>(group.now, from), &idle = part<Size>(group.idle, from);
-        find_gap<Size, SPRINGS>(group, rest, from, now, opened, scaled);
+        find_gap<Size>(group, springs ? rest : nullptr, from, now, opened, scaled);
         const V gap = scaled * part<Size>(rest->root, from);
         part<Size>(looked->gap, from) = gap;
         Set::find_open(now, idle, gap, open);
@@ -419,60 +419,26 @@ namespace {
   }
 
   // The passes over groups of each kind, by vectors of eight and of four numbers.
-#define INELASTIC_PASSES(GROUP, SPRINGS)                                                          \
-  INELASTIC_CLONES void wide_sweep(std::bool_constant<SPRINGS>, GROUP *groups,                    \
-                                   const Rest *springs, std::size_t count, GROUP::State *states,  \
-                                   float along, float blur, Swept &swept)                         \
-  { sweep_all<Wide, SPRINGS>(groups, springs, count, states, along, blur, swept); }               \
-  INELASTIC_CLONES double wide_unsolved(std::bool_constant<SPRINGS>,                              \
-                                        const std::vector<GROUP> &groups, const Rest *springs,    \
-                                        const GROUP::State *states, float blur)                   \
-  { return unsolved_of_all<Wide, SPRINGS>(groups, springs, states, blur); }                       \
-  INELASTIC_CLONES float wide_look(std::bool_constant<SPRINGS>, const std::vector<GROUP> &groups, \
-                                   const Rest *rest, const GROUP::State *states, Looked *looked)  \
-  { return look_at_all<Wide, SPRINGS>(groups, rest, states, looked); }
-
-  INELASTIC_PASSES(ParticleGroup, false)
-  INELASTIC_PASSES(ParticleGroup, true)
-  INELASTIC_PASSES(BodyGroup, false)
-  INELASTIC_PASSES(BodyGroup, true)
-
-#define INELASTIC_OTHER_PASSES(GROUP)                                                    \
-  INELASTIC_CLONES void wide_targets(GROUP *groups, const Rest *rest, std::size_t count, \
-                                     const float *changed, float most)                   \
-  { set_all_targets<Wide>(groups, rest, count, changed, most); }                         \
-  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,            \
-                                 GROUP::State *states)                                   \
+#define INELASTIC_PASSES(GROUP)                                                                 \
+  INELASTIC_CLONES void wide_sweep(GROUP *groups, const Rest *springs, std::size_t count,       \
+                                   GROUP::State *states, float along, float blur, Swept &swept) \
+  { sweep_all<Wide>(groups, springs, count, states, along, blur, swept); }                      \
+  INELASTIC_CLONES double wide_unsolved(const std::vector<GROUP> &groups, const Rest *springs,  \
+                                        const GROUP::State *states, float blur)                 \
+  { return unsolved_of_all<Wide>(groups, springs, states, blur); }                              \
+  INELASTIC_CLONES float wide_look(const std::vector<GROUP> &groups, const Rest *rest,          \
+                                   const Rest *springs, const GROUP::State *states,             \
+                                   Looked *looked)                                              \
+  { return look_at_all<Wide>(groups, rest, springs, states, looked); }                          \
+  INELASTIC_CLONES void wide_targets(GROUP *groups, const Rest *rest, std::size_t count,        \
+                                     const float *changed, float most)                          \
+  { set_all_targets<Wide>(groups, rest, count, changed, most); }                                \
+  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,                   \
+                                 GROUP::State *states)                                          \
   { add_all<Wide>(groups, when, states); }
 
-  INELASTIC_OTHER_PASSES(ParticleGroup)
-  INELASTIC_OTHER_PASSES(BodyGroup)
-
-  template <typename Springs, typename Group>
-  void sweep(Springs, Group *groups, const Rest *springs, std::size_t count,
-             typename Group::State *states, float along, float blur, Swept &swept)
-  {
-    if (is_wide())
-      wide_sweep(Springs{}, groups, springs, count, states, along, blur, swept);
-    else
-      sweep_all<Narrow, Springs::value>(groups, springs, count, states, along, blur, swept);
-  }
-
-  template <typename Springs, typename Group>
-  double find_unsolved(Springs, const std::vector<Group> &groups, const Rest *springs,
-                       const typename Group::State *states, float blur)
-  {
-    return is_wide() ? wide_unsolved(Springs{}, groups, springs, states, blur)
-                     : unsolved_of_all<Narrow, Springs::value>(groups, springs, states, blur);
-  }
-
-  template <typename Springs, typename Group>
-  float look(Springs, const std::vector<Group> &groups, const Rest *rest,
-             const typename Group::State *states, Looked *looked)
-  {
-    return is_wide() ? wide_look(Springs{}, groups, rest, states, looked)
-                     : look_at_all<Narrow, Springs::value>(groups, rest, states, looked);
-  }
+  INELASTIC_PASSES(ParticleGroup)
+  INELASTIC_PASSES(BodyGroup)
 
 }    // namespace
 
@@ -480,22 +446,22 @@ namespace {
   void sweep(GROUP *groups, const Rest *springs, std::size_t count, GROUP::State *states,    \
              float along, float blur, Swept &swept)                                          \
   {                                                                                          \
-    if (springs)                                                                             \
-      sweep(std::true_type{}, groups, springs, count, states, along, blur, swept);           \
+    if (is_wide())                                                                           \
+      wide_sweep(groups, springs, count, states, along, blur, swept);                        \
     else                                                                                     \
-      sweep(std::false_type{}, groups, springs, count, states, along, blur, swept);          \
+      sweep_all<Narrow>(groups, springs, count, states, along, blur, swept);                 \
   }                                                                                          \
   double find_unsolved(const std::vector<GROUP> &groups, const Rest *springs,                \
                        const GROUP::State *states, float blur)                               \
   {                                                                                          \
-    return springs ? find_unsolved(std::true_type{}, groups, springs, states, blur)          \
-                   : find_unsolved(std::false_type{}, groups, springs, states, blur);        \
+    return is_wide() ? wide_unsolved(groups, springs, states, blur)                          \
+                     : unsolved_of_all<Narrow>(groups, springs, states, blur);               \
   }                                                                                          \
   float look(const std::vector<GROUP> &groups, const Rest *rest, const Rest *springs,        \
              const GROUP::State *states, Looked *looked)                                     \
   {                                                                                          \
-    return springs ? look(std::true_type{}, groups, rest, states, looked)                    \
-                   : look(std::false_type{}, groups, rest, states, looked);                  \
+    return is_wide() ? wide_look(groups, rest, springs, states, looked)                      \
+                     : look_at_all<Narrow>(groups, rest, springs, states, looked);           \
   }                                                                                          \
   void set_targets(GROUP *groups, const Rest *rest, std::size_t count, const float *changed, \
                    float most)                                                               \
