@@ -17,17 +17,6 @@ using inelastic::norm;
 
 namespace {
 
-// A cluster is quiet if the root mean square of its held particles' speeds is at most this part of
-// the mean speed that they would have without contacts, and its motion as a whole this part of what
-// resists it.
-constexpr double QUIET = 0.1;
-// A trial comes where this speed is at most so large a part, or some accuracies where these are
-// more: what is faster still moves when it has begun at rest.
-constexpr double SLOW = 0.005;
-// So many quiet steps come before a trial: a force that nothing balances would show.
-constexpr double PATIENCE = 8.0;
-// The count of a cluster at rest, and of one that was and did not balance in the last step.
-constexpr double RESTS = PATIENCE + 1.0, RESTED = RESTS + 1.0;
 // The part of the accuracy to which contacts are solved in a trial, and before a cluster at rest is
 // let go. The residuals of a bed, which is isostatic, make velocities of some fifty times their
 // size.
@@ -41,29 +30,13 @@ constexpr int MOST_TRIALS = 12;
 // What is at rest shows it in few iterations, since its forces are known: the first trial takes as
 // many as the step, or this number, and more accurate ones so many times that.
 constexpr long MOST_ITERATIONS = 250, MORE_ITERATIONS = 4;
-// After a trial in which something held moved so many quiet steps more come before the next one;
-// none more if the cluster was at rest just before.
-constexpr double PAUSE = 8.0;
-// A particle at rest is no faster than so many accuracies; a coarser accuracy counts as the one
-// below.
-constexpr double AT_REST = 5.0;
-constexpr double COARSEST_ACCURACY = 1.0e-3;
-// When it comes to rest it is no faster than so many along the normal of a contact with something
-// that is not held: as much of the force there is lacking.
-constexpr double SLIP = 1.0;
-// An error of the solver becomes smaller than this part in the more accurate solution of a trial.
-constexpr double ERRORS_LEFT = 0.5;
-// Below this part of what particles would have without contacts slip is round-off.
-constexpr double LEAST_SLIP = 1.0e-9;
-// A cluster moves if it is faster than this part of what it would be without contacts, whatever
-// resists it.
-constexpr double ROUND_OFF = 1.0e-12;
 
 }    // namespace
 
 Rest::Rest(LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state, Movers &movers) :
-    Pointers(lmp), step_(step), ranks_(ranks), state_(state), motions_(lmp, step, ranks, state),
-    trial_(step, ranks, movers), hold_still_(step, ranks, movers, inelastic::make_solver("apgd"))
+    Pointers(lmp), step_(step), ranks_(ranks), state_(state), rules_(step),
+    motions_(lmp, step, ranks, state), trial_(step, ranks, movers),
+    hold_still_(step, ranks, movers, inelastic::make_solver("apgd"))
 {
 }
 
@@ -102,8 +75,8 @@ bool Rest::look(const inelastic::ProjectionResult &result)
   double any = 0.0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const int one = clusters.of(contacts.first[c]), other = clusters.of(contacts.second[c]);
-    const bool refines = (one != Clusters::NONE && needs_refinement(motions_[one])) ||
-        (other != Clusters::NONE && needs_refinement(motions_[other]));
+    const bool refines = (one != Clusters::NONE && rules_.needs_refinement(motions_[one])) ||
+        (other != Clusters::NONE && rules_.needs_refinement(motions_[other]));
     contacts.refinement[c] = std::min(refines ? REFINED : 1.0, step_.contact_of(c).refinement());
     if (refines) any = 1.0;
   }
@@ -112,57 +85,13 @@ bool Rest::look(const inelastic::ProjectionResult &result)
 }
 
 void Rest::look_again()
-{ motions_.measure(PATIENCE); }
-
-bool Rest::is_quiet(const ClusterMotion &cluster) const
-{
-  const double round_off = ROUND_OFF * cluster.without_contacts;
-  return cluster.supported && !cluster.driven &&
-      cluster.held_speed <= QUIET * cluster.without_contacts &&
-      cluster.speed <= std::max(QUIET * cluster.resisted, round_off);
-}
-
-// Tells whether something in a quiet cluster moves that contacts are to hold.
-bool Rest::moves(const ClusterMotion &cluster) const
-{
-  const double round_off = ROUND_OFF * cluster.without_contacts;
-  return cluster.fastest > limit() ||
-      cluster.speed > std::max(limit() * cluster.resisted, round_off);
-}
-
-// Tells whether a quiet cluster is so slow that a trial may pass.
-bool Rest::is_slow(const ClusterMotion &cluster) const
-{
-  const double part = std::clamp(AT_REST * step_.settings.accuracy, SLOW, QUIET);
-  return cluster.held_speed <= part * cluster.without_contacts;
-}
-
-// Tells whether something held gives way to, or follows, what is not held, in a trial after a less
-// accurate one in which the cluster moved so.
-bool Rest::slips(const ClusterMotion &cluster, const ClusterMotion &less_accurate) const
-{
-  if (cluster.slip <= LEAST_SLIP * cluster.without_contacts) return false;
-  return cluster.most_slip > SLIP / AT_REST * limit() ||
-      cluster.slip > ERRORS_LEFT * less_accurate.slip;
-}
-
-bool Rest::is_at_rest(const ClusterMotion &cluster) const
-{ return cluster.quiet_steps == RESTS; }
-
-bool Rest::was_at_rest(const ClusterMotion &cluster) const
-{ return cluster.quiet_steps == RESTED; }
-
-bool Rest::needs_refinement(const ClusterMotion &cluster) const
-{ return is_at_rest(cluster) && is_quiet(cluster) && moves(cluster); }
+{ motions_.measure(RestRules::PATIENCE); }
 
 void Rest::forget()
 {
   for (int i = 0; i < atom->nlocal; ++i)
     state_.quiet_steps(i) = std::min(state_.quiet_steps(i), 0.0);
 }
-
-double Rest::limit() const
-{ return AT_REST * std::min(step_.settings.accuracy, COARSEST_ACCURACY); }
 
 /* ----------------------------------------------------------------------
    which clusters rest
@@ -202,11 +131,11 @@ void Rest::decide()
   unit_.assign(step_.problem.particles, 0.0);
   for (std::size_t k = 0; k < fates_.size(); ++k) {
     const ClusterMotion &cluster = motions_[k];
-    if (is_at_rest(cluster))
-      fates_[k] = is_quiet(cluster) && !moves(cluster) ? Fate::RESTS : Fate::LET_GO;
+    if (rules_.is_at_rest(cluster))
+      fates_[k] = rules_.is_quiet(cluster) && !rules_.moves(cluster) ? Fate::RESTS : Fate::LET_GO;
     // In the half kick of a run nothing is tried: velocities may have been given.
-    else if ((cluster.quiet_steps == PATIENCE || was_at_rest(cluster)) && is_quiet(cluster) &&
-             is_slow(cluster) && step_.kick == Kick::WHOLE)
+    else if ((cluster.quiet_steps == RestRules::PATIENCE || rules_.was_at_rest(cluster)) &&
+             rules_.is_quiet(cluster) && rules_.is_slow(cluster) && step_.kick == Kick::WHOLE)
       fates_[k] = Fate::FAILS;
   }
   mark_held(Fate::RESTS);
@@ -304,9 +233,9 @@ bool Rest::judge_trial(bool solved, const std::vector<ClusterMotion> &of_coarser
     const ClusterMotion &cluster = of_trial[k] = motions_[k];
     if (fates_[k] != Fate::FAILS && fates_[k] != Fate::PASSES) continue;
     fates_[k] = Fate::FAILS;
-    if (!solved || !is_quiet(cluster) || moves(cluster)) continue;
+    if (!solved || !rules_.is_quiet(cluster) || rules_.moves(cluster)) continue;
     // What was at rest before the last step did not slip then.
-    if (was_at_rest(cluster) || !slips(cluster, of_coarser[k])) {
+    if (rules_.was_at_rest(cluster) || !rules_.slips(cluster, of_coarser[k])) {
       fates_[k] = Fate::PASSES;
       held_in_trial_[k] = cluster.held;
     } else
@@ -481,7 +410,8 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!held.particles[i]) continue;
     const int k = clusters.of(i);
-    if (motions_.speed_between(i, by_contacts, balanced) > limit() * unit_[i]) unbalanced[k] = 1.0;
+    if (motions_.speed_between(i, by_contacts, balanced) > rules_.limit() * unit_[i])
+      unbalanced[k] = 1.0;
   }
   const std::vector<char> touched = touched_particles();
   for (int i = 0; i < atom->nlocal; ++i)
@@ -515,24 +445,24 @@ void Rest::end_step(const HoldStill::Held &held)
     const std::vector<double> &predicted = fate == Fate::PASSES ? trial_.predicted()
                                                                 : step_.problem.predicted_velocity;
     const double drift = norm(cluster.common.data());
-    const bool stays = drift <= ROUND_OFF * cluster.without_contacts;
+    const bool stays = drift <= RestRules::ROUND_OFF * cluster.without_contacts;
     if (stopped) maxima[0] = 1.0;
     if (stopped && stays)
       state_.load_at_rest(i) =
           norm(&predicted[3 * static_cast<std::size_t>(i)]) / step_.impulse_per_force;
     const double own_speed = stopped ? 0.0 : motions_.motion_of(i).speed;
-    if (std::max(drift, own_speed) > limit() * cluster.without_contacts) maxima[1] = 1.0;
+    if (std::max(drift, own_speed) > rules_.limit() * cluster.without_contacts) maxima[1] = 1.0;
     // No time passes in the half kick with which a run starts.
     if (step_.kick == Kick::HALF) continue;
     double &own = state_.quiet_steps(i);
     if (fate == Fate::RESTS || (fate == Fate::PASSES && !held.particles.empty()))
-      own = RESTS;
+      own = RestRules::RESTS;
     else if (fate == Fate::UNBALANCED)
-      own = RESTED;
+      own = RestRules::RESTED;
     else if (fate == Fate::FAILS || fate == Fate::PASSES)
-      own = was_at_rest(cluster) ? 0.0 : -PAUSE;
-    else if (fate == Fate::MOVES && is_quiet(cluster))
-      own = std::min(cluster.quiet_steps, PATIENCE - 1.0) + 1.0;
+      own = rules_.was_at_rest(cluster) ? 0.0 : -RestRules::PAUSE;
+    else if (fate == Fate::MOVES && rules_.is_quiet(cluster))
+      own = std::min(cluster.quiet_steps, RestRules::PATIENCE - 1.0) + 1.0;
     else
       own = std::min(cluster.quiet_steps, 0.0);
   }

@@ -42,6 +42,7 @@
 #include "inelastic_cluster_motions.h"
 #include "inelastic_hold_still.h"
 #include "inelastic_projection.h"
+#include "inelastic_rest_rules.h"
 #include "inelastic_rest_trial.h"
 #include "inelastic_step.h"
 
@@ -83,15 +84,7 @@ class Rest : protected Pointers {
     RESTS
   };
 
-  bool is_quiet(const ClusterMotion &cluster) const;
-  bool moves(const ClusterMotion &cluster) const;
-  bool is_slow(const ClusterMotion &cluster) const;
-  bool slips(const ClusterMotion &cluster, const ClusterMotion &less_accurate) const;
-  bool is_at_rest(const ClusterMotion &cluster) const;
-  bool was_at_rest(const ClusterMotion &cluster) const;
-  bool needs_refinement(const ClusterMotion &cluster) const;
   void forget();
-  double limit() const;
 
   void decide();
   long try_clusters(double least_length);
@@ -114,11 +107,12 @@ class Rest : protected Pointers {
   Step &step_;
   GhostExchange &ranks_;
   AtomState &state_;
+  const RestRules rules_;
   ClusterMotions motions_;
   RestTrial trial_;
   RestTrial::Begun begun_;    // of the trial
   HoldStill hold_still_;
-  std::vector<Fate> fates_;    // by cluster
+  std::vector<Fate> fates_;                  // by cluster
   std::vector<Directions> held_in_trial_;    // by cluster, of those that pass
   // By particle, ghosts included: whether it is stopped if its cluster rests or passes; and by
   // owned particle its unit then (inelastic_cluster_motions.h).

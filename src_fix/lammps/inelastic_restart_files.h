@@ -26,9 +26,9 @@ class RestartFiles : protected Pointers {
   bool has_memory() const { return !law_.empty(); }
   bool is_of_same_law() const;
 
-  // Error: a file holds what contacts remember for a fix with another ID than this one. LAMMPS gives
-  // it to the fix with the same ID alone, and tells nobody before the end of the first run. Without
-  // a law there is little to lose.
+  // Error: a file holds what contacts remember for a fix with another ID than this one. LAMMPS
+  // gives it to the fix with the same ID alone, and tells nobody before the end of the first run.
+  // Without a law there is little to lose.
   void find_lost_memory(const char *id, const char *style) const;
 
   // Warns where the fix is gone and with it what the law remembers of so many contacts.
