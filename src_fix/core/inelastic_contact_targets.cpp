@@ -13,7 +13,7 @@ namespace inelastic {
 namespace {
 
   // In a bed of many contacts residuals make velocities of some hundred times their size, in a
-  // chain of n up to n times (which inelastic_accelerated_gradient.h looks at).
+  // chain of n up to n times (which inelastic_settling.h looks at).
   constexpr double IN_NETWORKS = 1.0 / 16.0;
   // Bodies turn, too: the softest motions of their networks are softer.
   constexpr double OF_BODIES = 1.0 / 48.0;

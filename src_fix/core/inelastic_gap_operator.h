@@ -3,7 +3,7 @@
 //   w(lambda) = gap + h G V* + A lambda,   A = h G M^-1 G^T + C
 //
 // in the notation of inelastic_contact_problem.h. Every verdict on impulses applies A through this
-// class, in double precision. (The iterations of inelastic_accelerated_gradient.h have a fast form
+// class, in double precision. (The iterations of inelastic_gradient_search.h have a fast form
 // of their own.)
 
 #pragma once

@@ -109,6 +109,13 @@ double GradientSearch<Real>::see(const packed::Passed &passed, Solve &solve)
   return packed_residual;
 }
 
+template <typename Real> bool GradientSearch<Real>::ends_on_plateau(Solve &solve) const
+{
+  if (!solve.is_on_plateau()) return false;
+  iterations_.impulses_before(solve.scales(), solve.impulse());
+  return solve.ends_on_plateau(solve.is_time_for_slow_modes());
+}
+
 // Iterates until all residuals, judged in double precision, are at most their targets and
 // velocities settle, or more iterations in this precision are of no use.
 template <typename Real> End GradientSearch<Real>::run(Solve &solve)
@@ -135,11 +142,9 @@ template <typename Real> End GradientSearch<Real>::run(Solve &solve)
       return End::NOT_FINITE;
     }
     const double packed_residual = see(passed, solve);
-    if (result.iterations % PLATEAU_EVERY == 0 && solve.is_on_plateau() &&
-        scales.length * packed_residual <= limits.tolerance) {
-      iterations_.impulses_before(scales, impulse);
-      if (solve.ends_on_plateau(solve.is_time_for_slow_modes())) return End::SOLVED;
-    }
+    if (result.iterations % PLATEAU_EVERY == 0 &&
+        scales.length * packed_residual <= limits.tolerance && ends_on_plateau(solve))
+      return End::SOLVED;
 
     // There is no better precision than double.
     blur = is_single() ? SINGLE_ROUND_OFF * passed.farthest : 0.0;

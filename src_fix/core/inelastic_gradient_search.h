@@ -66,6 +66,8 @@ template <typename Real> class GradientSearch final : public Search {
   // use.
   std::optional<End> judge_prospects(Solve &solve) const;
 
+  bool ends_on_plateau(Solve &solve) const;
+
   std::shared_ptr<Curvature> curvature_;
   PackedIterations<Real> iterations_;
 };

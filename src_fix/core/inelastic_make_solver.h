@@ -9,8 +9,8 @@
 
 namespace inelastic {
 
-// Makes the solver named "apgd" (inelastic_accelerated_gradient.h) or "uzawa" (inelastic_uzawa.h);
-// returns nullptr for any other name.
+// Makes the solver with a name: "sweeps" or "apgd", chains of searches
+// (inelastic_search_chain.h), or "uzawa" (inelastic_uzawa.h); returns nullptr for any other name.
 std::unique_ptr<Solver> make_solver(const std::string &name);
 
 }    // namespace inelastic

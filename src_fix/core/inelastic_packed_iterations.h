@@ -1,4 +1,4 @@
-// The iterations of inelastic_accelerated_gradient.h on packed arrays (inelastic_packed_kernels.h):
+// The iterations of inelastic_gradient_search.h on packed arrays (inelastic_packed_kernels.h):
 // this class packs a problem, runs the passes in the order that the exchange between ranks needs,
 // and unpacks impulses.
 //

@@ -1,4 +1,4 @@
-// The vector passes of one iteration of inelastic_accelerated_gradient.h, over packed arrays.
+// The vector passes of one iteration of inelastic_gradient_search.h, over packed arrays.
 //
 // Packed arrays hold the problem in the order and in the units in which the passes are fast, in
 // single (Real = float) or double precision. Vectors have four numbers, so that one instruction
@@ -64,7 +64,7 @@ template <typename Real, template <typename> typename Set> struct Pass {
   Real *gap_before;            // the gaps of the changes before; replaced by the present ones
   Vector<Real> *sum;           // per slot: sum of the next changes; zero before
   Real step, step_before;      // 1 / L, and that of the pass before
-  Real along, beyond, back;    // the weights of inelastic_accelerated_gradient.h
+  Real along, beyond, back;    // the weights of inelastic_momentum.h
   Real blur;                   // a residual below this may be round-off
 };
 

@@ -215,7 +215,7 @@ using namespace inelastic;
 class Forgetful final : public ContactLaw {
  public:
   int remembers() const override { return 4; }
-  Demand ask(const ContactState &, const double *) const override { return {false, 0.0, {-1e-9}}; }
+  Demand ask(const ContactState &, const double *) const override { return Demand::pulls(1e-9); }
 
   bool remember(const Impulse &, double *remembered) const override
   {
@@ -243,10 +243,10 @@ def test_what_need_not_be_kept_begins_anew(tmp_path: Path, lmp: Runner) -> None:
     ("old", "new", "said"),
     [
         ("{ return 4; }", "{ return 5; }", "remembers 5 values of a contact: 0 to 4 are allowed"),
-        ("{false, 0.0, {-1e-9}}", '{true, std::nan(""), {}}', "to part with the speed nan"),
-        ("{false, 0.0, {-1e-9}}", "{true, -1.0, {}}", "to part with the speed -1"),
-        ("{false, 0.0, {-1e-9}}", "{false, 0.0, {0.5}}", "to carry an impulse of at least 0.5"),
-        ("{false, 0.0, {-1e-9}}", '{false, 0.0, {std::nan("")}}', "of at least nan"),
+        ("pulls(1e-9)", 'parts_with(std::nan(""))', "to part with the speed nan"),
+        ("pulls(1e-9)", "parts_with(-1.0)", "to part with the speed -1"),
+        ("pulls(1e-9)", "pulls(-0.5)", "to carry an impulse of at least 0.5"),
+        ("pulls(1e-9)", 'pulls(-std::nan(""))', "of at least nan"),
     ],
 )
 def test_answers_that_no_law_may_give(
