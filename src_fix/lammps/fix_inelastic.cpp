@@ -24,11 +24,12 @@ FixInelastic::FixInelastic(LAMMPS *lmp, int narg, char **arg) :
     bodies_(settings_.has_bodies() ? new RigidMotion(lmp, step_, ranks_, state_) : nullptr),
     spheres_(lmp, step_, ranks_, state_), walls_(lmp, settings_.regions),
     constraints_(lmp, step_, ranks_, clock_, state_.first_guesses(), laws_, walls_, movers_),
-    length_(lmp, step_, ranks_), files_(lmp, step_, length_), rest_(lmp, step_, ranks_, state_, movers_),
-    prediction_(lmp, step_, walls_, laws_, movers_, rest_, clock_),
-    check_(lmp, this, step_, ranks_, state_, movers_), output_(lmp, step_, ranks_),
-    unrest_(lmp, step_, output_), summary_(lmp, step_, clock_),
-    trials_(lmp, step_, constraints_, length_, prediction_, movers_, ranks_, summary_, clock_)
+    length_(lmp, step_, ranks_), files_(lmp, step_, length_),
+    rest_(lmp, step_, ranks_, state_, movers_), check_(lmp, this, step_, ranks_, state_, movers_),
+    output_(lmp, step_, ranks_), unrest_(lmp, step_, output_), summary_(lmp, step_, clock_),
+    trials_(lmp, step_, constraints_, length_, movers_, ranks_, summary_, clock_, [this] {
+      predict();
+    })
 {
   movers_.add(&spheres_);
   if (bodies_) movers_.add(bodies_.get());
@@ -315,6 +316,26 @@ void FixInelastic::advance(int vflag, Kick kick)
   finish(result);
 }
 
+// Every other fix and force has done its work: sets up the problem, with the velocities that the
+// step would end with. Collective.
+void FixInelastic::predict()
+{
+  const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
+  const int nall = atom->nlocal + atom->nghost;
+  inelastic::ContactProblem &problem = step_.problem;
+  step_.impulse_per_force = step_.kicks() * update->dt * force->ftm2v;
+  problem.timestep = update->dt;
+  problem.resize(nall, walls_.number_of_walls());
+  for (int i = 0; i < nall; ++i)
+    problem.inverse_mass[i] = step_.is_mobile(atom, i) ? 1.0 / mass_of(atom, i) : 0.0;
+  if (laws_.has_law()) {
+    step_.velocity_before.assign(problem.predicted_velocity.size(), 0.0);
+    movers_.find_velocity_before(step_.velocity_before);
+  }
+  movers_.predict();
+  rest_.compare_loads();
+}
+
 // The step is solved: gives it to LAMMPS, to the output, and to the next step.
 void FixInelastic::finish(const inelastic::ProjectionResult &result)
 {
@@ -334,7 +355,8 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
     check_.after_step(output_.largest_change());
   }
   const bool solved = result.status == inelastic::Status::CONVERGED;
-  overlaps.end_step(solved && constraints_.entangled().empty(), trials_.push_apart().deepest_at_end());
+  overlaps.end_step(solved && constraints_.entangled().empty(),
+                    trials_.push_apart().deepest_at_end());
   restart_peratom = overlaps.pushes_in_velocity() || laws_.has_law();
   restart_global = length_.is_shortened() || laws_.has_law();
   {
@@ -413,9 +435,7 @@ int FixInelastic::pack_restart(int i, double *buffer)
 { return state_.pack_restart(i, buffer, restart_peratom != 0); }
 
 void FixInelastic::unpack_restart(int i, int nth)
-{
-  state_.unpack_restart(i, nth, files_.has_memory(), laws_.has_law() && files_.is_of_same_law());
-}
+{ state_.unpack_restart(i, nth, files_.has_memory(), laws_.has_law() && files_.is_of_same_law()); }
 
 int FixInelastic::size_restart(int i)
 { return state_.restart_size(i, restart_peratom != 0); }

@@ -23,7 +23,6 @@ FixStyle(inelastic,FixInelastic);
 #include "inelastic_law_contacts.h"
 #include "inelastic_motion_check.h"
 #include "inelastic_phase_clock.h"
-#include "inelastic_prediction.h"
 #include "inelastic_region_walls.h"
 #include "inelastic_rest.h"
 #include "inelastic_restart_files.h"
@@ -96,7 +95,6 @@ class FixInelastic : public Fix {
   Inelastic_NS::StepLength length_;
   Inelastic_NS::RestartFiles files_;
   Inelastic_NS::Rest rest_;
-  Inelastic_NS::Prediction prediction_;
   Inelastic_NS::MotionCheck check_;
   Inelastic_NS::ContactOutput output_;
   Inelastic_NS::Unrest unrest_;
@@ -112,6 +110,7 @@ class FixInelastic : public Fix {
   void check_volume();
   void begin_summary();
   void advance(int vflag, Inelastic_NS::Kick kick);
+  void predict();
   void finish(const inelastic::ProjectionResult &result);
 };
 

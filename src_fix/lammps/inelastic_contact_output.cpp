@@ -47,12 +47,13 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
     if (is_contact(c)) add_contact(c, contacts.impulse[c] * force_per_impulse, virial);
   share(virial);
 
-  double sums[5] = {counts_[0], counts_[1], static_cast<double>(contacts.size()), counts_[2],
-                    counts_[3]};
-  ranks_.reduce(sums, 5, &largest_change_, 1);
-  vector_[PARTICLE_CONTACTS] = sums[0];
-  vector_[WALL_CONTACTS] = sums[1];
-  vector_[CONSTRAINTS] = sums[2];
+  enum { PAIRS, WALLS, PRESSED, HELD, ROWS, SUMS };
+  double sums[SUMS] = {counts_.pairs, counts_.walls, counts_.pressed, counts_.held,
+                       static_cast<double>(contacts.size())};
+  ranks_.reduce(sums, SUMS, &largest_change_, 1);
+  vector_[PARTICLE_CONTACTS] = sums[PAIRS];
+  vector_[WALL_CONTACTS] = sums[WALLS];
+  vector_[CONSTRAINTS] = sums[ROWS];
   vector_[ITERATIONS] = static_cast<double>(result.iterations);
   vector_[FEASIBILITY] = result.residual.feasibility;
   vector_[COMPLEMENTARITY] = result.residual.complementarity;
@@ -63,8 +64,8 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   vector_[EXCESS] = step_.excess;
   vector_[PUSHED_STEPS] += step_.bad_start ? 1.0 : 0.0;
   vector_[AT_REST] = step_.at_rest ? 1.0 : 0.0;
-  vector_[PRESSED_CONTACTS] = sums[3];
-  vector_[HELD_CONTACTS] = sums[4];
+  vector_[PRESSED_CONTACTS] = sums[PRESSED];
+  vector_[HELD_CONTACTS] = sums[HELD];
 }
 
 // Tells whether a row is a contact of the output: it carries a force, or the law remembers
@@ -81,14 +82,11 @@ void ContactOutput::clear_sums(bool virial_per_atom)
   const std::size_t size = 3 * static_cast<std::size_t>(step_.problem.slots());
   contact_force_.assign(size, 0.0);
   contact_count_.assign(2 * static_cast<std::size_t>(step_.problem.slots()), 0.0);
-  if (virial_per_atom) {
-    virial_diagonal_.assign(size, 0.0);
-    virial_off_diagonal_.assign(size, 0.0);
-  }
+  if (virial_per_atom) { virial_.assign(2 * size, 0.0); }
   std::fill(wall_force_.begin(), wall_force_.end(), 0.0);
   wall_force_step_ = -1;
   local_rows_ = 0;
-  std::fill_n(counts_, 4, 0.0);
+  counts_ = Counts{};
   largest_change_ = 0.0;
 }
 
@@ -101,10 +99,10 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   const double *const n = &problem.contacts.normal[3 * c];
   const Contact &contact = step_.contact_of(c);
   const bool is_wall = contact.is_with_wall();
-  counts_[is_wall] += 1.0;
-  if (strength > 0.0) counts_[2] += 1.0;
+  (is_wall ? counts_.walls : counts_.pairs) += 1.0;
+  if (strength > 0.0) counts_.pressed += 1.0;
   const LawState *const law = step_.law_state_of(c);
-  if (law && law->kept) counts_[3] += 1.0;
+  if (law && law->kept) counts_.held += 1.0;
   largest_change_ = std::max(largest_change_,
                              std::abs(problem.contacts.impulse[c]) *
                                  (problem.inverse_mass[i] + problem.inverse_mass[j]));
@@ -155,24 +153,18 @@ void ContactOutput::add_virial(std::size_t c, double weight, const VirialTarget 
   if (!virial.per_atom) return;
   const int i = contacts.first[c];
   const int j = step_.contact_of(c).is_with_wall() ? i : contacts.second[c];
-  for (int k = 0; k < 3; ++k) {
-    virial_diagonal_[3 * i + k] += 0.5 * v[k];
-    virial_diagonal_[3 * j + k] += 0.5 * v[k];
-    virial_off_diagonal_[3 * i + k] += 0.5 * v[3 + k];
-    virial_off_diagonal_[3 * j + k] += 0.5 * v[3 + k];
+  for (int k = 0; k < 6; ++k) {
+    virial_[6 * i + k] += 0.5 * v[k];
+    virial_[6 * j + k] += 0.5 * v[k];
   }
 }
 
 void ContactOutput::share(const VirialTarget &virial)
 {
   if (virial.per_atom) {
-    ranks_.sum_over_ghosts(virial_diagonal_.data(), 3);
-    ranks_.sum_over_ghosts(virial_off_diagonal_.data(), 3);
+    ranks_.sum_over_ghosts(virial_.data(), 6);
     for (int i = 0; i < atom->nlocal; ++i)
-      for (int k = 0; k < 3; ++k) {
-        virial.atoms[i][k] += virial_diagonal_[3 * i + k];
-        virial.atoms[i][3 + k] += virial_off_diagonal_[3 * i + k];
-      }
+      for (int k = 0; k < 6; ++k) virial.atoms[i][k] += virial_[6 * i + k];
   }
   ranks_.sum_over_ghosts(contact_force_.data(), 3);
   ranks_.sum_over_ghosts(contact_count_.data(), 2);

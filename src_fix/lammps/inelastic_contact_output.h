@@ -86,6 +86,12 @@ class ContactOutput : protected Pointers {
   static constexpr double PER_CONTACT = 20.0 + LOCAL_COLUMNS;
 
  private:
+  // Contacts between spheres, and with walls; of these: pressed ones, and those of which the law
+  // remembers something.
+  struct Counts {
+    double pairs = 0.0, walls = 0.0, pressed = 0.0, held = 0.0;
+  };
+
   bool is_contact(std::size_t c) const;
   void clear_sums(bool virial_per_atom);
   void add_contact(std::size_t c, double strength, const VirialTarget &virial);
@@ -101,12 +107,10 @@ class ContactOutput : protected Pointers {
   double **local_ = nullptr;
   int local_rows_ = 0;
   int local_room_ = 0;
-  // Contacts of spheres, with walls; of these: pressed ones, and those of which the law remembers
-  // something.
-  double counts_[4] = {};
+  Counts counts_;
   // 3 per slot (inelastic_unknowns.h), and 2: contacts with particles, and with walls
   std::vector<double> contact_force_, contact_count_;
-  std::vector<double> virial_diagonal_, virial_off_diagonal_;
+  std::vector<double> virial_;        // 6 per slot
   std::vector<double> wall_force_;    // 3 per wall, this rank's share
   std::vector<double> wall_force_total_;
   bigint wall_force_step_ = -1;

@@ -4,13 +4,13 @@
 #include "inelastic_ghost_exchange.h"
 #include "inelastic_make_solver.h"
 #include "inelastic_phase_clock.h"
-#include "inelastic_prediction.h"
 #include "inelastic_run_summary.h"
 #include "inelastic_step_length.h"
 
 #include "update.h"
 
 #include <limits>
+#include <utility>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
@@ -22,10 +22,10 @@ constexpr int MAX_ROUNDS = 100;    // of adding constraints; a handful is usual
 }    // namespace
 
 StepTrials::StepTrials(LAMMPS *lmp, Step &step, Constraints &constraints, StepLength &length,
-                       Prediction &prediction, Movers &movers, GhostExchange &ranks,
-                       RunSummary &summary, PhaseClock &clock) :
+                       Movers &movers, GhostExchange &ranks, RunSummary &summary, PhaseClock &clock,
+                       std::function<void()> predict) :
     Pointers(lmp), step_(step), constraints_(constraints), length_(length),
-    prediction_(prediction), ranks_(ranks), summary_(summary), clock_(clock),
+    predict_(std::move(predict)), ranks_(ranks), summary_(summary), clock_(clock),
     solver_(inelastic::make_solver(step.settings.solver)),
     push_apart_(lmp, step, constraints, ranks, movers), hard_(lmp, step, ranks),
     energy_(lmp, step, constraints.rules(), ranks, movers),
@@ -57,7 +57,7 @@ StepTrials::Again StepTrials::try_once(inelastic::ProjectionResult &result)
   step_.keeps_overlaps = step_.keeps_overlaps || step_.waits;
   unsolved_.begin_trial();
   length_.fit_to_list();
-  prediction_.run();
+  predict_();
   constraints_.collect();
   constraints_.overlaps().share();
   // Beside bad overlaps, which count as touching and may leave no room, regular ones are kept.

@@ -12,21 +12,23 @@
 #include "inelastic_squeezed_grains.h"
 #include "inelastic_unsolved_step.h"
 
+#include <functional>
 #include <memory>
 
 namespace LAMMPS_NS::Inelastic_NS {
 
 class Constraints;
 class PhaseClock;
-class Prediction;
 class RunSummary;
 class StepLength;
 
 class StepTrials : protected Pointers {
  public:
+  // `predict` sets up the problem of the step at its present length, with the velocities that it
+  // would end with without contacts.
   StepTrials(class LAMMPS *lmp, Step &step, Constraints &constraints, StepLength &length,
-             Prediction &prediction, Movers &movers, GhostExchange &ranks, RunSummary &summary,
-             PhaseClock &clock);
+             Movers &movers, GhostExchange &ranks, RunSummary &summary, PhaseClock &clock,
+             std::function<void()> predict);
 
   // At the start of a run, and where its summary begins to count.
   void begin_run() { squeezed_.begin_run(); }
@@ -75,7 +77,7 @@ class StepTrials : protected Pointers {
   Step &step_;
   Constraints &constraints_;
   StepLength &length_;
-  Prediction &prediction_;
+  std::function<void()> predict_;
   GhostExchange &ranks_;
   RunSummary &summary_;
   PhaseClock &clock_;
