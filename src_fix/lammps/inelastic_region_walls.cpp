@@ -34,7 +34,7 @@ void let_only_parts_move(Region *region)
 WallView make_view(const Region::Contact &contact, int first_wall)
 {
   WallView view{};
-  view.wall = first_wall + contact.iwall;
+  view.surface = view.piece = first_wall + contact.iwall;
   view.distance = view.distance_now = contact.r;
   // Near a curved wall the distance is a small difference, with more round-off than the vector.
   const double length = std::sqrt(contact.delx * contact.delx + contact.dely * contact.dely +
@@ -322,7 +322,7 @@ void RegionWalls::view_moving(const Obstacle &obstacle, const Viewpoints &viewpo
       for (int d = 0; d < 3; ++d) entry.view.distance_now += entry.view.normal[d] * shift[d];
     look(region, x, EVERYTHING, seen_);
     for (const Contact &contact : seen_)
-      if (obstacle.first_wall + contact.iwall == entry.view.wall)
+      if (obstacle.first_wall + contact.iwall == entry.view.piece)
         entry.view.distance_now = contact.r;
     found(*entry.from, entry.view);
   }

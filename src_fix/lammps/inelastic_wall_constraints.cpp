@@ -112,7 +112,7 @@ double WallConstraints::opening_of(int i, int wall, const double *normal,
 // contacts give the wall.
 double WallConstraints::gap_at_end(const WallView &view, int i) const
 {
-  const double *const of_wall = &step_.velocity[3 * step_.problem.slot_of_wall(view.wall - 1)];
+  const double *const of_wall = &step_.velocity[3 * step_.problem.slot_of_wall(view.surface - 1)];
   return view.distance - atom->radius[i] - step_.problem.timestep * dot(view.normal, of_wall);
 }
 
@@ -134,10 +134,10 @@ void WallConstraints::collect(double margin)
         clear_of_walls_[from.atom] = 0.0;
         const double gap = view.distance - atom->radius[from.atom];
         const double gap_now = view.distance_now - atom->radius[from.atom];
-        rules_.overlaps().note(gap_now, from.atom, -view.wall);
-        const double opening = opening_of(from.atom, view.wall, view.normal, velocity);
+        rules_.overlaps().note(gap_now, from.atom, -view.surface);
+        const double opening = opening_of(from.atom, view.surface, view.normal, velocity);
         if (gap + std::min(0.0, opening) <= margin ||
-            rows_.remembers(from.atom, -view.wall, view.normal, gap_now, atom->radius[from.atom]))
+            rows_.remembers(from.atom, -view.surface, view.normal, gap_now, atom->radius[from.atom]))
           take(from, view);
       },
       [&](const Viewpoint &from, const std::string &region) {
@@ -152,7 +152,7 @@ void WallConstraints::note_overlaps_with_moving_walls()
 {
   for (Viewpoint &from : viewpoints_) from.reach = atom->radius[from.atom];
   walls_.view_moving_now(viewpoints_, [&](const Viewpoint &from, const WallView &view) {
-    rules_.overlaps().note(view.distance - from.reach, from.atom, -view.wall);
+    rules_.overlaps().note(view.distance - from.reach, from.atom, -view.surface);
   });
 }
 
@@ -160,9 +160,9 @@ void WallConstraints::take(const Viewpoint &from, const WallView &view)
 {
   const int i = from.atom;
   const double motion = view.distance_now - view.distance;
-  constraint_[key(i, view.wall)] = step_.problem.contacts.size();
-  rows_.add(contact_with(i, view.wall, view.distance_now - atom->radius[i]), motion, i,
-            step_.problem.slot_of_wall(view.wall - 1), view.normal);
+  constraint_[key(i, view.piece)] = step_.problem.contacts.size();
+  rows_.add(contact_with(i, view.surface, view.distance_now - atom->radius[i]), motion, i,
+            step_.problem.slot_of_wall(view.surface - 1), view.normal);
 }
 
 // A contact of an atom with a wall that is at this gap now [length].
@@ -178,9 +178,9 @@ long WallConstraints::add_violated()
       viewpoints(velocity, 0.0), false,
       [&](const Viewpoint &from, const WallView &view) {
         const double gap = view.distance - atom->radius[from.atom];
-        const double opening = opening_of(from.atom, view.wall, view.normal, velocity);
+        const double opening = opening_of(from.atom, view.surface, view.normal, velocity);
         if (gap + opening < -step_.settings.tolerance &&
-            !constraint_.count(key(from.atom, view.wall)))
+            !constraint_.count(key(from.atom, view.piece)))
           take(from, view);
       },
       [](const Viewpoint &, const std::string &) {
@@ -199,7 +199,7 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   if (step_.relinearisations > GapRules::MAX_RELINEARISATIONS) return 0;
   const int i = from.atom;
   const double h = step_.problem.timestep;
-  const auto existing = constraint_.find(key(i, view.wall));
+  const auto existing = constraint_.find(key(i, view.piece));
   const bool known = existing != constraint_.end();
   const double *const n = view.normal;
   const double *const x = atom->x[i];
@@ -216,9 +216,9 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   const double to_plane = gap_here + wall_motion;
   const bool is_beyond =
       to_plane < 0.0 && (view.convex || (walls_.any_moves() && rules_.overlaps().is_bad(to_plane)));
-  Contact unseen = contact_with(i, view.wall, is_beyond ? 0.0 : to_plane);
+  Contact unseen = contact_with(i, view.surface, is_beyond ? 0.0 : to_plane);
   const Contact &contact = known ? step_.contact_of(existing->second) : unseen;
-  rules_.overlaps().note(contact.gap_now, i, -view.wall);
+  rules_.overlaps().note(contact.gap_now, i, -view.surface);
   // With `turning` the gap is exact for this motion, also where a body turns.
   const double turning = step_.is_member(i)
       ? h * (dot(n, &step_.motion()[3 * i]) - dot(n, &step_.velocity[3 * i]))
@@ -235,7 +235,7 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   }
   const int place = known ? step_.rows[existing->second].contact
                           : rows_.add_late(unseen, wall_motion, i, n);
-  constraint_[key(i, view.wall)] = step_.problem.contacts.size();
+  constraint_[key(i, view.piece)] = step_.problem.contacts.size();
   rows_.add_plane({place, wall_motion, false, step_.is_member(i)}, i, n, gap);
   return 1;
 }
@@ -248,11 +248,11 @@ long WallConstraints::relinearise(double margin)
   walls_.view(
       viewpoints_at_end(margin), only_inexact(),
       [&](const Viewpoint &from, const WallView &view) {
-        const auto existing = constraint_.find(key(from.atom, view.wall));
+        const auto existing = constraint_.find(key(from.atom, view.piece));
         const bool known = existing != constraint_.end();
         if (known) seen.insert(existing->second);
         const Contact contact = known ? step_.contact_of(existing->second)
-                                      : contact_with(from.atom, view.wall, 0.0);
+                                      : contact_with(from.atom, view.surface, 0.0);
         const double gap = gap_at_end(view, from.atom);
         // The walls behind a periodic boundary are as exact as others.
         const bool exact = is_image(from) && walls_.exact() && !step_.is_member(from.atom);
@@ -338,7 +338,7 @@ long WallConstraints::add_planes_within(const Viewpoints &beyond)
 bool WallConstraints::is_kept_by_plane(const Viewpoint &from, const WallView &view) const
 {
   const int i = from.atom;
-  const auto existing = constraint_.find(key(i, view.wall));
+  const auto existing = constraint_.find(key(i, view.piece));
   if (existing == constraint_.end() || step_.is_member(i) ||
       !is_same_plane(existing->second, view.normal))
     return false;

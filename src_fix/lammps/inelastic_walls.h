@@ -23,7 +23,10 @@ struct Viewpoint {
 
 // One wall seen from the centre of one sphere.
 struct WallView {
-  int wall;    // 1, 2, ... over all walls of the fix
+  // 1, 2, ... over all walls of the fix: memory, output and what moves go by surfaces. A sphere may
+  // touch several pieces of one, such as triangles; each has its constraint. Of a region they are
+  // the same.
+  int surface, piece;
   // [length] from the sphere's centre to the wall as it will stand at the end of the step
   double distance;
   // unit vector from the wall to the centre, for the wall at the end of the step
