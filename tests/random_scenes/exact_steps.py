@@ -55,6 +55,8 @@ def gives_nothing_back(record: core.Record, after: Table, shapes: list[Shape]) -
     linear = a["gap_now"] - a["wall_motion"] + problem.timestep * opens
     closes = np.maximum(0.0, linear - ends(record, after, shapes))
     kept = np.maximum(problem.gap, -closes - a["wall_motion"])
+    # No more than the overlap is given back, however far a body turns.
+    kept = np.minimum(kept, problem.gap + np.maximum(0.0, -a["gap_now"]))
     gap = np.where(a["gap_now"] < 0, kept, problem.gap)
     return core.Record({**a, "gap": gap})
 
