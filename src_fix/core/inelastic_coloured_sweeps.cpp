@@ -1,7 +1,7 @@
 #include "inelastic_coloured_sweeps.h"
 
+#include "inelastic_checkpoints.h"
 #include "inelastic_infeasibility.h"
-#include "inelastic_looks.h"
 #include "inelastic_momentum.h"
 #include "inelastic_solve.h"
 
@@ -52,8 +52,8 @@ namespace {
 }    // namespace
 
 // ROUND_OFF where double precision refuses what is solved in single precision.
-template <typename Group>
-End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Group>> &settling,
+template <typename Batch>
+End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Settling<PackedSweeps<Batch>> &settling,
                           Solve &solve)
 {
   const SolverLimits &limits = solve.limits;
@@ -61,7 +61,7 @@ End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Gro
   Host &host = solve.host;
   SolverResult &result = solve.result;
   Momentum momentum;
-  Looks looks(result.iterations);
+  Checkpoints checkpoints(result.iterations);
   Upkeep upkeep(result.iterations);
   ResidualTrend progress;
   const long begun = result.iterations;
@@ -69,7 +69,7 @@ End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Gro
   while (!solve.is_out_of_iterations()) {
     const swept::Swept mine = sweeps.sweep(momentum.next().along, blur, host);
     ++result.iterations;
-    double uphill = mine.uphill, maxima[3] = {mine.of_target, mine.change, mine.farthest};
+    double uphill = mine.uphill, maxima[3] = {mine.of_target, mine.change, mine.since_start};
     host.reduce(&uphill, 1, maxima, 3);
     const double of_target = maxima[0], change = maxima[1];
     if (first == 0.0) first = change;
@@ -78,9 +78,9 @@ End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Gro
     result.trend.see(result.iterations, scales.length * change);
     blur = SINGLE_ROUND_OFF * maxima[2];
 
-    if (looks.is_time(result.iterations, of_target)) {
+    if (checkpoints.is_due(result.iterations, of_target)) {
       double unsolved = find_unsolved(sweeps, blur, host);
-      looks.see(result.iterations, of_target, unsolved);
+      checkpoints.note(result.iterations, of_target, unsolved);
       const bool near = unsolved <= 1.0;
       const bool settled = near && settling.has_settled(limits.accuracy, host);
       if (settled) unsolved = find_unsolved(sweeps, blur, host);    // the targets are new
@@ -88,7 +88,8 @@ End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Gro
         sweeps.impulses(scales, solve.impulse());
         return solve.judge() ? End::SOLVED : End::ROUND_OFF;
       }
-      if (near && !settled) looks.wait(result.iterations + std::max(3L, result.iterations / 10));
+      if (near && !settled)
+        checkpoints.wait_until(result.iterations + std::max(3L, result.iterations / 10));
     }
     if ((result.iterations - begun) % PLATEAU_EVERY == 0)
       if (const auto end = leave_plateau(sweeps, blur, solve)) return *end;
@@ -105,7 +106,7 @@ End ColouredSweeps::sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Gro
   return End::GO_ON;
 }
 
-template <typename Group> End ColouredSweeps::search(PackedSweeps<Group> &sweeps, Solve &solve)
+template <typename Batch> End ColouredSweeps::search(PackedSweeps<Batch> &sweeps, Solve &solve)
 {
   const SolverLimits &limits = solve.limits;
   double refused = sweeps.prepare(solve.start(), solve.idle_gap(), solve.host) ? 0.0 : 1.0;

@@ -5,7 +5,7 @@
 //   led_k = x_k + along_k (x_k - x_k-1)
 //
 // and visits the constraints in the order of their colours (inelastic_packed_sweeps.h); the states
-// of particles and bodies are linear in the impulses, and are led on alike.
+// of particles and bodies are linear in the impulses, and are extrapolated alike.
 //
 // A sweep needs about half as many visits as inelastic_gradient_search.h needs iterations, and a
 // visit takes half the time. But no theory says that sweeps with momentum end. Where they do not,
@@ -28,14 +28,14 @@ class ColouredSweeps final : public Search {
   bool is_single() const override { return true; }
 
  private:
-  template <typename Group> End search(PackedSweeps<Group> &sweeps, Solve &solve);
+  template <typename Batch> End search(PackedSweeps<Batch> &sweeps, Solve &solve);
 
   // Sweeps until the impulses are a solution, or sweeps are of no more use.
-  template <typename Group>
-  End sweep(PackedSweeps<Group> &sweeps, Settling<PackedSweeps<Group>> &settling, Solve &solve);
+  template <typename Batch>
+  End sweep(PackedSweeps<Batch> &sweeps, Settling<PackedSweeps<Batch>> &settling, Solve &solve);
 
-  PackedSweeps<swept::ParticleGroup> of_particles_;
-  PackedSweeps<swept::BodyGroup> of_bodies_;
+  PackedSweeps<swept::ParticleBatch> of_particles_;
+  PackedSweeps<swept::BodyBatch> of_bodies_;
 };
 
 }    // namespace inelastic

@@ -8,7 +8,7 @@ namespace inelastic {
 ConstraintColours::ConstraintColours(const std::vector<int> &first, const std::vector<int> &second,
                                      const std::vector<char> &moves) : colour_(first.size())
 {
-  std::vector<std::uint64_t> taken(moves.size(), 0);    // a bit for each colour, per mover
+  std::vector<std::uint64_t> taken(moves.size(), 0);    // a bit for each colour, per grain
   for (std::size_t k = 0; k < first.size(); ++k) {
     const bool one = moves[first[k]], other = moves[second[k]];
     const std::uint64_t both = (one ? taken[first[k]] : 0) | (other ? taken[second[k]] : 0);

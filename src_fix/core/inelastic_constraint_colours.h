@@ -1,5 +1,5 @@
-// Colours of constraints: those of one colour have no mover in common, so that they can be worked
-// on together. (A mover is a particle that turns with nothing, or a body.)
+// Colours of constraints: those of one colour have no grain in common, so that they can be worked
+// on together. (A grain is a particle that turns with nothing, or a body.)
 
 #pragma once
 
@@ -11,12 +11,12 @@ namespace inelastic {
 
 class ConstraintColours {
  public:
-  // As many as a mask has bits. Constraints of the last one may have movers in common.
+  // As many as a mask has bits. Constraints of the last one may have grains in common.
   static constexpr int NUMBER = 64, LAST = NUMBER - 1;
 
-  // Colours constraints, given by the movers of both sides, in their order: each gets the first
-  // colour that no earlier one of either of its movers has. What no impulse moves (`moves` has an
-  // entry for each mover) is shared freely.
+  // Colours constraints, given by the grains of both sides, in their order: each gets the first
+  // colour that no earlier one of either of its grains has. What no impulse moves (`moves` has an
+  // entry for each grain) is shared freely.
   ConstraintColours(const std::vector<int> &first, const std::vector<int> &second,
                     const std::vector<char> &moves);
 

@@ -75,13 +75,13 @@ std::vector<double> ContactSet::pushing() const
 }
 
 double ContactSet::lacking(const double *impulses, const double *free_gap, double tolerance,
-                           double &farthest) const
+                           double &longest) const
 {
   double sum = 0.0;
   for (std::size_t c = 0; c < size(); ++c) {
     const double give = compliance[c] * impulses[c];
     sum -= impulses[c] * (free_gap[c] + give + tolerance);
-    farthest = std::max(farthest, -free_gap[c]);
+    longest = std::max(longest, -free_gap[c]);
   }
   return sum;
 }

@@ -72,9 +72,9 @@ struct ContactSet {
   // Returns the impulses of this set, without those that pull.
   std::vector<double> pushing() const;
   // Returns -lambda . (free_gap + C lambda + tolerance) [mass length^2 / time] for such impulses,
-  // and raises `farthest` to the largest overlap without impulses [length].
+  // and raises `longest` to the largest overlap without impulses [length].
   double lacking(const double *impulses, const double *free_gap, double tolerance,
-                 double &farthest) const;
+                 double &longest) const;
   // Tells whether the gap of a contact must be closed at the end of the step.
   bool is_loaded(std::size_t c) const { return set[c].is_loaded(impulse[c]); }
 

@@ -24,7 +24,7 @@ namespace {
   constexpr double ROUND_OFF = 8.0 * std::numeric_limits<double>::epsilon();
 
   // The slot that stands for all those that move together with this one.
-  int mover(const Unknowns &unknowns, int i)
+  int grain(const Unknowns &unknowns, int i)
   {
     const RigidBodies &bodies = unknowns.bodies;
     return unknowns.is_member(i) ? bodies.member[bodies.start[bodies.body[i]]] : i;
@@ -64,15 +64,15 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
   for (std::size_t c = 0; c < count; ++c) {
     const double load = contacts.magnitude(c) * diagonal_[c];
     if (load == 0.0) continue;
-    carried_[mover(problem, contacts.first[c])] += load;
-    carried_[mover(problem, contacts.second[c])] += load;
+    carried_[grain(problem, contacts.first[c])] += load;
+    carried_[grain(problem, contacts.second[c])] += load;
   }
   for (int slot = problem.particles; slot < problem.slots(); ++slot)
     if (!problem.is_mobile(slot)) carried_[slot] = 0.0;
   const double *const v = problem.predicted_velocity.data();
   length_.resize(carried_.size());
   for (std::size_t i = 0; i < length_.size(); ++i)
-    length_[i] = carried_[mover(problem, static_cast<int>(i))] + problem.timestep * norm(v + 3 * i);
+    length_[i] = carried_[grain(problem, static_cast<int>(i))] + problem.timestep * norm(v + 3 * i);
   for (std::size_t c = 0; c < count; ++c) {
     const bool of_bodies = problem.is_member(contacts.first[c]) ||
         problem.is_member(contacts.second[c]);

@@ -21,9 +21,9 @@
 // - r_c is the residual of the first guess: for two spheres that meet, by how much they would
 //   overlap;
 // - l_c is the length by which the contact's own impulse of the first guess would open its gap if
-//   its sides were as heavy as the heaviest of the scene. It matters where forces balance and
-//   change no velocity, and tells there what is small. (Light particles carry a heavy one: the
-//   length by which they would move is none that anything moves.)
+//   its sides were as heavy as the heaviest of the scene. Where forces balance they change no
+//   velocity, v_c is near zero, and l_c alone says what is small. (The sides' own masses would say
+//   too much: under a heavy particle light ones would move far by impulses that move nothing.)
 //
 // Changes of velocity are those of the present impulses. Contacts of bodies have A/48. A contact
 // whose refinement (inelastic_contact_set.h) is below 1 has that part of A.

@@ -25,8 +25,8 @@ namespace {
   packed::Passed over_ranks(const packed::Passed &mine, Host &host)
   {
     double sums[3] = {mine.uphill, mine.curved, mine.steep};
-    double maxima[6] = {-mine.least_gap, mine.most_under_force, mine.heaviest,
-                        mine.farthest,   mine.unsolved,         mine.unblurred};
+    double maxima[6] = {-mine.least_gap,  mine.most_under_force, mine.heaviest,
+                        mine.since_start, mine.unsolved,         mine.unblurred};
     host.reduce(sums, 3, maxima, 6);
     packed::Passed all;
     all.uphill = sums[0];
@@ -35,7 +35,7 @@ namespace {
     all.least_gap = -maxima[0];
     all.most_under_force = maxima[1];
     all.heaviest = maxima[2];
-    all.farthest = maxima[3];
+    all.since_start = maxima[3];
     all.unsolved = maxima[4];
     all.unblurred = maxima[5];
     return all;
@@ -147,7 +147,7 @@ template <typename Real> End GradientSearch<Real>::run(Solve &solve)
       return End::SOLVED;
 
     // There is no better precision than double.
-    blur = is_single() ? SINGLE_ROUND_OFF * passed.farthest : 0.0;
+    blur = is_single() ? SINGLE_ROUND_OFF * passed.since_start : 0.0;
     bool solved = passed.unblurred <= 1.0 && result.iterations >= next_check;
     if (solved && !settling.has_settled(limits.accuracy, host)) {
       solved = false;

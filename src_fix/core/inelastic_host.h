@@ -2,7 +2,7 @@
 // between ranks and global reductions.
 //
 // A rank holds the particles that it owns and, behind them, ghosts: particles that other ranks own,
-// and periodic images of its own. Every function but `tell` and `hear` is collective: all ranks
+// and periodic images of its own. Every function but `send` and `receive` is collective: all ranks
 // call it together. A host with one rank and without periodic images has nothing to do
 // (SerialHost).
 
@@ -24,10 +24,11 @@ class Host {
   // Returns whether any rank has ghosts. If none has, choose_ghosts need not be called.
   virtual bool has_ghosts() const = 0;
 
-  // Ranks that share particles may take turns in working on them: turns() is 1 or 2, the same on
-  // all ranks, and turn() that of this rank, from 0 on. Most neighbours should have different ones.
-  virtual int turns() const = 0;
-  virtual int turn() const = 0;
+  // Ranks that share particles may work on them one after the other: rank_colours() is 1 or 2, the
+  // same on all ranks, and rank_colour() that of this rank, from 0 on. Most neighbours should have
+  // different colours.
+  virtual int rank_colours() const = 0;
+  virtual int rank_colour() const = 0;
 
   // Chooses the ghosts for sum_over_chosen_ghosts. `chosen` has one entry per slot; the entries of
   // owned particles are not read, and those of walls have no meaning.
@@ -43,19 +44,19 @@ class Host {
   virtual void sum_over_chosen_ghosts(double *per_particle) = 0;
   virtual void sum_over_chosen_ghosts(float *per_particle) = 0;
 
-  // Chooses the particles of which ranks tell one another. `chosen` has one entry per slot; those
-  // of walls have no meaning. With `images` a rank that has several slots of a particle tells
-  // itself of each of them, too. Collective; the two functions below are not.
-  virtual void choose_told(const std::vector<char> &chosen, bool images) = 0;
+  // Chooses the particles that send() and receive(), which are not collective, serve. `chosen` has
+  // one entry per slot; those of walls have no meaning. With `images` several slots that a rank has
+  // of one particle receive from one another, too. Collective.
+  virtual void choose_shared(const std::vector<char> &chosen, bool images) = 0;
 
-  // Tells all others who have chosen a particle a vector of it, for each slot: 4 numbers per
+  // Sends a vector per slot to all other ranks that have chosen its particle: 4 numbers per
   // particle, of which the fourth has no meaning. Does not wait for them.
-  virtual void tell(const float *per_particle) = 0;
+  virtual void send(const float *per_particle) = 0;
 
-  // Adds to each chosen slot what the ranks of a turn have told of that particle, once each; what
-  // a slot has told itself is not added. Waits for what has not been told yet: each rank tells as
-  // often as all others hear its turn.
-  virtual void hear(int turn, float *per_particle) = 0;
+  // Adds to each chosen slot what the ranks of a colour have sent of its particle, once each, and
+  // nothing that the slot has sent itself. Waits for what has not arrived yet: each rank sends as
+  // often as all others receive from its colour.
+  virtual void receive(int colour, float *per_particle) = 0;
 
   // Gives every ghost the values of its owner. Programs that set up a problem need it: the ghosts
   // must have predicted velocities too.
@@ -74,14 +75,14 @@ class SerialHost final : public Host {
   void sum_over_ghosts(double *, int) override {}
   void sum_over_ranks(double *, int) override {}
   bool has_ghosts() const override { return false; }
-  int turns() const override { return 1; }
-  int turn() const override { return 0; }
+  int rank_colours() const override { return 1; }
+  int rank_colour() const override { return 0; }
   void choose_ghosts(const std::vector<char> &) override {}
   void sum_over_chosen_ghosts(double *) override {}
   void sum_over_chosen_ghosts(float *) override {}
-  void choose_told(const std::vector<char> &, bool) override {}
-  void tell(const float *) override {}
-  void hear(int, float *) override {}
+  void choose_shared(const std::vector<char> &, bool) override {}
+  void send(const float *) override {}
+  void receive(int, float *) override {}
   void share_with_ghosts(double *, int) override {}
   void reduce(double *, int, double *, int) override {}
 };

@@ -10,10 +10,10 @@
 // way by no more than its C lambda. Divided by the root of the mass that the impulses act on, the
 // right side is a length: the root mean square, by mass, of the distances from the predicted
 // positions at which admissible velocities would leave these particles, is at least so long. It is
-// not sensible to go on when this length is above SolverLimits::reach and above ten times every
-// overlap and every predicted motion. Without admissible velocities the impulses of a solver grow
-// for ever along a direction in which they balance, and the bound grows with them. With admissible
-// velocities nearby the bound never gets so large.
+// not sensible to go on when this length is above SolverLimits::longest_move and above ten times
+// every overlap and every predicted motion. Without admissible velocities the impulses of a solver
+// grow for ever along a direction in which they balance, and the bound grows with them. With
+// admissible velocities nearby the bound never gets so large.
 
 #pragma once
 

@@ -1,5 +1,5 @@
-// The momentum of accelerated iterations (Nesterov): how far an iteration is led on along the last
-// change. With t_0 = 1 and t_k+1 = (1 + sqrt(1 + 4 t_k^2)) / 2
+// The momentum of accelerated iterations (Nesterov): how far an iteration is extrapolated along the
+// last change. With t_0 = 1 and t_k+1 = (1 + sqrt(1 + 4 t_k^2)) / 2
 //
 //   along_k  = (t_k - 1) / t_k+1
 //   beyond_k = t_k / t_k+1

@@ -91,7 +91,7 @@ namespace {
                                                         std::size_t begin, std::size_t size,
                                                         const Real *gap, Real *next, Passed &passed)
   {
-    Real uphill = 0, curved = 0, steep = 0, lowest = 0, most = 0, heaviest = 0, farthest = 0,
+    Real uphill = 0, curved = 0, steep = 0, lowest = 0, most = 0, heaviest = 0, since_start = 0,
          unsolved = 0, beyond_blur = 0;
     const Real *const diagonal = pass.diagonal + begin;
     const Real *const compliance = pass.compliance + begin;
@@ -103,7 +103,7 @@ namespace {
     const Real step = pass.step, step_before = pass.step_before, along = pass.along,
                beyond = pass.beyond, back = pass.back, blur = pass.blur;
 #pragma omp simd simdlen(16) reduction(+ : uphill, curved, steep) reduction(min : lowest) \
-    reduction(max : most, heaviest, farthest, unsolved, beyond_blur)
+    reduction(max : most, heaviest, since_start, unsolved, beyond_blur)
     for (std::size_t k = 0; k < size; ++k) {
       const Real present = set[k].project(unbound[k]);
       const Real here = gap[k] + compliance[k] * present;
@@ -125,7 +125,7 @@ namespace {
       const Real load = set[k].load(value) * diagonal[k];
       heaviest = load > heaviest ? load : heaviest;
       const Real far = (value > 0 ? value : -value) * diagonal[k];
-      farthest = far > farthest ? far : farthest;
+      since_start = far > since_start ? far : since_start;
       const Real left = here < 0 ? -here : under_force;
       const Real part = left * inverse_target[k];
       unsolved = part > unsolved ? part : unsolved;
@@ -142,7 +142,7 @@ namespace {
     passed.least_gap = std::min(passed.least_gap, static_cast<double>(lowest));
     passed.most_under_force = std::max(passed.most_under_force, static_cast<double>(most));
     passed.heaviest = std::max(passed.heaviest, static_cast<double>(heaviest));
-    passed.farthest = std::max(passed.farthest, static_cast<double>(farthest));
+    passed.since_start = std::max(passed.since_start, static_cast<double>(since_start));
     passed.unsolved = std::max(passed.unsolved, static_cast<double>(unsolved));
     passed.unblurred = std::max(passed.unblurred, static_cast<double>(beyond_blur));
   }

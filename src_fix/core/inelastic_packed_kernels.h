@@ -78,7 +78,7 @@ struct Passed {
   double least_gap = 0.0;           // least present gap at the end of the step, at most 0
   double most_under_force = 0.0;    // largest present gap where an impulse acts, at least 0
   double heaviest = 0.0;            // largest of the next impulses, times D: a length
-  double farthest = 0.0;            // largest of the next changes, times D
+  double since_start = 0.0;         // largest of the next changes, times D
   // Largest present residual as a part of its target; the same with the residual less the blur
   double unsolved = 0.0, unblurred = 0.0;
 };

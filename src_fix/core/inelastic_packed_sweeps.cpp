@@ -8,16 +8,16 @@ namespace inelastic {
 
 namespace {
 
-  // At most so many lanes for each constraint, beside a group for each colour.
+  // At most so many lanes for each constraint, beside a batch for each colour.
   constexpr std::size_t MOST_LANES = 2;
 
-  bool is_loaded(const swept::Lanes &group, int lane)
-  { return HalfLine<float>::above(group.idle[lane]).is_loaded(group.now[lane]); }
+  bool is_loaded(const swept::Lanes &batch, int lane)
+  { return HalfLine<float>::above(batch.idle[lane]).is_loaded(batch.now[lane]); }
 
 }    // namespace
 
-template <typename Group>
-bool PackedSweeps<Group>::prepare(const Start &start, double idle_gap, Host &host)
+template <typename Batch>
+bool PackedSweeps<Batch>::prepare(const Start &start, double idle_gap, Host &host)
 {
   const ContactProblem &problem = start.problem;
   const ContactSet &contacts = problem.contacts;
@@ -25,14 +25,14 @@ bool PackedSweeps<Group>::prepare(const Start &start, double idle_gap, Host &hos
   idle_gap_ = static_cast<float>(idle_gap / start.scales.length);
   start_ = contacts.impulse;
   of_impulses_ = contacts.set;
-  movers_.find(problem, problem.timestep * (start.scales.impulse / start.scales.length));
+  grains_.find(problem, problem.timestep * (start.scales.impulse / start.scales.length));
   std::vector<std::size_t> near, far;
   for (std::size_t c = 0; c < start.gap.size(); ++c)
     (contacts.is_loaded(c) || !(start.gap[c] > idle_gap) ? near : far).push_back(c);
   shared_.find(problem, near, host);
   const bool has_springs = contacts.has_springs();
   for (Packed *const some : {&at_cuts_, &inside_, &idle_})
-    some->clear(movers_.number(), has_springs);
+    some->clear(grains_.number(), has_springs);
   const std::size_t lanes = pack(true, near) + pack(false, near);
   far_ = std::move(far);
   begin_search();
@@ -42,8 +42,8 @@ bool PackedSweeps<Group>::prepare(const Start &start, double idle_gap, Host &hos
 
 // Packs those of some constraints that are at cuts, or those that are not. Returns how many lanes
 // they take.
-template <typename Group>
-std::size_t PackedSweeps<Group>::pack(bool at_cuts, const std::vector<std::size_t> &constraints)
+template <typename Batch>
+std::size_t PackedSweeps<Batch>::pack(bool at_cuts, const std::vector<std::size_t> &constraints)
 {
   const ContactSet &contacts = given_->problem.contacts;
   std::vector<std::size_t> chosen;
@@ -61,27 +61,27 @@ std::size_t PackedSweeps<Group>::pack(bool at_cuts, const std::vector<std::size_
 }
 
 // Colours constraints, given by the slots of both sides.
-template <typename Group>
-ConstraintColours PackedSweeps<Group>::colour(const std::vector<int> &first,
+template <typename Batch>
+ConstraintColours PackedSweeps<Batch>::colour(const std::vector<int> &first,
                                               const std::vector<int> &second) const
 {
   std::vector<int> one(first.size()), other(first.size());
   for (std::size_t k = 0; k < first.size(); ++k) {
-    one[k] = movers_.of(first[k]);
-    other[k] = movers_.of(second[k]);
+    one[k] = grains_.of(first[k]);
+    other[k] = grains_.of(second[k]);
   }
-  return {one, other, movers_.moves()};
+  return {one, other, grains_.moves()};
 }
 
 // Begins with impulses that have not changed yet.
-template <typename Group> void PackedSweeps<Group>::begin_search()
+template <typename Batch> void PackedSweeps<Batch>::begin_search()
 {
-  movers_.stop(states_);
+  grains_.stop(states_);
   before_ = states_;
   targets_.begin(*given_);
 }
 
-template <typename Group> void PackedSweeps<Group>::go_on(double idle_gap)
+template <typename Batch> void PackedSweeps<Batch>::go_on(double idle_gap)
 {
   start_ = given_->problem.contacts.impulse;
   idle_gap_ = static_cast<float>(idle_gap / given_->scales.length);
@@ -98,91 +98,92 @@ template <typename Group> void PackedSweeps<Group>::go_on(double idle_gap)
   set_targets();
 }
 
-template <typename Group>
-void PackedSweeps<Group>::write(std::size_t c, Packed &packed, std::size_t place) const
+template <typename Batch>
+void PackedSweeps<Batch>::write(std::size_t c, Packed &packed, std::size_t place) const
 {
   const ContactProblem &problem = given_->problem;
   const ContactSet &contacts = problem.contacts;
-  Group &group = packed.group(place);
-  swept::Rest &rest = packed.rest_of(place);
+  Batch &batch = packed.batch(place);
+  swept::Details &details = packed.details_of(place);
   const int lane = static_cast<int>(place % WIDTH);
   const double unit = given_->scales.impulse / given_->scales.length;
   const double whole = given_->diagonal[c] + shared_.from_other_ranks(problem, c);
   // All is divided by the same number, which is kept in single precision.
-  rest.root[lane] = static_cast<float>(std::sqrt(whole * unit));
-  rest.give[lane] = static_cast<float>(contacts.compliance[c] / whole);
-  movers_.write_rows(problem, c, static_cast<double>(rest.root[lane]), group, lane);
-  rest.source[lane] = c;
-  rest.first[lane] = contacts.first[c];
-  rest.second[lane] = contacts.second[c];
+  details.root[lane] = static_cast<float>(std::sqrt(whole * unit));
+  details.compliance[lane] = static_cast<float>(contacts.compliance[c] / whole);
+  grains_.write_rows(problem, c, static_cast<double>(details.root[lane]), batch, lane);
+  details.source[lane] = c;
+  details.first[lane] = contacts.first[c];
+  details.second[lane] = contacts.second[c];
   write_start(packed, place);
 }
 
 // Writes what each search begins with.
-template <typename Group>
-void PackedSweeps<Group>::write_start(Packed &packed, std::size_t place) const
+template <typename Batch>
+void PackedSweeps<Batch>::write_start(Packed &packed, std::size_t place) const
 {
-  Group &group = packed.group(place);
-  swept::Rest &rest = packed.rest_of(place);
+  Batch &batch = packed.batch(place);
+  swept::Details &details = packed.details_of(place);
   const auto lane = place % WIDTH;
-  const std::size_t c = rest.source[lane];
+  const std::size_t c = details.source[lane];
   const Scales &scales = given_->scales;
   const double per_length = 1.0 / scales.length;
-  const auto root = static_cast<double>(rest.root[lane]);
-  group.gap[lane] = static_cast<float>(given_->gap[c] * per_length / root);
-  group.idle[lane] =
+  const auto root = static_cast<double>(details.root[lane]);
+  batch.gap[lane] = static_cast<float>(given_->gap[c] * per_length / root);
+  batch.idle[lane] =
       static_cast<float>(of_impulses_[c].changes_of(start_[c]).idle() / scales.impulse * root);
-  group.now[lane] = group.before[lane] = 0.0f;
-  rest.least_target[lane] = static_cast<float>(given_->targets.least()[c] * per_length);
-  rest.part[lane] = static_cast<float>(given_->targets.part()[c]);
+  batch.now[lane] = batch.before[lane] = 0.0f;
+  details.least_target[lane] = static_cast<float>(given_->targets.least()[c] * per_length);
+  details.part[lane] = static_cast<float>(given_->targets.part()[c]);
 }
 
-template <typename Group>
-swept::Swept PackedSweeps<Group>::sweep(double along, double blur, Host &host)
+template <typename Batch>
+swept::Swept PackedSweeps<Batch>::sweep(double along, double blur, Host &host)
 {
   const auto by = static_cast<float>(along), blurred = static_cast<float>(blur);
-  swept::lead_on(states_, before_, by);
+  swept::extrapolate(states_, before_, by);
   swept::Swept swept;
   const auto visit = [&](Packed &some, std::size_t from, std::size_t to) {
-    const swept::Rest *const springs = some.springs() ? some.springs() + from : nullptr;
-    swept::sweep(some.groups.data() + from, springs, to - from, states_.data(), by, blurred, swept);
+    const swept::Details *const springs = some.springs() ? some.springs() + from : nullptr;
+    swept::sweep(some.batches.data() + from, springs, to - from, states_.data(), by, blurred,
+                 swept);
   };
-  const std::size_t at_cuts = at_cuts_.groups.size(), inside = inside_.groups.size();
-  // Ranks of the first turn begin with their constraints at cuts, those of the second visit theirs
-  // after half of the others: messages arrive before somebody waits for them.
+  const std::size_t at_cuts = at_cuts_.batches.size(), inside = inside_.batches.size();
+  // Ranks of the first colour begin with their constraints at cuts, those of the second visit
+  // theirs after half of the others: messages arrive before somebody waits for them.
   const std::size_t begun = shared_.is_second() ? inside / 2 : 0;
   visit(inside_, 0, begun);
-  if (shared_.is_second()) shared_.hear_first(states_, host);
+  if (shared_.is_second()) shared_.receive_first(states_, host);
   shared_.keep_before_visit(at_cuts_, states_, by);
   visit(at_cuts_, 0, at_cuts);
-  shared_.tell_changes(at_cuts_, states_, host);
+  shared_.send_changes(at_cuts_, states_, host);
   visit(inside_, begun, inside);
-  if (!shared_.is_second()) shared_.hear_first(states_, host);
-  shared_.hear_second(states_, host);
+  if (!shared_.is_second()) shared_.receive_first(states_, host);
+  shared_.receive_second(states_, host);
   return swept;
 }
 
-template <typename Group> void PackedSweeps<Group>::refresh(Host &host)
+template <typename Batch> void PackedSweeps<Batch>::refresh(Host &host)
 {
   for (const swept::When when : {swept::When::NOW, swept::When::BEFORE}) {
     std::vector<State> &states = when == swept::When::NOW ? states_ : before_;
-    movers_.stop(states);
-    swept::add_impulses(at_cuts_.groups, when, states.data());
-    swept::add_impulses(inside_.groups, when, states.data());
-    shared_.tell_all(at_cuts_, when, states, host);
-    shared_.hear_all(states, host);
+    grains_.stop(states);
+    swept::add_impulses(at_cuts_.batches, when, states.data());
+    swept::add_impulses(inside_.batches, when, states.data());
+    shared_.send_all(at_cuts_, when, states, host);
+    shared_.receive_all(states, host);
   }
 }
 
 // Returns the change of velocity of each slot.
-template <typename Group>
-const std::vector<typename PackedSweeps<Group>::Vector> &PackedSweeps<Group>::velocities()
+template <typename Batch>
+const std::vector<typename PackedSweeps<Batch>::Vector> &PackedSweeps<Batch>::velocities()
 {
-  movers_.velocities(states_, velocity_);
+  grains_.velocities(states_, velocity_);
   return velocity_;
 }
 
-template <typename Group> bool PackedSweeps<Group>::sets_targets(long sweep)
+template <typename Batch> bool PackedSweeps<Batch>::sets_targets(long sweep)
 {
   if (sweep < 2) return false;
   int below = 0;    // 2^below is the largest power of two that is not more
@@ -191,49 +192,50 @@ template <typename Group> bool PackedSweeps<Group>::sets_targets(long sweep)
   return sweep % quarter == 0;
 }
 
-template <typename Group> void PackedSweeps<Group>::set_targets()
+template <typename Batch> void PackedSweeps<Batch>::set_targets()
 {
   targets_.set(velocities());
   for (Packed *const some : {&at_cuts_, &inside_}) set_targets(*some, 0);
 }
 
-// Sets the targets of the groups from a place on.
-template <typename Group>
-void PackedSweeps<Group>::set_targets(Packed &packed, std::size_t from) const
+// Sets the targets of the batches from a place on.
+template <typename Batch>
+void PackedSweeps<Batch>::set_targets(Packed &packed, std::size_t from) const
 {
-  swept::set_targets(packed.groups.data() + from, packed.rest.data() + from,
-                     packed.groups.size() - from, targets_.changed().data(), targets_.most());
+  swept::set_targets(packed.batches.data() + from, packed.details.data() + from,
+                     packed.batches.size() - from, targets_.changed().data(), targets_.most());
 }
 
-template <typename Group> double PackedSweeps<Group>::moved_since_kept(double accuracy)
+template <typename Batch> double PackedSweeps<Batch>::moved_since_kept(double accuracy)
 {
   targets_.compare(velocities());
   float most = 0.0f;
   for (const Packed *const some : {&at_cuts_, &inside_})
-    for (std::size_t g = 0; g < some->groups.size(); ++g) {
-      const Group &group = some->groups[g];
-      const swept::Rest &rest = some->rest[g];
+    for (std::size_t g = 0; g < some->batches.size(); ++g) {
+      const Batch &batch = some->batches[g];
+      const swept::Details &details = some->details[g];
       for (int lane = 0; lane < WIDTH; ++lane) {
-        if (!is_loaded(group, lane)) continue;
-        const int i = rest.first[lane], j = rest.second[lane];
-        most = std::max(most,
-                        targets_.moved(i, j) /
-                            targets_.free_target(i, j, rest.least_target[lane], rest.part[lane]));
+        if (!is_loaded(batch, lane)) continue;
+        const int i = details.first[lane], j = details.second[lane];
+        most = std::max(
+            most,
+            targets_.moved(i, j) /
+                targets_.free_target(i, j, details.least_target[lane], details.part[lane]));
       }
     }
   return accuracy * static_cast<double>(most);
 }
 
 // Packs constraints as idle ones, where none are packed so far.
-template <typename Group>
-void PackedSweeps<Group>::write_idle(const std::vector<std::size_t> &constraints)
+template <typename Batch>
+void PackedSweeps<Batch>::write_idle(const std::vector<std::size_t> &constraints)
 {
   if (constraints.empty()) return;
   idle_.resize_for(constraints.size());
   for (std::size_t k = 0; k < constraints.size(); ++k) write(constraints[k], idle_, k);
 }
 
-template <typename Group> void PackedSweeps<Group>::look_at_idle(double least_idle_gap)
+template <typename Batch> void PackedSweeps<Batch>::look_at_idle(double least_idle_gap)
 {
   // What was far from closed at the start is packed now: many searches end before.
   write_idle(far_);
@@ -243,15 +245,15 @@ template <typename Group> void PackedSweeps<Group>::look_at_idle(double least_id
 }
 
 // Returns a gap that was looked at last, as a length in packed units.
-template <typename Group> float PackedSweeps<Group>::looked_gap(std::size_t place) const
+template <typename Batch> float PackedSweeps<Batch>::looked_gap(std::size_t place) const
 { return looked_[place / WIDTH].gap[place % WIDTH]; }
 
 // Makes the idle constraints working whose gaps are not above idle_gap_. Their lanes are left empty
 // until half of all are: looks are frequent, and wake a few of many.
-template <typename Group> void PackedSweeps<Group>::wake_near()
+template <typename Batch> void PackedSweeps<Batch>::wake_near()
 {
-  looked_.resize(idle_.groups.size());
-  swept::look(idle_.groups, idle_.rest.data(), idle_.springs(), states_.data(), looked_.data());
+  looked_.resize(idle_.batches.size());
+  swept::look(idle_.batches, idle_.details.data(), idle_.springs(), states_.data(), looked_.data());
   std::vector<std::size_t> near;
   std::size_t empty = 0;
   for (std::size_t place = 0; place < idle_.lanes(); ++place) {
@@ -268,22 +270,22 @@ template <typename Group> void PackedSweeps<Group>::wake_near()
 }
 
 // Makes idle constraints working, given by their places in ascending order.
-template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::size_t> &near)
+template <typename Batch> void PackedSweeps<Batch>::wake(const std::vector<std::size_t> &near)
 {
   for (const bool at_cuts : {true, false}) {
     std::vector<std::size_t> chosen;
     std::vector<int> first, second;
     for (const std::size_t place : near) {
-      const swept::Rest &rest = idle_.rest_of(place);
-      const auto one = static_cast<int>(rest.first[place % WIDTH]);
-      const auto other = static_cast<int>(rest.second[place % WIDTH]);
+      const swept::Details &details = idle_.details_of(place);
+      const auto one = static_cast<int>(details.first[place % WIDTH]);
+      const auto other = static_cast<int>(details.second[place % WIDTH]);
       if (shared_.is_at_cut(one, other) != at_cuts) continue;
       chosen.push_back(place);
       first.push_back(one);
       second.push_back(other);
     }
     Packed &packed = at_cuts ? at_cuts_ : inside_;
-    const std::size_t from = packed.groups.size();
+    const std::size_t from = packed.batches.size();
     const std::vector<std::size_t> places = packed.add(colour(first, second));
     for (std::size_t k = 0; k < chosen.size(); ++k) packed.copy(idle_, chosen[k], places[k]);
     set_targets(packed, from);
@@ -292,16 +294,17 @@ template <typename Group> void PackedSweeps<Group>::wake(const std::vector<std::
 
 // Returns the largest residual of working constraints, as a length in packed units, and lists those
 // that have no impulse, with their gaps.
-template <typename Group>
-float PackedSweeps<Group>::look_at(const Packed &packed, std::vector<Unloaded> &unloaded)
+template <typename Batch>
+float PackedSweeps<Batch>::look_at(const Packed &packed, std::vector<Unloaded> &unloaded)
 {
-  looked_.resize(packed.groups.size());
-  const float residual = swept::look(packed.groups, packed.rest.data(), packed.springs(),
+  looked_.resize(packed.batches.size());
+  const float residual = swept::look(packed.batches, packed.details.data(), packed.springs(),
                                      states_.data(), looked_.data());
-  for (std::size_t g = 0; g < packed.groups.size(); ++g)
+  for (std::size_t g = 0; g < packed.batches.size(); ++g)
     for (unsigned lanes = looked_[g].unloaded; lanes != 0; lanes &= lanes - 1) {
       const std::size_t place = g * WIDTH + __builtin_ctz(lanes);
-      if (!packed.is_empty(place) && !of_impulses_[packed.rest[g].source[place % WIDTH]].may_pull())
+      if (!packed.is_empty(place) &&
+          !of_impulses_[packed.details[g].source[place % WIDTH]].may_pull())
         unloaded.push_back({place, looked_gap(place)});
     }
   return residual;
@@ -310,7 +313,7 @@ float PackedSweeps<Group>::look_at(const Packed &packed, std::vector<Unloaded> &
 // Sets the gap above which a constraint without an impulse is idle: by the present residual, or
 // `least_idle_gap` where that is more. Makes working constraints idle that have no impulse and are
 // far from closed.
-template <typename Group> void PackedSweeps<Group>::set_idle(double least_idle_gap)
+template <typename Batch> void PackedSweeps<Batch>::set_idle(double least_idle_gap)
 {
   std::vector<Unloaded> at_cuts, inside;
   const float residual = std::max(look_at(at_cuts_, at_cuts), look_at(inside_, inside));
@@ -321,8 +324,8 @@ template <typename Group> void PackedSweeps<Group>::set_idle(double least_idle_g
 
 // Makes constraints without an impulse idle whose gaps are far from closed, if they are more than a
 // few.
-template <typename Group>
-void PackedSweeps<Group>::make_idle(const std::vector<Unloaded> &unloaded, Packed &packed)
+template <typename Batch>
+void PackedSweeps<Batch>::make_idle(const std::vector<Unloaded> &unloaded, Packed &packed)
 {
   std::vector<std::size_t> far;
   for (const Unloaded &one : unloaded)
@@ -334,24 +337,24 @@ void PackedSweeps<Group>::make_idle(const std::vector<Unloaded> &unloaded, Packe
   packed.leave_out(far);
 }
 
-template <typename Group>
-void PackedSweeps<Group>::impulses(const Scales &scales, std::vector<double> &impulse) const
+template <typename Batch>
+void PackedSweeps<Batch>::impulses(const Scales &scales, std::vector<double> &impulse) const
 {
   for (std::size_t c = 0; c < impulse.size(); ++c) impulse[c] = of_impulses_[c].idle();
   for (const Packed *const some : {&at_cuts_, &inside_})
-    for (std::size_t g = 0; g < some->groups.size(); ++g) {
-      const Group &group = some->groups[g];
-      const swept::Rest &rest = some->rest[g];
+    for (std::size_t g = 0; g < some->batches.size(); ++g) {
+      const Batch &batch = some->batches[g];
+      const swept::Details &details = some->details[g];
       for (int lane = 0; lane < WIDTH; ++lane) {
-        if (rest.source[lane] == swept::NONE || !is_loaded(group, lane)) continue;
-        const std::size_t c = rest.source[lane];
+        if (details.source[lane] == swept::NONE || !is_loaded(batch, lane)) continue;
+        const std::size_t c = details.source[lane];
         impulse[c] = of_impulses_[c].project(
-            start_[c] + scales.impulse * static_cast<double>(group.now[lane] / rest.root[lane]));
+            start_[c] + scales.impulse * static_cast<double>(batch.now[lane] / details.root[lane]));
       }
     }
 }
 
-template class PackedSweeps<swept::ParticleGroup>;
-template class PackedSweeps<swept::BodyGroup>;
+template class PackedSweeps<swept::ParticleBatch>;
+template class PackedSweeps<swept::BodyBatch>;
 
 }    // namespace inelastic

@@ -1,20 +1,20 @@
-// Coloured sweeps (inelastic_coloured_sweeps.h) on packed groups (inelastic_sweep_kernels.h): this
+// Coloured sweeps (inelastic_coloured_sweeps.h) on packed batches (inelastic_sweep_kernels.h): this
 // class packs a problem, sweeps, and unpacks impulses.
 //
 // Constraints are coloured in the order of the problem (inelastic_constraint_colours.h), those at
-// cuts between ranks (inelastic_shared_movers.h) and all others apart. Each rank sweeps over its
+// cuts between ranks (inelastic_shared_grains.h) and all others apart. Each rank sweeps over its
 // own constraints.
 //
-// The unknown is the change of the impulses since the start of the search, as in
-// inelastic_packed_iterations.h; so are working and idle constraints.
+// As in inelastic_packed_iterations.h the unknown is the change of the impulses since the start of
+// the search, and constraints are working or idle: sweeps visit the working ones alone.
 
 #pragma once
 
-#include "inelastic_packed_groups.h"
+#include "inelastic_packed_batches.h"
 #include "inelastic_packed_targets.h"
-#include "inelastic_shared_movers.h"
+#include "inelastic_shared_grains.h"
 #include "inelastic_start.h"
-#include "inelastic_swept_movers.h"
+#include "inelastic_swept_grains.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -23,19 +23,20 @@
 
 namespace inelastic {
 
-template <typename Group> class PackedSweeps {
+template <typename Batch> class PackedSweeps {
  public:
   // Packs a problem, whose impulses are the start. Constraints without an impulse whose gap is
-  // above `idle_gap` [length] are idle. Returns false where so many constraints have one mover in
-  // common that groups would be mostly empty. Collective; what is returned is this rank's answer.
+  // above `idle_gap` [length] are idle. Returns false where so many constraints have one grain in
+  // common that batches would be mostly empty. Collective; what is returned is this rank's answer.
   bool prepare(const Start &start, double idle_gap, Host &host);
 
   // Begins another search from the impulses of the last one, which are those of the problem now, as
   // double precision has judged them: what `prepare` was given refers to what is new. Colours and
-  // groups stay.
+  // batches stay.
   void go_on(double idle_gap);
 
-  // Leads all impulses on by `along` times their last change, and visits each constraint once.
+  // Extrapolates all impulses by `along` times their last change, and visits each working
+  // constraint once.
   // Changes and residuals below `blur`, in scaled units, may be round-off. Collective; what is
   // returned is of this rank's constraints.
   swept::Swept sweep(double along, double blur, Host &host);
@@ -57,18 +58,18 @@ template <typename Group> class PackedSweeps {
   void keep_velocities() { targets_.keep(velocities()); }
   double moved_since_kept(double accuracy);
 
-  // Makes the idle constraints working whose gaps are near closed: not above some residuals, or
-  // `least_idle_gap`, in packed units, where that is more. Makes the working ones idle that have no
-  // impulse and larger gaps, where they are more than a few.
+  // Finds anew which constraints are idle. Idle ones become working whose gaps are no larger than
+  // some residuals, or than `least_idle_gap` where that is more (in packed units). Working ones
+  // without an impulse whose gaps are larger become idle, unless these are few.
   void look_at_idle(double least_idle_gap);
 
   // Writes the present impulses, in the order of the problem's constraints.
   void impulses(const Scales &scales, std::vector<double> &impulse) const;
 
  private:
-  using State = typename Group::State;
+  using State = typename Batch::State;
   using Vector = packed::Vector<float>;
-  using Packed = PackedGroups<Group>;
+  using Packed = PackedBatches<Batch>;
   static constexpr int WIDTH = swept::WIDTH;
 
   // A constraint without an impulse, by its place, and its gap.
@@ -78,7 +79,7 @@ template <typename Group> class PackedSweeps {
   };
 
   double find_unsolved(const Packed &packed, float blur) const
-  { return swept::find_unsolved(packed.groups, packed.springs(), states_.data(), blur); }
+  { return swept::find_unsolved(packed.batches, packed.springs(), states_.data(), blur); }
   ConstraintColours colour(const std::vector<int> &first, const std::vector<int> &second) const;
   std::size_t pack(bool at_cuts, const std::vector<std::size_t> &constraints);
   void write(std::size_t c, Packed &packed, std::size_t place) const;
@@ -96,8 +97,8 @@ template <typename Group> class PackedSweeps {
 
   // What `prepare` was given. Until all of it is packed nothing of it changes but the impulses.
   std::optional<Start> given_;
-  SweptMovers<Group> movers_;
-  SharedMovers<Group> shared_{movers_};
+  SweptGrains<Batch> grains_;
+  SharedGrains<Batch> shared_{grains_};
   // Working constraints: those at cuts, and all others.
   Packed at_cuts_, inside_;
   Packed idle_;

@@ -11,7 +11,7 @@ struct SolverLimits {
   long max_iterations = 0;
   // [length] Steps that move particles further than this are not sensible
   // (inelastic_infeasibility.h).
-  double reach = std::numeric_limits<double>::infinity();
+  double longest_move = std::numeric_limits<double>::infinity();
   // Contacts are resolved to this part of the changes of velocity that they make
   // (inelastic_contact_targets.h); 0 = only the tolerance counts.
   double accuracy = 0.0;

@@ -99,54 +99,54 @@ namespace {
     add_picked<0, 1, 4, 5>(ab, cd, sums);
   }
 
-  // The states of some constraints of a group: kept, where registers have room for them.
-  template <typename Group, typename Size> struct Loaded {};
-  template <> struct Loaded<ParticleGroup, Wide> {
+  // The states of some constraints of a batch: kept, where registers have room for them.
+  template <typename Batch, typename Size> struct Loaded {};
+  template <> struct Loaded<ParticleBatch, Wide> {
     Eight first[4], second[4];
   };
 
-  INELASTIC_INLINE void load(const ParticleGroup &group, const ParticleGroup::State *states,
-                             Loaded<ParticleGroup, Wide> &loaded)
+  INELASTIC_INLINE void load(const ParticleBatch &batch, const ParticleBatch::State *states,
+                             Loaded<ParticleBatch, Wide> &loaded)
   {
     for (int k = 0; k < 4; ++k) {
-      join(at(states, group.first[k]), at(states, group.first[k + 4]), loaded.first[k]);
-      join(at(states, group.second[k]), at(states, group.second[k + 4]), loaded.second[k]);
+      join(at(states, batch.first[k]), at(states, batch.first[k + 4]), loaded.first[k]);
+      join(at(states, batch.second[k]), at(states, batch.second[k + 4]), loaded.second[k]);
     }
   }
 
-  template <typename Group, typename Size>
-  INELASTIC_INLINE void load(const Group &, const typename Group::State *, Loaded<Group, Size> &)
+  template <typename Batch, typename Size>
+  INELASTIC_INLINE void load(const Batch &, const typename Batch::State *, Loaded<Batch, Size> &)
   {
   }
 
-  // opening() writes row . u of the constraints of a group from a place on.
-  INELASTIC_INLINE void opening(const ParticleGroup &group, int, const ParticleGroup::State *states,
-                                Loaded<ParticleGroup, Wide> &loaded, Eight &sums)
+  // opening() writes row . u of the constraints of a batch from a place on.
+  INELASTIC_INLINE void opening(const ParticleBatch &batch, int, const ParticleBatch::State *states,
+                                Loaded<ParticleBatch, Wide> &loaded, Eight &sums)
   {
     Eight terms[4];
-    load(group, states, loaded);
-    for (int k = 0; k < 4; ++k) terms[k] = group.row[k] * (loaded.first[k] - loaded.second[k]);
+    load(batch, states, loaded);
+    for (int k = 0; k < 4; ++k) terms[k] = batch.row[k] * (loaded.first[k] - loaded.second[k]);
     add_up(terms, sums);
   }
 
-  INELASTIC_INLINE void opening(const ParticleGroup &group, int from,
-                                const ParticleGroup::State *states, Loaded<ParticleGroup, Narrow> &,
+  INELASTIC_INLINE void opening(const ParticleBatch &batch, int from,
+                                const ParticleBatch::State *states, Loaded<ParticleBatch, Narrow> &,
                                 Four &sums)
   {
     Four terms[4];
     for (int k = 0; k < 4; ++k)
-      terms[k] = part<Narrow>(group.row[k], from) *
-          (at(states, group.first[from + k]) - at(states, group.second[from + k]));
+      terms[k] = part<Narrow>(batch.row[k], from) *
+          (at(states, batch.first[from + k]) - at(states, batch.second[from + k]));
     add_up(terms, sums);
   }
 
-  INELASTIC_INLINE void opening(const BodyGroup &group, int, const BodyGroup::State *states,
-                                Loaded<BodyGroup, Wide> &, Eight &sums)
+  INELASTIC_INLINE void opening(const BodyBatch &batch, int, const BodyBatch::State *states,
+                                Loaded<BodyBatch, Wide> &, Eight &sums)
   {
     Eight terms[WIDTH], low, high;
     for (int k = 0; k < WIDTH; ++k)
-      terms[k] = group.first_row[k] * at(states, group.first[k]) +
-          group.second_row[k] * at(states, group.second[k]);
+      terms[k] = batch.first_row[k] * at(states, batch.first[k]) +
+          batch.second_row[k] * at(states, batch.second[k]);
     add_up(terms, low);
     add_up(terms + 4, high);
     Eight slides, spins;
@@ -155,14 +155,14 @@ namespace {
     sums = slides + spins;
   }
 
-  INELASTIC_INLINE void opening(const BodyGroup &group, int from, const BodyGroup::State *states,
-                                Loaded<BodyGroup, Narrow> &, Four &sums)
+  INELASTIC_INLINE void opening(const BodyBatch &batch, int from, const BodyBatch::State *states,
+                                Loaded<BodyBatch, Narrow> &, Four &sums)
   {
     Four terms[4];
     for (int k = 0; k < 4; ++k) {
-      const Eight &first = at(states, group.first[from + k]);
-      const Eight &second = at(states, group.second[from + k]);
-      const Eight &first_row = group.first_row[from + k], &second_row = group.second_row[from + k];
+      const Eight &first = at(states, batch.first[from + k]);
+      const Eight &second = at(states, batch.second[from + k]);
+      const Eight &first_row = batch.first_row[from + k], &second_row = batch.second_row[from + k];
       terms[k] = part<Narrow>(first_row, 0) * part<Narrow>(first, 0) +
           part<Narrow>(first_row, 4) * part<Narrow>(first, 4) +
           part<Narrow>(second_row, 0) * part<Narrow>(second, 0) +
@@ -177,60 +177,60 @@ namespace {
 
   // Adds the changes of two impulses, of constraints K and K + 4, to their states.
   template <int K>
-  INELASTIC_INLINE void push_two(const ParticleGroup &group, const Eight &change,
-                                 const Loaded<ParticleGroup, Wide> &loaded,
-                                 ParticleGroup::State *states)
+  INELASTIC_INLINE void push_two(const ParticleBatch &batch, const Eight &change,
+                                 const Loaded<ParticleBatch, Wide> &loaded,
+                                 ParticleBatch::State *states)
   {
     constexpr int J = K + 4;
     Eight by, of_first, of_second;
     pick<K, K, K, K, J, J, J, J>(change, change, by);
     mobilities(loaded.first[K], of_first);
     mobilities(loaded.second[K], of_second);
-    const Eight first = loaded.first[K] + group.row[K] * (by * of_first);
-    const Eight second = loaded.second[K] - group.row[K] * (by * of_second);
-    at(states, group.first[K]) = Four{first[0], first[1], first[2], first[3]};
-    at(states, group.first[J]) = Four{first[4], first[5], first[6], first[7]};
-    at(states, group.second[K]) = Four{second[0], second[1], second[2], second[3]};
-    at(states, group.second[J]) = Four{second[4], second[5], second[6], second[7]};
+    const Eight first = loaded.first[K] + batch.row[K] * (by * of_first);
+    const Eight second = loaded.second[K] - batch.row[K] * (by * of_second);
+    at(states, batch.first[K]) = Four{first[0], first[1], first[2], first[3]};
+    at(states, batch.first[J]) = Four{first[4], first[5], first[6], first[7]};
+    at(states, batch.second[K]) = Four{second[0], second[1], second[2], second[3]};
+    at(states, batch.second[J]) = Four{second[4], second[5], second[6], second[7]};
   }
 
-  // push() adds changes of the impulses of the constraints of a group from a place on to the
+  // push() adds changes of the impulses of the constraints of a batch from a place on to the
   // states.
-  INELASTIC_INLINE void push(const ParticleGroup &group, int, const Eight &change,
-                             const Loaded<ParticleGroup, Wide> &loaded,
-                             ParticleGroup::State *states)
+  INELASTIC_INLINE void push(const ParticleBatch &batch, int, const Eight &change,
+                             const Loaded<ParticleBatch, Wide> &loaded,
+                             ParticleBatch::State *states)
   {
-    push_two<0>(group, change, loaded, states);
-    push_two<1>(group, change, loaded, states);
-    push_two<2>(group, change, loaded, states);
-    push_two<3>(group, change, loaded, states);
+    push_two<0>(batch, change, loaded, states);
+    push_two<1>(batch, change, loaded, states);
+    push_two<2>(batch, change, loaded, states);
+    push_two<3>(batch, change, loaded, states);
   }
 
-  INELASTIC_INLINE void push(const ParticleGroup &group, int from, const Four &change,
-                             const Loaded<ParticleGroup, Narrow> &, ParticleGroup::State *states)
+  INELASTIC_INLINE void push(const ParticleBatch &batch, int from, const Four &change,
+                             const Loaded<ParticleBatch, Narrow> &, ParticleBatch::State *states)
   {
     for (int k = 0; k < 4; ++k) {
-      const Four &row = part<Narrow>(group.row[k], from);
-      Four &first = at(states, group.first[from + k]);
+      const Four &row = part<Narrow>(batch.row[k], from);
+      Four &first = at(states, batch.first[from + k]);
       first += row * (change[k] * first[3]);
-      Four &second = at(states, group.second[from + k]);
+      Four &second = at(states, batch.second[from + k]);
       second -= row * (change[k] * second[3]);
     }
   }
 
   template <typename Size>
-  INELASTIC_INLINE void push(const BodyGroup &group, int from, const typename Size::Numbers &change,
-                             const Loaded<BodyGroup, Size> &, BodyGroup::State *states)
+  INELASTIC_INLINE void push(const BodyBatch &batch, int from, const typename Size::Numbers &change,
+                             const Loaded<BodyBatch, Size> &, BodyBatch::State *states)
   {
     constexpr int COUNT = Size::COUNT;
     for (int k = 0; k < COUNT; ++k) {
       const int c = from + k;
       for (int half = 0; half < WIDTH; half += COUNT)
-        part<Size>(at(states, group.first[c]), half) +=
-            part<Size>(group.first_row[c], half) * change[k];
+        part<Size>(at(states, batch.first[c]), half) +=
+            part<Size>(batch.first_row[c], half) * change[k];
       for (int half = 0; half < WIDTH; half += COUNT)
-        part<Size>(at(states, group.second[c]), half) +=
-            part<Size>(group.second_row[c], half) * change[k];
+        part<Size>(at(states, batch.second[c]), half) +=
+            part<Size>(batch.second_row[c], half) * change[k];
     }
   }
 
@@ -244,70 +244,70 @@ namespace {
   using Set = HalfLine<float>;
 
   // Writes the gaps of constraints with some impulses, of which `opened` is what all make of them.
-  template <typename Size, typename Group>
-  INELASTIC_INLINE void find_gap(const Group &group, const Rest *springs, int from,
+  template <typename Size, typename Batch>
+  INELASTIC_INLINE void find_gap(const Batch &batch, const Details *springs, int from,
                                  const typename Size::Numbers &impulse,
                                  const typename Size::Numbers &opened, typename Size::Numbers &gap)
   {
     if (springs)
-      gap = part<Size>(group.gap, from) + part<Size>(springs->give, from) * impulse + opened;
+      gap = part<Size>(batch.gap, from) + part<Size>(springs->compliance, from) * impulse + opened;
     else
-      gap = part<Size>(group.gap, from) + opened;
+      gap = part<Size>(batch.gap, from) + opened;
   }
 
-  template <typename Size, typename Group>
-  INELASTIC_INLINE void sweep_all(Group *groups, const Rest *springs, std::size_t count,
-                                  typename Group::State *states, float along, float blur,
+  template <typename Size, typename Batch>
+  INELASTIC_INLINE void sweep_all(Batch *batches, const Details *springs, std::size_t count,
+                                  typename Batch::State *states, float along, float blur,
                                   Swept &swept)
   {
     using V = typename Size::Numbers;
-    V uphill = {}, most = {}, of_target = {}, farthest = {};
+    V uphill = {}, most = {}, of_target = {}, since_start = {};
     for (std::size_t g = 0; g < count; ++g) {
-      Group &group = groups[g];
+      Batch &batch = batches[g];
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
-        Loaded<Group, Size> loaded;
+        Loaded<Batch, Size> loaded;
         V opened, gap, next;
-        opening(group, from, states, loaded, opened);
-        const V now = part<Size>(group.now, from);
-        const V led = now + along * (now - part<Size>(group.before, from));
-        find_gap<Size>(group, springs ? springs + g : nullptr, from, led, opened, gap);
-        const V free = led - gap;
-        Set::project(free, part<Size>(group.idle, from), next);
-        const V change = next - led;
+        opening(batch, from, states, loaded, opened);
+        const V now = part<Size>(batch.now, from);
+        const V extrapolated = now + along * (now - part<Size>(batch.before, from));
+        find_gap<Size>(batch, springs ? springs + g : nullptr, from, extrapolated, opened, gap);
+        const V free = extrapolated - gap;
+        Set::project(free, part<Size>(batch.idle, from), next);
+        const V change = next - extrapolated;
         uphill -= change * (next - now);
         const V size = change > 0 ? change : -change;
         most = size > most ? size : most;
-        const V ratio = (size - blur) * part<Size>(group.inverse_target, from);
+        const V ratio = (size - blur) * part<Size>(batch.inverse_target, from);
         of_target = ratio > of_target ? ratio : of_target;
         const V far = next > 0 ? next : -next;
-        farthest = far > farthest ? far : farthest;
-        part<Size>(group.before, from) = now;
-        part<Size>(group.now, from) = next;
-        push(group, from, change, loaded, states);
+        since_start = far > since_start ? far : since_start;
+        part<Size>(batch.before, from) = now;
+        part<Size>(batch.now, from) = next;
+        push(batch, from, change, loaded, states);
       }
     }
     for (int k = 0; k < Size::COUNT; ++k) swept.uphill += static_cast<double>(uphill[k]);
     swept.change = std::max(swept.change, largest_of<Size>(most));
     swept.of_target = std::max(swept.of_target, largest_of<Size>(of_target));
-    swept.farthest = std::max(swept.farthest, largest_of<Size>(farthest));
+    swept.since_start = std::max(swept.since_start, largest_of<Size>(since_start));
   }
 
-  template <typename Size, typename Group>
-  INELASTIC_INLINE double unsolved_of_all(const std::vector<Group> &groups, const Rest *springs,
-                                          const typename Group::State *states, float blur)
+  template <typename Size, typename Batch>
+  INELASTIC_INLINE double unsolved_of_all(const std::vector<Batch> &batches, const Details *springs,
+                                          const typename Batch::State *states, float blur)
   {
     using V = typename Size::Numbers;
     V unsolved = {};
-    for (const Group &group : groups) {
+    for (const Batch &batch : batches) {
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
-        Loaded<Group, Size> loaded;
+        Loaded<Batch, Size> loaded;
         V opened, gap, open;
-        opening(group, from, states, loaded, opened);
-        const V &now = part<Size>(group.now, from);
-        find_gap<Size>(group, springs, from, now, opened, gap);
-        Set::find_open(now, part<Size>(group.idle, from), gap, open);
+        opening(batch, from, states, loaded, opened);
+        const V &now = part<Size>(batch.now, from);
+        find_gap<Size>(batch, springs, from, now, opened, gap);
+        Set::find_open(now, part<Size>(batch.idle, from), gap, open);
         const V left = open > -gap ? open : -gap;
-        const V ratio = (left - blur) * part<Size>(group.inverse_target, from);
+        const V ratio = (left - blur) * part<Size>(batch.inverse_target, from);
         unsolved = ratio > unsolved ? ratio : unsolved;
       }
       if (springs) ++springs;
@@ -315,27 +315,27 @@ namespace {
     return largest_of<Size>(unsolved);
   }
 
-  template <typename Size, typename Group>
-  INELASTIC_INLINE float look_at_all(const std::vector<Group> &groups, const Rest *rest,
-                                     const Rest *springs, const typename Group::State *states,
+  template <typename Size, typename Batch>
+  INELASTIC_INLINE float look_at_all(const std::vector<Batch> &batches, const Details *details,
+                                     const Details *springs, const typename Batch::State *states,
                                      Looked *looked)
   {
     using V = typename Size::Numbers;
     V residual = {};
-    for (const Group &group : groups) {
+    for (const Batch &batch : batches) {
       unsigned unloaded = 0;
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
-        Loaded<Group, Size> loaded;
+        Loaded<Batch, Size> loaded;
         V opened, scaled, open;
-        opening(group, from, states, loaded, opened);
-        const V &now = part<Size>(group.now, from), &idle = part<Size>(group.idle, from);
-        find_gap<Size>(group, springs ? rest : nullptr, from, now, opened, scaled);
-        const V gap = scaled * part<Size>(rest->root, from);
+        opening(batch, from, states, loaded, opened);
+        const V &now = part<Size>(batch.now, from), &idle = part<Size>(batch.idle, from);
+        find_gap<Size>(batch, springs ? details : nullptr, from, now, opened, scaled);
+        const V gap = scaled * part<Size>(details->root, from);
         part<Size>(looked->gap, from) = gap;
         Set::find_open(now, idle, gap, open);
         const V left = open > -gap ? open : -gap;
         residual = left > residual ? left : residual;
-        const V &before = part<Size>(group.before, from);
+        const V &before = part<Size>(batch.before, from);
         const V most = now > before ? now : before, fewest = now < before ? now : before;
         for (int k = 0; k < Size::COUNT; ++k)
           unloaded |= unsigned{most[k] == 0.0f && fewest[k] == 0.0f &&
@@ -343,14 +343,14 @@ namespace {
               << (from + k);
       }
       looked->unloaded = static_cast<std::uint8_t>(unloaded);
-      ++rest;
+      ++details;
       ++looked;
     }
     return static_cast<float>(largest_of<Size>(residual));
   }
 
-  template <typename Size, typename Group>
-  INELASTIC_INLINE void set_all_targets(Group *groups, const Rest *rest, std::size_t count,
+  template <typename Size, typename Batch>
+  INELASTIC_INLINE void set_all_targets(Batch *batches, const Details *details, std::size_t count,
                                         const float *changed, float most)
   {
     using V = typename Size::Numbers;
@@ -359,25 +359,26 @@ namespace {
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
         V less;
         for (int k = 0; k < Size::COUNT; ++k)
-          less[k] = std::min(changed[rest[g].first[from + k]], changed[rest[g].second[from + k]]);
-        const V &least = part<Size>(rest[g].least_target, from);
-        const V by_velocity = part<Size>(rest[g].part, from) * less;
+          less[k] =
+              std::min(changed[details[g].first[from + k]], changed[details[g].second[from + k]]);
+        const V &least = part<Size>(details[g].least_target, from);
+        const V by_velocity = part<Size>(details[g].part, from) * less;
         V free, target;
         find_free_target(by_velocity, least, free);
         bound_target(free, bound, target);
-        part<Size>(groups[g].inverse_target, from) = part<Size>(rest[g].root, from) / target;
+        part<Size>(batches[g].inverse_target, from) = part<Size>(details[g].root, from) / target;
       }
   }
 
-  template <typename Size, typename Group>
-  INELASTIC_INLINE void add_all(const std::vector<Group> &groups, When when,
-                                typename Group::State *states)
+  template <typename Size, typename Batch>
+  INELASTIC_INLINE void add_all(const std::vector<Batch> &batches, When when,
+                                typename Batch::State *states)
   {
-    for (const Group &group : groups)
+    for (const Batch &batch : batches)
       for (int from = 0; from < WIDTH; from += Size::COUNT) {
-        Loaded<Group, Size> loaded;
-        load(group, states, loaded);
-        push(group, from, part<Size>(when == When::NOW ? group.now : group.before, from), loaded,
+        Loaded<Batch, Size> loaded;
+        load(batch, states, loaded);
+        push(batch, from, part<Size>(when == When::NOW ? batch.now : batch.before, from), loaded,
              states);
       }
   }
@@ -418,68 +419,68 @@ namespace {
 #endif
   }
 
-  // The passes over groups of each kind, by vectors of eight and of four numbers.
-#define INELASTIC_PASSES(GROUP)                                                                 \
-  INELASTIC_CLONES void wide_sweep(GROUP *groups, const Rest *springs, std::size_t count,       \
-                                   GROUP::State *states, float along, float blur, Swept &swept) \
-  { sweep_all<Wide>(groups, springs, count, states, along, blur, swept); }                      \
-  INELASTIC_CLONES double wide_unsolved(const std::vector<GROUP> &groups, const Rest *springs,  \
-                                        const GROUP::State *states, float blur)                 \
-  { return unsolved_of_all<Wide>(groups, springs, states, blur); }                              \
-  INELASTIC_CLONES float wide_look(const std::vector<GROUP> &groups, const Rest *rest,          \
-                                   const Rest *springs, const GROUP::State *states,             \
-                                   Looked *looked)                                              \
-  { return look_at_all<Wide>(groups, rest, springs, states, looked); }                          \
-  INELASTIC_CLONES void wide_targets(GROUP *groups, const Rest *rest, std::size_t count,        \
-                                     const float *changed, float most)                          \
-  { set_all_targets<Wide>(groups, rest, count, changed, most); }                                \
-  INELASTIC_CLONES void wide_add(const std::vector<GROUP> &groups, When when,                   \
-                                 GROUP::State *states)                                          \
-  { add_all<Wide>(groups, when, states); }
+  // The passes over batches of each kind, by vectors of eight and of four numbers.
+#define INELASTIC_PASSES(BATCH)                                                                    \
+  INELASTIC_CLONES void wide_sweep(BATCH *batches, const Details *springs, std::size_t count,      \
+                                   BATCH::State *states, float along, float blur, Swept &swept)    \
+  { sweep_all<Wide>(batches, springs, count, states, along, blur, swept); }                        \
+  INELASTIC_CLONES double wide_unsolved(const std::vector<BATCH> &batches, const Details *springs, \
+                                        const BATCH::State *states, float blur)                    \
+  { return unsolved_of_all<Wide>(batches, springs, states, blur); }                                \
+  INELASTIC_CLONES float wide_look(const std::vector<BATCH> &batches, const Details *details,      \
+                                   const Details *springs, const BATCH::State *states,             \
+                                   Looked *looked)                                                 \
+  { return look_at_all<Wide>(batches, details, springs, states, looked); }                         \
+  INELASTIC_CLONES void wide_targets(BATCH *batches, const Details *details, std::size_t count,    \
+                                     const float *changed, float most)                             \
+  { set_all_targets<Wide>(batches, details, count, changed, most); }                               \
+  INELASTIC_CLONES void wide_add(const std::vector<BATCH> &batches, When when,                     \
+                                 BATCH::State *states)                                             \
+  { add_all<Wide>(batches, when, states); }
 
-  INELASTIC_PASSES(ParticleGroup)
-  INELASTIC_PASSES(BodyGroup)
+  INELASTIC_PASSES(ParticleBatch)
+  INELASTIC_PASSES(BodyBatch)
 
 }    // namespace
 
-#define INELASTIC_CHOICES(GROUP)                                                             \
-  void sweep(GROUP *groups, const Rest *springs, std::size_t count, GROUP::State *states,    \
-             float along, float blur, Swept &swept)                                          \
-  {                                                                                          \
-    if (is_wide())                                                                           \
-      wide_sweep(groups, springs, count, states, along, blur, swept);                        \
-    else                                                                                     \
-      sweep_all<Narrow>(groups, springs, count, states, along, blur, swept);                 \
-  }                                                                                          \
-  double find_unsolved(const std::vector<GROUP> &groups, const Rest *springs,                \
-                       const GROUP::State *states, float blur)                               \
-  {                                                                                          \
-    return is_wide() ? wide_unsolved(groups, springs, states, blur)                          \
-                     : unsolved_of_all<Narrow>(groups, springs, states, blur);               \
-  }                                                                                          \
-  float look(const std::vector<GROUP> &groups, const Rest *rest, const Rest *springs,        \
-             const GROUP::State *states, Looked *looked)                                     \
-  {                                                                                          \
-    return is_wide() ? wide_look(groups, rest, springs, states, looked)                      \
-                     : look_at_all<Narrow>(groups, rest, springs, states, looked);           \
-  }                                                                                          \
-  void set_targets(GROUP *groups, const Rest *rest, std::size_t count, const float *changed, \
-                   float most)                                                               \
-  {                                                                                          \
-    is_wide() ? wide_targets(groups, rest, count, changed, most)                             \
-              : set_all_targets<Narrow>(groups, rest, count, changed, most);                 \
-  }                                                                                          \
-  void add_impulses(const std::vector<GROUP> &groups, When when, GROUP::State *states)       \
-  { is_wide() ? wide_add(groups, when, states) : add_all<Narrow>(groups, when, states); }
+#define INELASTIC_CHOICES(BATCH)                                                                \
+  void sweep(BATCH *batches, const Details *springs, std::size_t count, BATCH::State *states,   \
+             float along, float blur, Swept &swept)                                             \
+  {                                                                                             \
+    if (is_wide())                                                                              \
+      wide_sweep(batches, springs, count, states, along, blur, swept);                          \
+    else                                                                                        \
+      sweep_all<Narrow>(batches, springs, count, states, along, blur, swept);                   \
+  }                                                                                             \
+  double find_unsolved(const std::vector<BATCH> &batches, const Details *springs,               \
+                       const BATCH::State *states, float blur)                                  \
+  {                                                                                             \
+    return is_wide() ? wide_unsolved(batches, springs, states, blur)                            \
+                     : unsolved_of_all<Narrow>(batches, springs, states, blur);                 \
+  }                                                                                             \
+  float look(const std::vector<BATCH> &batches, const Details *details, const Details *springs, \
+             const BATCH::State *states, Looked *looked)                                        \
+  {                                                                                             \
+    return is_wide() ? wide_look(batches, details, springs, states, looked)                     \
+                     : look_at_all<Narrow>(batches, details, springs, states, looked);          \
+  }                                                                                             \
+  void set_targets(BATCH *batches, const Details *details, std::size_t count,                   \
+                   const float *changed, float most)                                            \
+  {                                                                                             \
+    is_wide() ? wide_targets(batches, details, count, changed, most)                            \
+              : set_all_targets<Narrow>(batches, details, count, changed, most);                \
+  }                                                                                             \
+  void add_impulses(const std::vector<BATCH> &batches, When when, BATCH::State *states)         \
+  { is_wide() ? wide_add(batches, when, states) : add_all<Narrow>(batches, when, states); }
 
-INELASTIC_CHOICES(ParticleGroup)
-INELASTIC_CHOICES(BodyGroup)
+INELASTIC_CHOICES(ParticleBatch)
+INELASTIC_CHOICES(BodyBatch)
 
-INELASTIC_CLONES void lead_on(std::vector<ParticleGroup::State> &states,
-                              std::vector<ParticleGroup::State> &before, float along)
+INELASTIC_CLONES void extrapolate(std::vector<ParticleBatch::State> &states,
+                                  std::vector<ParticleBatch::State> &before, float along)
 { lead_all_on(states, before, along); }
-INELASTIC_CLONES void lead_on(std::vector<BodyGroup::State> &states,
-                              std::vector<BodyGroup::State> &before, float along)
+INELASTIC_CLONES void extrapolate(std::vector<BodyBatch::State> &states,
+                                  std::vector<BodyBatch::State> &before, float along)
 { lead_all_on(states, before, along); }
 
 }    // namespace inelastic::swept

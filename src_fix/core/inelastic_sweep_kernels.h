@@ -1,7 +1,7 @@
 // The passes of coloured sweeps (inelastic_coloured_sweeps.h) over packed constraints, in single
 // precision.
 //
-// A group holds eight constraints of which no two share anything that impulses move, so that one
+// A batch holds eight constraints of which no two share anything that impulses move, so that one
 // instruction works on all of them. In impulses scaled by the root of the diagonal, x = lambda
 // sqrt(D), A has a unit diagonal; rows and gaps are divided by that root, and a visit to constraint
 // c makes
@@ -23,9 +23,9 @@ namespace inelastic::swept {
 typedef float Four __attribute__((vector_size(16), may_alias));
 typedef float Eight __attribute__((vector_size(32), may_alias));
 
-constexpr int WIDTH = 8;    // constraints in a group
+constexpr int WIDTH = 8;    // constraints in a batch
 
-// What the constraints of a group have in common, whatever moves: one lane a constraint. All
+// What the constraints of a batch have in common, whatever moves: one lane a constraint. All
 // impulses are changes since the start of the search.
 struct alignas(32) Lanes {
   std::uint32_t first[WIDTH], second[WIDTH];    // places of the two states, in bytes
@@ -37,8 +37,8 @@ struct alignas(32) Lanes {
 };
 
 // Constraints of particles that turn with nothing. A state is a velocity, and the inverse mass.
-// Sweeps of large scenes read their groups from memory: what belongs to a mover is in its state.
-struct ParticleGroup : Lanes {
+// Sweeps of large scenes read their batches from memory: what belongs to a grain is in its state.
+struct ParticleBatch : Lanes {
   struct alignas(16) State {
     Four lanes;
   };
@@ -47,17 +47,17 @@ struct ParticleGroup : Lanes {
 
 // Constraints of bodies and particles. A state is sqrt(M) v, 0, the spin in units of the root of
 // the inverse inertia, and 0.
-struct BodyGroup : Lanes {
+struct BodyBatch : Lanes {
   struct alignas(32) State {
     Eight lanes;
   };
   Eight first_row[WIDTH], second_row[WIDTH];    // by the constraint
 };
 
-// What a sweep does not read of the constraints of a group.
-struct alignas(32) Rest {
+// What a sweep does not read of the constraints of a batch.
+struct alignas(32) Details {
   Eight root;                                   // of D
-  Eight give;                                   // the compliance over D
+  Eight compliance;                             // the compliance over D
   Eight least_target, part;                     // of PackedTargets::target
   std::size_t source[WIDTH];                    // the place in the problem; NONE in an empty lane
   std::uint32_t first[WIDTH], second[WIDTH];    // slots
@@ -70,53 +70,54 @@ struct Swept {
   double change = 0.0;    // the largest change of an impulse that a visit made, in scaled units
   // The same, beyond what may be round-off, as a part of the target: a hint at the residual.
   double of_target = 0.0;
-  double farthest = 0.0;    // the largest change of an impulse since the start of the search
+  double since_start = 0.0;    // the largest change of an impulse since the start of the search
 };
 
-// Visits the constraints of `count` groups, each from its impulse led on by `along` times its last
-// change, and adds to `swept`. The states must have been led on alike. Changes below `blur`, in
-// scaled units, may be round-off. Here and below `springs` are the groups' Rest if some constraints
-// have a compliance, and nullptr if none has.
-void sweep(ParticleGroup *groups, const Rest *springs, std::size_t count,
-           ParticleGroup::State *states, float along, float blur, Swept &swept);
-void sweep(BodyGroup *groups, const Rest *springs, std::size_t count, BodyGroup::State *states,
+// Visits the constraints of `count` batches, each from its impulse extrapolated by `along` times
+// its last change, and adds to `swept`. The states must have been extrapolated alike. Changes below
+// `blur`, in scaled units, may be round-off. Here and below `springs` are the batches' Details if
+// some constraints have a compliance, and nullptr if none has.
+void sweep(ParticleBatch *batches, const Details *springs, std::size_t count,
+           ParticleBatch::State *states, float along, float blur, Swept &swept);
+void sweep(BodyBatch *batches, const Details *springs, std::size_t count, BodyBatch::State *states,
            float along, float blur, Swept &swept);
 
 // Returns, between two sweeps, the largest residual, beyond the blur, as a part of its target.
-double find_unsolved(const std::vector<ParticleGroup> &groups, const Rest *springs,
-                     const ParticleGroup::State *states, float blur);
-double find_unsolved(const std::vector<BodyGroup> &groups, const Rest *springs,
-                     const BodyGroup::State *states, float blur);
+double find_unsolved(const std::vector<ParticleBatch> &batches, const Details *springs,
+                     const ParticleBatch::State *states, float blur);
+double find_unsolved(const std::vector<BodyBatch> &batches, const Details *springs,
+                     const BodyBatch::State *states, float blur);
 
-// What a look at a group finds.
+// What a look at a batch finds.
 struct alignas(32) Looked {
   Eight gap;                // w, as a length in packed units
   std::uint8_t unloaded;    // a bit for each constraint whose impulse is and was the least and 0
 };
 
-// Looks at all groups; returns their largest residual, as a length in packed units.
-float look(const std::vector<ParticleGroup> &groups, const Rest *rest, const Rest *springs,
-           const ParticleGroup::State *states, Looked *looked);
-float look(const std::vector<BodyGroup> &groups, const Rest *rest, const Rest *springs,
-           const BodyGroup::State *states, Looked *looked);
+// Looks at all batches; returns their largest residual, as a length in packed units.
+float look(const std::vector<ParticleBatch> &batches, const Details *details,
+           const Details *springs, const ParticleBatch::State *states, Looked *looked);
+float look(const std::vector<BodyBatch> &batches, const Details *details, const Details *springs,
+           const BodyBatch::State *states, Looked *looked);
 
-// Sets the targets of `count` groups as PackedTargets::target has them, from its `changed` and
+// Sets the targets of `count` batches as PackedTargets::target has them, from its `changed` and
 // `most`.
-void set_targets(ParticleGroup *groups, const Rest *rest, std::size_t count, const float *changed,
-                 float most);
-void set_targets(BodyGroup *groups, const Rest *rest, std::size_t count, const float *changed,
-                 float most);
+void set_targets(ParticleBatch *batches, const Details *details, std::size_t count,
+                 const float *changed, float most);
+void set_targets(BodyBatch *batches, const Details *details, std::size_t count,
+                 const float *changed, float most);
 
 // Adds to the states what all impulses make of them, those now or before the last sweep.
 enum class When { NOW, BEFORE };
-void add_impulses(const std::vector<ParticleGroup> &groups, When when,
-                  ParticleGroup::State *states);
-void add_impulses(const std::vector<BodyGroup> &groups, When when, BodyGroup::State *states);
+void add_impulses(const std::vector<ParticleBatch> &batches, When when,
+                  ParticleBatch::State *states);
+void add_impulses(const std::vector<BodyBatch> &batches, When when, BodyBatch::State *states);
 
-// Leads the states on by `along` times their last change, and keeps them as they were in `before`.
-void lead_on(std::vector<ParticleGroup::State> &states, std::vector<ParticleGroup::State> &before,
-             float along);
-void lead_on(std::vector<BodyGroup::State> &states, std::vector<BodyGroup::State> &before,
-             float along);
+// Extrapolates the states by `along` times their last change, and keeps them as they were in
+// `before`.
+void extrapolate(std::vector<ParticleBatch::State> &states,
+                 std::vector<ParticleBatch::State> &before, float along);
+void extrapolate(std::vector<BodyBatch::State> &states, std::vector<BodyBatch::State> &before,
+                 float along);
 
 }    // namespace inelastic::swept

@@ -20,8 +20,8 @@ void AtomState::take_out_pushes()
 {
   for (int i = 0; i < atom->nlocal; ++i)
     for (int d = 0; d < 3; ++d) {
-      atom->v[i][d] -= push_held(i)[d];
-      push_held(i)[d] = 0.0;
+      atom->v[i][d] -= push_included(i)[d];
+      push_included(i)[d] = 0.0;
     }
 }
 
@@ -116,9 +116,9 @@ int AtomState::unpack_exchange(int i, const double *buffer)
 
 bool AtomState::is_pushed(int i) const
 {
-  const double *const held = state_[i] + PUSH_HELD;
-  return held[0] != 0.0 || held[1] != 0.0 || held[2] != 0.0 ||
-      (step_.has_bodies && momenta_.has_held(i));
+  const double *const included = state_[i] + PUSH_INCLUDED;
+  return included[0] != 0.0 || included[1] != 0.0 || included[2] != 0.0 ||
+      (step_.has_bodies && momenta_.has_included(i));
 }
 
 // The layout is: this size; what the law remembers of contacts, or without a law a 0 if more
@@ -147,8 +147,8 @@ int AtomState::pack_restart(int i, double *buffer, bool writes) const
     *out++ = 0.0;
   if (!is_pushed(i)) return size;
   out = std::copy_n(atom->v[i], 3, out);
-  out = std::copy_n(state_[i] + PUSH_HELD, 3, out);
-  if (step_.has_bodies) momenta_.pack_held(i, out);
+  out = std::copy_n(state_[i] + PUSH_INCLUDED, 3, out);
+  if (step_.has_bodies) momenta_.pack_included(i, out);
   return size;
 }
 
@@ -173,7 +173,7 @@ void AtomState::unpack_restart(int i, int nth, bool written, bool same_law)
   // A velocity that was set since the file was written is momentum alone.
   if (!std::equal(in, in + 3, atom->v[i])) return;
   for (int d = 0; d < 3; ++d) atom->v[i][d] -= in[3 + d];
-  if (step_.has_bodies && end - in == push_size()) momenta_.unpack_held(i, in + 6);
+  if (step_.has_bodies && end - in == push_size()) momenta_.unpack_included(i, in + 6);
 }
 
 double AtomState::memory_usage() const

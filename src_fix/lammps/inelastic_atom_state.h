@@ -32,7 +32,7 @@ class AtomState : protected Pointers {
   // The part of a velocity that takes a bad overlap apart and is no momentum: after the last move,
   // and at whole steps.
   double *push_next(int i) { return state_[i] + PUSH_NEXT; }
-  double *push_held(int i) { return state_[i] + PUSH_HELD; }
+  double *push_included(int i) { return state_[i] + PUSH_INCLUDED; }
   // At the end of a run: takes the pushes out of the velocities, which are momentum alone from here
   // on.
   void take_out_pushes();
@@ -83,7 +83,7 @@ class AtomState : protected Pointers {
     EXPECTED_X = 0,
     EXPECTED_V = 3,
     PUSH_NEXT = 6,
-    PUSH_HELD = 9,
+    PUSH_INCLUDED = 9,
     EXPECTED_RADIUS = 12,
     QUIET_STEPS = 13,
     LOAD_AT_REST = 14,
@@ -94,7 +94,7 @@ class AtomState : protected Pointers {
 
   bool has_law() const { return step_.settings.law != nullptr; }
   bool is_pushed(int i) const;
-  int push_size() const { return 6 + (step_.has_bodies ? CarriedMomenta::HELD_SIZE : 0); }
+  int push_size() const { return 6 + (step_.has_bodies ? CarriedMomenta::INCLUDED_SIZE : 0); }
 
   const Step &step_;
   double **state_ = nullptr;

@@ -9,7 +9,7 @@ int CarriedMomenta::pack(int i, double *buffer) const
 {
   const Carried &of_body = carried_[i];
   double *out = std::copy_n(of_body.angular_momentum.begin(), 3, buffer);
-  for (const Push *push : {&of_body.next, &of_body.held}) {
+  for (const Push *push : {&of_body.next, &of_body.included}) {
     out = std::copy_n(push->velocity.begin(), 3, out);
     out = std::copy_n(push->angular_momentum.begin(), 3, out);
   }
@@ -28,7 +28,7 @@ int CarriedMomenta::unpack(int i, const double *buffer)
     in += 3;
   };
   take(of_body.angular_momentum);
-  for (Push *push : {&of_body.next, &of_body.held}) {
+  for (Push *push : {&of_body.next, &of_body.included}) {
     take(push->velocity);
     take(push->angular_momentum);
   }
@@ -38,25 +38,25 @@ int CarriedMomenta::unpack(int i, const double *buffer)
   return static_cast<int>(in - buffer);
 }
 
-bool CarriedMomenta::has_held(int i) const
+bool CarriedMomenta::has_included(int i) const
 {
-  double held[HELD_SIZE];
-  pack_held(i, held);
-  return std::any_of(held, held + HELD_SIZE, [](double value) {
+  double included[INCLUDED_SIZE];
+  pack_included(i, included);
+  return std::any_of(included, included + INCLUDED_SIZE, [](double value) {
     return value != 0.0;
   });
 }
 
-void CarriedMomenta::pack_held(int i, double *buffer) const
+void CarriedMomenta::pack_included(int i, double *buffer) const
 {
-  const Push &held = carried_[i].held;
-  double *out = std::copy_n(held.velocity.begin(), 3, buffer);
-  std::copy_n(held.angular_momentum.begin(), 3, out);
+  const Push &included = carried_[i].included;
+  double *out = std::copy_n(included.velocity.begin(), 3, buffer);
+  std::copy_n(included.angular_momentum.begin(), 3, out);
 }
 
-void CarriedMomenta::unpack_held(int i, const double *buffer)
+void CarriedMomenta::unpack_included(int i, const double *buffer)
 {
-  Push &held = carried_[i].held;
-  std::copy_n(buffer, 3, held.velocity.begin());
-  std::copy_n(buffer + 3, 3, held.angular_momentum.begin());
+  Push &included = carried_[i].included;
+  std::copy_n(buffer, 3, included.velocity.begin());
+  std::copy_n(buffer + 3, 3, included.angular_momentum.begin());
 }

@@ -18,7 +18,7 @@ struct Push {
 struct Carried {
   std::array<double, 3> angular_momentum;    // after the last move, push included
   Push next;                                 // part of the motion after the last move
-  Push held;                                 // part of the velocities at whole steps
+  Push included;                             // part of the velocities at whole steps
   // The angular momentum of earlier pushes that is still in the motion: forces on spheres in a line
   // cannot take away its part along the line, until the line has turned.
   std::array<double, 3> left_over;
@@ -44,10 +44,10 @@ class CarriedMomenta {
   int unpack(int i, const double *buffer);
 
   // The push in the velocities at a whole step, for restart files.
-  static constexpr int HELD_SIZE = 6;
-  bool has_held(int i) const;
-  void pack_held(int i, double *buffer) const;
-  void unpack_held(int i, const double *buffer);
+  static constexpr int INCLUDED_SIZE = 6;
+  bool has_included(int i) const;
+  void pack_included(int i, double *buffer) const;
+  void unpack_included(int i, const double *buffer);
 
   // Returns the factor by which the steps of a run have magnified the round-off of a local atom's
   // position: the rotation of a body is known no better than its arms, which may be short.

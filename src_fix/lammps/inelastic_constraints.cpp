@@ -91,14 +91,14 @@ long Constraints::refine(const std::vector<double> &velocity, inelastic::Contact
 }
 
 bool Constraints::need_relinearising() const
-{ return movers_.any_turns() || rows_.may_hold() || wall_constraints_.need_relinearising(); }
+{ return movers_.any_turns() || rows_.may_pull() || wall_constraints_.need_relinearising(); }
 
 // Notes the excess of the step on this rank. Returns how many constraints changed. Collective.
 long Constraints::relinearise()
 {
   step_.excess = 0.0;
   long changed = 0;
-  if (movers_.any_turns() || rows_.may_hold()) changed += pairs_.relinearise();
+  if (movers_.any_turns() || rows_.may_pull()) changed += pairs_.relinearise();
   if (wall_constraints_.need_relinearising()) changed += wall_constraints_.relinearise(margin_);
   return changed;
 }

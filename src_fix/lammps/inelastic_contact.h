@@ -23,7 +23,7 @@ struct Contact {
   double force = 0.0;    // [force] of the last step
   // [length] The gap at which it counts as closed (inelastic_gap_rules.h).
   double closed_gap = NOT_CLOSED;
-  double to_stop = 0.0;            // [length] what the contact has to stop (inelastic_gap_rules.h)
+  double length_to_stop = 0.0;     // [length] what the contact has to stop (inelastic_gap_rules.h)
   inelastic::Demand asked = {};    // what the law asks for; an inelastic contact nothing
   double predicted_speed = 0.0;    // [length / time] n.u without contacts; set if there is a law
 

@@ -48,7 +48,7 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   share(virial);
 
   enum { PAIRS, WALLS, PRESSED, HELD, ROWS, SUMS };
-  double sums[SUMS] = {counts_.pairs, counts_.walls, counts_.pressed, counts_.held,
+  double sums[SUMS] = {counts_.pairs, counts_.walls, counts_.pressed, counts_.kept,
                        static_cast<double>(contacts.size())};
   ranks_.reduce(sums, SUMS, &largest_change_, 1);
   vector_[PARTICLE_CONTACTS] = sums[PAIRS];
@@ -102,7 +102,7 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   (is_wall ? counts_.walls : counts_.pairs) += 1.0;
   if (strength > 0.0) counts_.pressed += 1.0;
   const LawState *const law = step_.law_state_of(c);
-  if (law && law->kept) counts_.held += 1.0;
+  if (law && law->kept) counts_.kept += 1.0;
   largest_change_ = std::max(largest_change_,
                              std::abs(problem.contacts.impulse[c]) *
                                  (problem.inverse_mass[i] + problem.inverse_mass[j]));

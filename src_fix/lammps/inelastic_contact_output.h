@@ -89,7 +89,7 @@ class ContactOutput : protected Pointers {
   // Contacts between spheres, and with walls; of these: pressed ones, and those of which the law
   // remembers something.
   struct Counts {
-    double pairs = 0.0, walls = 0.0, pressed = 0.0, held = 0.0;
+    double pairs = 0.0, walls = 0.0, pressed = 0.0, kept = 0.0;
   };
 
   bool is_contact(std::size_t c) const;

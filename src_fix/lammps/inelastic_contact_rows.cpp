@@ -16,7 +16,7 @@ void ContactRows::begin_step()
   laws_.begin_step();
 }
 
-bool ContactRows::may_hold() const
+bool ContactRows::may_pull() const
 { return laws_.has_law(); }
 
 bool ContactRows::remembers(int i, tagint partner, const double *normal, double gap,

@@ -24,7 +24,7 @@ class ContactRows {
 
   // Tells whether contacts of this scene may pull, or belong to the problem because something is
   // remembered of them.
-  bool may_hold() const;
+  bool may_pull() const;
 
   // Tells whether something is remembered of the contact of particle i with a partner (an atom's
   // ID, or minus a wall's number) on the side of the normal, with this gap and sum of radii

@@ -36,11 +36,12 @@ void GapRules::begin(Contact &contact, const FirstGuess &last, double wall_motio
   for (int d = 0; d < 3; ++d) opening += normal[d] * (v[3 * i + d] - v[3 * j + d]);
   const double load =
       step_.impulse_per_force * contact.force * problem.mobility_of_pair(i, j, normal);
-  contact.to_stop = std::max({PART_OF_LOAD * load, wall_motion - problem.timestep * opening, 0.0});
+  contact.length_to_stop =
+      std::max({PART_OF_LOAD * load, wall_motion - problem.timestep * opening, 0.0});
   // A contact at rest is closed where it is: to close the gap would be a motion that no force
   // makes.
   contact.closed_gap =
-      closed_gap(contact, last.closed_gap, changes ? 0.0 : CLOSING * contact.to_stop);
+      closed_gap(contact, last.closed_gap, changes ? 0.0 : CLOSING * contact.length_to_stop);
 }
 
 // The factors by which the loads of two particles have changed that were at rest in the last step,
@@ -91,7 +92,7 @@ double GapRules::given_back(const Contact &contact) const
   const double beyond = -contact.gap_now - step_.eps(CLOSED);
   if (beyond <= 0.0 || step_.keeps_overlaps) return 0.0;
   const double x = beyond / step_.eps(in_eps::WHOLE - CLOSED);
-  const double softly = step_.settings.accuracy * contact.to_stop * x * std::max(1.0, x * x);
+  const double softly = step_.settings.accuracy * contact.length_to_stop * x * std::max(1.0, x * x);
   return std::min(
       {beyond, std::max(softly, -contact.gap_now - step_.eps(ALLOWED)), most_given_back()});
 }
@@ -114,7 +115,8 @@ double GapRules::effective_gap(const Contact &contact) const
   const double gap = contact.gap_now;
   if (step_.phase == Phase::CONTACT) {
     if (overlaps_.is_bad(gap)) return 0.0;
-    if (contact.asked.set.may_pull()) return gap <= 0.0 ? -given_back(contact) : held_.gap(contact);
+    if (contact.asked.set.may_pull())
+      return gap <= 0.0 ? -given_back(contact) : pulled_.gap(contact);
     const double closed = contact_gap(contact);
     const double parted = -step_.problem.timestep * contact.asked.parting_speed;
     return contact.asked.parts ? std::min(closed, parted) : closed;
@@ -188,9 +190,9 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     if (contacts.gap[c] == linear_gap || overlaps_.is_bad(contact.gap_now)) continue;
     if (step_.is_member(contacts.first[c]) || step_.is_member(contacts.second[c])) continue;
     const double at_end = gap_at_end(c, velocity);
-    // A held contact is closed no faster than its gap asks for.
-    const bool holds = step_.may_hold(c) && contacts.impulse[c] < 0.0;
-    const bool may_be_open = holds || contacts.impulse[c] == 0.0 || contact.asked.parts;
+    // A pulled contact is closed no faster than its gap asks for.
+    const bool pulls = step_.may_pull(c) && contacts.impulse[c] < 0.0;
+    const bool may_be_open = pulls || contacts.impulse[c] == 0.0 || contact.asked.parts;
     const bool stays = at_end >= -deepest(contact, allowed);
     if (stays && (at_end <= allowed || may_be_open)) continue;
     // Surfaces that part are asked for no less than that.

@@ -5,8 +5,8 @@
 #define INELASTIC_GAP_RULES_H
 
 #include "inelastic_first_guess.h"
-#include "inelastic_held_contacts.h"
 #include "inelastic_overlap_watch.h"
+#include "inelastic_pulled_contacts.h"
 #include "inelastic_step.h"
 
 #include <array>
@@ -17,11 +17,11 @@ namespace LAMMPS_NS::Inelastic_NS {
 
 class GapRules {
  public:
-  GapRules(Step &step, OverlapWatch &overlaps) : step_(step), held_(step), overlaps_(overlaps) {}
+  GapRules(Step &step, OverlapWatch &overlaps) : step_(step), pulled_(step), overlaps_(overlaps) {}
 
-  // As for held contacts (inelastic_held_contacts.h).
-  static constexpr int MAX_RELINEARISATIONS = HeldContacts::MOST_ROUNDS;
-  static constexpr double LEAST_ALONG = HeldContacts::LEAST_ALONG;
+  // As for pulled contacts (inelastic_pulled_contacts.h).
+  static constexpr int MAX_RELINEARISATIONS = PulledContacts::MOST_ROUNDS;
+  static constexpr double LEAST_ALONG = PulledContacts::LEAST_ALONG;
 
   // The gap [length] that the constraint takes for the present one, the wall's motion left out.
   double effective_gap(const Contact &contact) const;
@@ -39,18 +39,18 @@ class GapRules {
   // overlap need not be given back in one step, and but for bad starts by at most half a tolerance.
   double wanted_gap(const Contact &contact) const;
 
-  // Notes the excess that a contact ends the step with (StepState). A bad overlap may stay as deep
-  // as it began without one, though its constraint asks for less: where less is not to be had, the
-  // step need not be shorter.
+  // Notes by how much a contact ends the step deeper than it may (the excess of StepState). The
+  // constraint of a bad overlap asks for less than there is; one that stays as deep as it began has
+  // no excess nevertheless, since a shorter step would not open it either.
   void note_end(const Contact &contact, double gap_at_end);
 
   // Tells whether the end of the step is so deep that the constraint must change.
   bool ends_too_deep(const Contact &contact, double gap_at_end) const;
 
-  // Sets the gap of constraint c to one that is exact for the present velocity, or to the
-  // linearised one if that is smaller; approach() says how far it goes there in one round. A gap
-  // that was set for an earlier velocity is set again, so that no force keeps surfaces apart that
-  // have parted meanwhile, and the step does not depend on how it was found. Returns how many
+  // Sets the gap of constraint c to the smaller one of its linearised gap and `exact_gap`, which is
+  // exact for the present velocity; approach() says how far it goes there in one round. This holds
+  // for a gap that an earlier round has set, too: surfaces that have parted since then are not kept
+  // apart by a force, and the step does not depend on the way to its solution. Returns how many
   // constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
@@ -61,11 +61,11 @@ class GapRules {
   // a dense start spheres jam for a moment, and cannot all be taken apart at once.
   long keep_within_tolerance(const std::vector<double> &velocity);
 
-  // What constraint c asks for beyond its gap at the start of the step [length], because bodies turn
-  // or walls curve.
+  // What constraint c asks for beyond its gap at the start of the step [length], because bodies
+  // turn or walls curve.
   double closed_by_turning(std::size_t c) const;
 
-  HeldContacts &held() { return held_; }
+  PulledContacts &pulled() { return pulled_; }
   OverlapWatch &overlaps() { return overlaps_; }
 
  private:
@@ -82,7 +82,7 @@ class GapRules {
   double gap_at_end(std::size_t c, const std::vector<double> &velocity) const;
 
   Step &step_;
-  HeldContacts held_;
+  PulledContacts pulled_;
   OverlapWatch &overlaps_;
 };
 

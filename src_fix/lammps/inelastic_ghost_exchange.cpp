@@ -37,7 +37,7 @@ void combine(void *in, void *inout, int *count, MPI_Datatype *)
 }    // namespace
 
 GhostExchange::GhostExchange(LAMMPS *lmp, Fix *fix, PhaseClock &clock) :
-    Pointers(lmp), fix_(fix), clock_(clock), told_particles_(world)
+    Pointers(lmp), fix_(fix), clock_(clock), shared_particles_(world)
 {
   MPI_Op_create(&combine, 1, &reduction_);
   MPI_Type_contiguous(sizeof(Reduced) / sizeof(double), MPI_DOUBLE, &reduction_type_);
@@ -53,12 +53,12 @@ GhostExchange::~GhostExchange()
 bool GhostExchange::has_ghosts() const
 { return comm->nprocs > 1 || atom->nghost > 0; }
 
-int GhostExchange::turns() const
+int GhostExchange::rank_colours() const
 { return comm->nprocs > 1 ? 2 : 1; }
 
-// In a grid of ranks those that share a face have different turns, but across a periodic face with
-// an odd number of ranks between.
-int GhostExchange::turn() const
+// In a grid of ranks those that share a face have different colours, but across a periodic face
+// with an odd number of ranks between.
+int GhostExchange::rank_colour() const
 {
   const bool in_grid = comm->layout != Comm::LAYOUT_TILED;
   const int place = in_grid ? comm->myloc[0] + comm->myloc[1] + comm->myloc[2] : comm->me;
@@ -112,7 +112,7 @@ void GhostExchange::sum_over_chosen_ghosts(float *per_particle)
   exchange(Exchange::CHOSEN_SINGLE, true, true);
 }
 
-void GhostExchange::choose_told(const std::vector<char> &chosen, bool images)
+void GhostExchange::choose_shared(const std::vector<char> &chosen, bool images)
 {
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
   std::vector<double> owner(2 * static_cast<std::size_t>(atom->nlocal + atom->nghost));
@@ -121,19 +121,19 @@ void GhostExchange::choose_told(const std::vector<char> &chosen, bool images)
     owner[2 * i + 1] = i;
   }
   share_with_ghosts(owner.data(), 2);
-  told_particles_.choose(chosen, owner, images, turn());
+  shared_particles_.choose(chosen, owner, images, rank_colour());
 }
 
-void GhostExchange::tell(const float *per_particle)
+void GhostExchange::send(const float *per_particle)
 {
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
-  told_particles_.tell(per_particle);
+  shared_particles_.send(per_particle);
 }
 
-void GhostExchange::hear(int turn, float *per_particle)
+void GhostExchange::receive(int colour, float *per_particle)
 {
   const PhaseClock::Within within(clock_, PhaseClock::COMMUNICATE);
-  told_particles_.hear(turn, per_particle);
+  shared_particles_.receive(colour, per_particle);
 }
 
 void GhostExchange::gather(FirstGuesses &guesses)

@@ -10,7 +10,7 @@
 #include "inelastic_host.h"
 #include "inelastic_law_memory.h"
 #include "inelastic_phase_clock.h"
-#include "inelastic_told_particles.h"
+#include "inelastic_shared_particles.h"
 
 #include "pointers.h"
 
@@ -45,14 +45,14 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   void choose_ghosts(const std::vector<char> &chosen) override;
   void sum_over_chosen_ghosts(double *per_particle) override;
   void sum_over_chosen_ghosts(float *per_particle) override;
-  void choose_told(const std::vector<char> &chosen, bool images) override;
-  void tell(const float *per_particle) override;
-  void hear(int turn, float *per_particle) override;
+  void choose_shared(const std::vector<char> &chosen, bool images) override;
+  void send(const float *per_particle) override;
+  void receive(int colour, float *per_particle) override;
   void share_with_ghosts(double *per_particle, int numbers) override;
   void reduce(double *sums, int number_of_sums, double *maxima, int number_of_maxima) override;
   bool has_ghosts() const override;
-  int turns() const override;
-  int turn() const override;
+  int rank_colours() const override;
+  int rank_colour() const override;
 
   // Gives an owned atom and all its ghosts the least of their values. Collective.
   void least_over_ghosts(double *per_particle, int numbers);
@@ -98,7 +98,7 @@ class GhostExchange final : public inelastic::Host, protected Pointers {
   FirstGuesses *exchanged_guesses_ = nullptr;
   LawMemory *exchanged_law_memory_ = nullptr;
   ChosenGhosts chosen_ghosts_;
-  ToldParticles told_particles_;
+  SharedParticles shared_particles_;
 };
 
 }    // namespace LAMMPS_NS::Inelastic_NS

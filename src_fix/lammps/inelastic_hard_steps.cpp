@@ -29,12 +29,12 @@ HardSteps::HardSteps(LAMMPS *lmp, const Step &step, GhostExchange &ranks) :
 }
 
 // Uzawa's method looks at overlaps alone, and a push is none that an accuracy counts for.
-bool HardSteps::looks() const
+bool HardSteps::judges_accuracy() const
 { return step_.settings.solver != "uzawa" && !step_.bad_start; }
 
 bool HardSteps::is_hardly_solved(const inelastic::ProjectionResult &result) const
 {
-  return looks() && result.status == inelastic::Status::CONVERGED && !result.accurate &&
+  return judges_accuracy() && result.status == inelastic::Status::CONVERGED && !result.accurate &&
       result.unresolved > inelastic::HARDLY_RESOLVED;
 }
 
@@ -89,7 +89,7 @@ std::string HardSteps::cause() const
 void HardSteps::end_step(const inelastic::ProjectionResult &result)
 {
   if (shortened_) ++counts_.shortened;
-  const bool inaccurate = looks() && result.status == inelastic::Status::CONVERGED &&
+  const bool inaccurate = judges_accuracy() && result.status == inelastic::Status::CONVERGED &&
       step_.settings.accuracy > 0.0 && !result.accurate;
   const bool at_maxiter = inaccurate && result.iterations >= step_.settings.max_iterations;
   if (inaccurate) ++counts_.inaccurate;

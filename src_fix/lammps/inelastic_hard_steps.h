@@ -49,7 +49,7 @@ class HardSteps : protected Pointers {
   void end_step(const inelastic::ProjectionResult &result);
 
  private:
-  bool looks() const;
+  bool judges_accuracy() const;
 
   const Step &step_;
   GhostExchange &ranks_;

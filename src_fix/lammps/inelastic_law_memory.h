@@ -38,8 +38,8 @@ class LawMemory : public ContactMemory<LawEntry> {
   void forget(int atom);
   void copy(int from, int to);
 
-  // Partners are known by the IDs that atoms have when they remember: commands between runs can
-  // give them others (delete_atoms does). Therefore an atom keeps the one that it had.
+  // What is remembered names partners by the IDs of that time, and commands between runs can change
+  // IDs (delete_atoms does). Therefore an atom keeps the ID, too, that it had when it remembered.
   void set_owner(int atom, tagint id) { owner_[atom] = id; }
   tagint owner(int atom) const { return owner_[atom]; }
 

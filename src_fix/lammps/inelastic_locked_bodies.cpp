@@ -1,6 +1,7 @@
 #include "inelastic_locked_bodies.h"
 
 #include "inelastic_lammps_versions.h"
+#include "inelastic_periods.h"
 
 #include "atom.h"
 #include "domain.h"
@@ -77,7 +78,8 @@ std::vector<LockedBodies::Grain> LockedBodies::grains() const
 void LockedBodies::find()
 {
   pairs_.clear();
-  const int axis = !domain->xperiodic ? 0 : !domain->yperiodic ? 1 : !domain->zperiodic ? 2 : -1;
+  const Periods periods(lmp);
+  const int axis = !periods.along(0) ? 0 : !periods.along(1) ? 1 : !periods.along(2) ? 2 : -1;
   std::vector<Grain> all = grains();
   auto begin = [axis](const Grain &grain) {
     return axis < 0 ? 0.0 : grain.centre[axis] - grain.reach;

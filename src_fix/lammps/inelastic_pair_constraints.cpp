@@ -81,7 +81,7 @@ void PairConstraints::search_list()
   const int nlocal = atom->nlocal;
   const int group_bit = step_.settings.group_bit;
   const std::vector<int> &body = step_.problem.bodies.body;
-  const bool may_hold = rows_.may_hold();
+  const bool may_pull = rows_.may_pull();
   candidates_.clear();
   std::size_t first_slot = 0;
   for (int ii = 0; ii < list_->inum; ++ii) {
@@ -103,7 +103,7 @@ void PairConstraints::search_list()
       const float square = away[0] * away[0] + away[1] * away[1] + away[2] * away[2];
       row_[found] = jj;
       // What is not a number is not beyond the reach.
-      found += !(square > reach * reach) || (may_hold && is_remembered(i, j));
+      found += !(square > reach * reach) || (may_pull && is_remembered(i, j));
     }
     for (int k = 0; k < found; ++k) {
       const int j = neighbours[row_[k]] & NEIGHMASK;
@@ -123,7 +123,7 @@ void PairConstraints::collect(double margin)
   const double h = step_.problem.timestep;
   const std::vector<double> &predicted = step_.problem.predicted_velocity;
   const double *const velocity = predicted.data();
-  const bool may_hold = rows_.may_hold();
+  const bool may_pull = rows_.may_pull();
   std::size_t slots = 0;
   for (int ii = 0; ii < list_->inum; ++ii) slots += list_->numneigh[list_->ilist[ii]];
   taken_.assign(slots, 0);
@@ -140,7 +140,7 @@ void PairConstraints::collect(double margin)
                                velocity[3 * i + 2] - velocity[3 * j + 2]};
     const double reach = radius[i] + radius[j] + margin;
     if (dot(away, away) > reach * reach && ends_beyond(reach, away, h, opening) &&
-        !(may_hold && is_remembered(i, j)))
+        !(may_pull && is_remembered(i, j)))
       continue;
     take(pair.slot, i, j);
   }
@@ -261,18 +261,18 @@ long PairConstraints::relinearise()
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const Contact &contact = step_.contact_of(c);
     const int i = contacts.first[c], j = contacts.second[c];
-    const bool may_hold = step_.may_hold(c);
-    if (contact.is_with_wall() || !(may_hold || step_.is_member(i) || step_.is_member(j))) continue;
+    const bool may_pull = step_.may_pull(c);
+    if (contact.is_with_wall() || !(may_pull || step_.is_member(i) || step_.is_member(j))) continue;
     if (entangled_.contains(i, j)) continue;
     const double gap = gap_at_end(i, j, away);
     rules_.note_end(contact, gap);
     const bool too_deep = rules_.ends_too_deep(contact, gap);
-    // A push leaves held pairs as they are, unless it turns a pair back: the gap that was set to
+    // A push leaves pulled pairs as they are, unless it turns a pair back: the gap that was set to
     // make room for its turning would then be an overlap.
     const bool follows = step_.phase == Phase::CONTACT || gap < -step_.settings.tolerance;
-    if (may_hold && follows && !rules_.overlaps().is_bad(contact.gap_now)) {
+    if (may_pull && follows && !rules_.overlaps().is_bad(contact.gap_now)) {
       const double along = dot(&contacts.normal[3 * c], away) / norm(away);
-      changed += rules_.held().follow(c, gap, opening(c), along);
+      changed += rules_.pulled().follow(c, gap, opening(c), along);
       continue;
     }
     if (!(step_.is_member(i) || step_.is_member(j))) continue;

@@ -36,7 +36,7 @@ class PairConstraints : protected Pointers {
   // how many.
   long add_violated();
 
-  // Makes the gaps of bodies, and of contacts that hold, exact for the present solution. The
+  // Makes the gaps of bodies, and of contacts that pull, exact for the present solution. The
   // distance between turning bodies is not convex: at the end of the step it may be less than the
   // linearised gap. The gap of the constraint is then lowered by the difference over the cosine of
   // the angle between the normal and the line of the centres at the end, since the spheres make it

@@ -1,6 +1,6 @@
 // The periods of the simulation box: which directions have one, where images of a point are, and
-// how much of the box is a rank's own. No other room of the fix knows that the box is periodic, or
-// tilted.
+// how much of the box is a rank's own. Other rooms of the fix ask here; inelastic_step_length.cpp
+// alone takes motions in units of the box from LAMMPS itself.
 
 #ifndef INELASTIC_PERIODS_H
 #define INELASTIC_PERIODS_H

@@ -76,7 +76,7 @@ bool RestTrial::close_contacts(const Begun &begun)
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const bool closes = begun.constraints[c] && contacts.impulse[c] > 0.0 &&
         contacts.gap[c] > 0.0 && step_.contact_of(c).gap_now <= step_.settings.tolerance &&
-        !step_.may_hold(c);
+        !step_.may_pull(c);
     if (!closes) continue;
     contacts.gap[c] = 0.0;
     any = 1.0;

@@ -83,7 +83,7 @@ void RigidMotion::gather_momenta(double kick)
     if (b < 0) continue;
     const bool carried = carries(i);
     const Carried &of_body = state_.momenta()[i];
-    const Push &push = carried ? of_body.next : of_body.held;
+    const Push &push = carried ? of_body.next : of_body.included;
     const double m = mass_of(atom, i);
     for (int d = 0; d < 3; ++d) {
       const double forced = kick * atom->f[i][d];
@@ -115,7 +115,7 @@ void RigidMotion::take_carried(int i)
   if (bodies.place[i] == bodies.start[b]) {
     const BodyInertia &inertia = inertias_[b];
     const Carried &of_body = state_.momenta()[i];
-    const Push &push = carried ? of_body.next : of_body.held;
+    const Push &push = carried ? of_body.next : of_body.included;
     // Forces on the spheres can take away no more of the push than `removed`.
     double pushed[3], slow[3], removed[3];
     for (int d = 0; d < 3; ++d)
@@ -310,7 +310,7 @@ Push RigidMotion::replace_push(int i, double *force)
       push.velocity[d] = -of_body.next.velocity[d];
       push.angular_momentum[d] = -of_body.next.angular_momentum[d];
     }
-  const Push &before = whole ? of_body.next : of_body.held;
+  const Push &before = whole ? of_body.next : of_body.included;
   const Push stop = stopping_ ? bodies_[b].stop : Push{};
   // Forces m (a + alpha x r) with the right sum and the right moment.
   double change[3], spin[3], around[3];
@@ -343,8 +343,8 @@ void RigidMotion::keep(int i, const Push &push, const double *contact_force)
   const bool whole = step_.kick == Kick::WHOLE;
   if (whole)
     for (int d = 0; d < 3; ++d) {
-      of_body.held.velocity[d] = 0.5 * (of_body.next.velocity[d] + push.velocity[d]);
-      of_body.held.angular_momentum[d] =
+      of_body.included.velocity[d] = 0.5 * (of_body.next.velocity[d] + push.velocity[d]);
+      of_body.included.angular_momentum[d] =
           0.5 * (of_body.next.angular_momentum[d] + push.angular_momentum[d]);
     }
   of_body.next = push;

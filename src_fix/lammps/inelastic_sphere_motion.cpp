@@ -44,7 +44,7 @@ void SphereMotion::apply(const double *)
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!step_.in_group(atom, i) || step_.is_member(i)) continue;
     const bool moves = problem.inverse_mass[i] > 0.0;
-    double *const held = state_.push_held(i);
+    double *const included = state_.push_included(i);
     double *const next = state_.push_next(i);
     for (int d = 0; d < 3; ++d) {
       const double v = step_.velocity[3 * i + d];
@@ -55,7 +55,7 @@ void SphereMotion::apply(const double *)
       }
       const double push = step_.bad_start && moves ? v - problem.predicted_velocity[3 * i + d]
                                                    : 0.0;
-      if (step_.kick == Kick::WHOLE) held[d] = 0.5 * (next[d] + push);
+      if (step_.kick == Kick::WHOLE) included[d] = 0.5 * (next[d] + push);
       next[d] = push;
       state_.expected_velocity(i)[d] = v;
       state_.expected_position(i)[d] = atom->x[i][d] + h * v;

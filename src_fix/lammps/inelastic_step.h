@@ -140,10 +140,10 @@ struct Step : RunState, StepState {
   { return law_states.empty() ? nullptr : &law_states[rows[c].contact]; }
 
   // Tells whether the contact of a row may pull.
-  bool may_hold(std::size_t c) const { return contact_of(c).asked.set.may_pull(); }
+  bool may_pull(std::size_t c) const { return contact_of(c).asked.set.may_pull(); }
 
-  // Tells whether a row holds: it may pull, and with the present impulse it does not open.
-  bool holds(std::size_t c) const
+  // Tells whether a row pulls: it may, and with the present impulse it does not open.
+  bool pulls(std::size_t c) const
   {
     const inelastic::HalfLine<double> set = problem.contacts.set[c];
     return set.may_pull() && set.is_loaded(problem.contacts.impulse[c]);

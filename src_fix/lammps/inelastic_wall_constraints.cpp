@@ -48,7 +48,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints(const double *vel
   viewpoints_.clear();
   const double h = step_.problem.timestep;
   // A wall that moves away from a sphere that it holds may be far at the end of the step.
-  const bool may_be_far = rows_.may_hold() && walls_.any_moves();
+  const bool may_be_far = rows_.may_pull() && walls_.any_moves();
   const double anywhere = periods_.widest();
   const double nearer = beyond + travel_of_walls(velocity);
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -77,7 +77,7 @@ const WallConstraints::Viewpoints &WallConstraints::viewpoints_at_end(double mar
   std::unordered_set<int> followed;
   for (std::size_t c = 0; c < step_.rows.size(); ++c) {
     const int i = step_.problem.contacts.first[c];
-    const bool follows = step_.rows[c].followed || step_.may_hold(c);
+    const bool follows = step_.rows[c].followed || step_.may_pull(c);
     if (!step_.contact_of(c).is_with_wall() || !follows) continue;
     if (!step_.is_member(i) || movers_.angle_turned(step_.problem, i) < HALF_A_TURN)
       followed.insert(i);
@@ -137,7 +137,8 @@ void WallConstraints::collect(double margin)
         rules_.overlaps().note(gap_now, from.atom, -view.surface);
         const double opening = opening_of(from.atom, view.surface, view.normal, velocity);
         if (gap + std::min(0.0, opening) <= margin ||
-            rows_.remembers(from.atom, -view.surface, view.normal, gap_now, atom->radius[from.atom]))
+            rows_.remembers(from.atom, -view.surface, view.normal, gap_now,
+                            atom->radius[from.atom]))
           take(from, view);
       },
       [&](const Viewpoint &from, const std::string &region) {
@@ -259,8 +260,8 @@ long WallConstraints::relinearise(double margin)
         rules_.note_end(contact, gap);
         const bool too_deep = rules_.ends_too_deep(contact, gap) ||
             (exact && gap < std::min(contact.gap_now, -step_.settings.tolerance));
-        if (known && may_hold(existing->second, view.normal))
-          changed += hold(existing->second, gap, view.normal);
+        if (known && may_pull(existing->second, view.normal))
+          changed += follow_pulled(existing->second, gap, view.normal);
         else if (too_deep || (known && step_.rows[existing->second].followed))
           changed += add_plane(from, view, too_deep);
       },
@@ -271,23 +272,23 @@ long WallConstraints::relinearise(double margin)
   return changed + add_planes_within(beyond);
 }
 
-// Tells whether a constraint is that of a contact which may be held, not in a bad start, and
+// Tells whether a constraint is that of a contact that may pull, not in a bad start, and
 // where the wall at the end of the step does not face another way.
-bool WallConstraints::may_hold(std::size_t c, const double *normal_at_end) const
+bool WallConstraints::may_pull(std::size_t c, const double *normal_at_end) const
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
-  return step_.may_hold(c) && step_.phase == Phase::CONTACT &&
+  return step_.may_pull(c) && step_.phase == Phase::CONTACT &&
       !rules_.overlaps().is_bad(step_.contact_of(c).gap_now) &&
       dot(&contacts.normal[3 * c], normal_at_end) >= GapRules::LEAST_ALONG;
 }
 
-long WallConstraints::hold(std::size_t c, double gap_at_end, const double *normal_at_end)
+long WallConstraints::follow_pulled(std::size_t c, double gap_at_end, const double *normal_at_end)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
   const double *const normal = &contacts.normal[3 * c];
   const double opening =
       opening_of(contacts.first[c], step_.contact_of(c).wall(), normal, step_.velocity.data());
-  return rules_.held().follow(c, gap_at_end, opening, dot(normal, normal_at_end));
+  return rules_.pulled().follow(c, gap_at_end, opening, dot(normal, normal_at_end));
 }
 
 // Sets constraints again whose walls are not seen from where a body ends (a part of an intersection

@@ -29,7 +29,7 @@ class WallConstraints : protected Pointers {
                   GhostExchange &ranks, const Movers &movers);
 
   // Tells whether the end of a step must be looked at: bodies turn, walls curve, spheres may cross
-  // a periodic boundary, or contacts may hold spheres to an obstacle, about which they turn.
+  // a periodic boundary, or contacts may pull spheres to an obstacle, about which they turn.
   bool need_relinearising() const { return !walls_.empty() && !(walls_.exact() && only_inexact()); }
 
   // Takes the walls that come nearer than `margin` [length] with the predicted velocities.
@@ -48,11 +48,11 @@ class WallConstraints : protected Pointers {
  private:
   using Viewpoints = Walls::Viewpoints;
 
-  std::uint64_t key(int i, int wall) const
-  { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + wall; }
+  std::uint64_t key(int i, int piece) const
+  { return static_cast<std::uint64_t>(i) * (walls_.number_of_walls() + 1) + piece; }
 
   // Tells whether a look at the end of a step may leave out the walls whose constraints are exact.
-  bool only_inexact() const { return !movers_.any_turns() && !periods_.any() && !rows_.may_hold(); }
+  bool only_inexact() const { return !movers_.any_turns() && !periods_.any() && !rows_.may_pull(); }
   bool wrap(Viewpoint &) const;
   void note_overlaps_with_moving_walls();
   void take(const Viewpoint &, const WallView &);
@@ -63,8 +63,8 @@ class WallConstraints : protected Pointers {
   double opening_of(int i, int wall, const double *normal, const double *velocity) const;
   double gap_at_end(const WallView &view, int i) const;
   double travel_of_walls(const double *velocity) const;
-  bool may_hold(std::size_t c, const double *normal_at_end) const;
-  long hold(std::size_t c, double gap_at_end, const double *normal_at_end);
+  bool may_pull(std::size_t c, const double *normal_at_end) const;
+  long follow_pulled(std::size_t c, double gap_at_end, const double *normal_at_end);
   long add_plane(const Viewpoint &, const WallView &, bool too_deep);
   long add_planes_within(const Viewpoints &beyond);
   long follow_unseen(const std::unordered_set<std::size_t> &seen, const Viewpoints &beyond);
@@ -78,7 +78,7 @@ class WallConstraints : protected Pointers {
   GhostExchange &ranks_;
   const Movers &movers_;
   const Periods periods_;
-  std::unordered_map<std::uint64_t, std::size_t> constraint_;    // atom and wall -> the latest one
+  std::unordered_map<std::uint64_t, std::size_t> constraint_;    // atom and piece -> the latest one
   Viewpoints viewpoints_;                                        // room for them
   std::vector<double> clear_of_walls_;    // per owned atom: no wall of this step is as near as this
 };

@@ -43,8 +43,8 @@ struct ContactState {
   std::array<int, 2> type;         // LAMMPS's atom types; 0 for a wall
 };
 
-// What a contact asks for in a step: the gap, and which impulses it may carry. By itself that of the
-// inelastic law: the surfaces do not overlap, and the contact pushes alone.
+// What a contact asks for in a step: the gap, and which impulses it may carry. By itself that of
+// the inelastic law: the surfaces do not overlap, and the contact pushes alone.
 struct Demand {
   // The contact may pull, by up to an impulse [mass length / time], >= 0.
   static Demand pulls(double up_to) { return {false, 0.0, HalfLine<double>::pulls(up_to)}; }

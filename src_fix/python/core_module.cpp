@@ -89,8 +89,8 @@ void add_contacts(inelastic::ContactProblem &problem, nb::handle given)
     problem.contacts.add(static_cast<int>(first.data()[c]),
                          wall_or_particle < 0 ? problem.slot_of_wall(0) : wall_or_particle,
                          normal.data() + 3 * c, gap.data()[c], guess.data()[c],
-                         compliance.data()[c],
-                         inelastic::HalfLine<double>::above(least.data()[c]), refinement.data()[c]);
+                         compliance.data()[c], inelastic::HalfLine<double>::above(least.data()[c]),
+                         refinement.data()[c]);
   }
 }
 

@@ -1,5 +1,5 @@
-// The core without Python: both solvers, rigid bodies, the projection in rounds, several ranks
-// and random numbers. Small, because it is there to be run under the address and
+// The core without Python: colours, all solvers, rigid bodies, the projection in rounds, several
+// ranks and random numbers. Small, because it is there to be run under the address and
 // undefined-behaviour sanitizers; the solvers are judged in test_solver*.py. Returns 1 when a check
 // failed.
 
@@ -417,8 +417,8 @@ void test_colours()
     for (std::size_t c = 0; c < first.size(); ++c) {
       if (colours[c] != colour) continue;
       ++count;
-      for (const int mover : {first[c], second[c]})
-        if (moves[mover] && colour < LAST) CHECK_EQUAL(used[mover]++, 0);
+      for (const int grain : {first[c], second[c]})
+        if (moves[grain] && colour < LAST) CHECK_EQUAL(used[grain]++, 0);
     }
     CHECK_EQUAL(colours.count(colour), count);
     counted += count;
@@ -987,7 +987,7 @@ class Ranks {
 
   static constexpr auto PATIENCE = std::chrono::seconds(20);
 
-  int turns = 2;    // of Host::turns
+  int rank_colours = 2;    // of Host::rank_colours
 
   struct Arrays {
     double *per_particle = nullptr;
@@ -1059,30 +1059,30 @@ class Ranks {
     }
   }
 
-  // What a rank has told, with the slots that it is of.
-  struct Told {
+  // What a rank has sent, with the slots that it is of.
+  struct Message {
     std::vector<char> chosen;
     std::vector<float> values;
   };
 
-  void tell(std::size_t rank, const Told &told)
+  void send(std::size_t rank, const Message &message)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    for (std::size_t to = 0; to < shares_.size(); ++to) told_[{rank, to}].push_back(told);
-    somebody_told_.notify_all();
+    for (std::size_t to = 0; to < shares_.size(); ++to) sent_[{rank, to}].push_back(message);
+    somebody_sent_.notify_all();
   }
 
-  Told hear(std::size_t from, std::size_t rank)
+  Message receive(std::size_t from, std::size_t rank)
   {
     std::unique_lock<std::mutex> lock(mutex_);
-    std::deque<Told> &messages = told_[{from, rank}];
-    if (!somebody_told_.wait_for(lock, PATIENCE, [&] {
+    std::deque<Message> &messages = sent_[{from, rank}];
+    if (!somebody_sent_.wait_for(lock, PATIENCE, [&] {
           return !messages.empty();
         }))
       give_up("one rank waits for what another tells");
-    Told told = messages.front();
+    Message message = messages.front();
     messages.pop_front();
-    return told;
+    return message;
   }
 
   const std::vector<Share> &shares() const { return shares_; }
@@ -1118,8 +1118,8 @@ class Ranks {
   int particles_;
   std::vector<Arrays> arrays_;
   std::mutex mutex_;
-  std::condition_variable all_here_, somebody_told_;
-  std::map<std::pair<std::size_t, std::size_t>, std::deque<Told>> told_;    // by from and to
+  std::condition_variable all_here_, somebody_sent_;
+  std::map<std::pair<std::size_t, std::size_t>, std::deque<Message>> sent_;    // by from and to
   int waiting_ = 0;
   long exchanges_ = 0;
 };
@@ -1132,8 +1132,8 @@ class RankHost final : public Host {
   { sum(per_particle, numbers, numbers, nullptr); }
 
   bool has_ghosts() const override { return true; }
-  int turns() const override { return ranks_.turns; }
-  int turn() const override { return static_cast<int>(rank_) % ranks_.turns; }
+  int rank_colours() const override { return ranks_.rank_colours; }
+  int rank_colour() const override { return static_cast<int>(rank_) % ranks_.rank_colours; }
   void choose_ghosts(const std::vector<char> &chosen) override
   {
     chosen_ = chosen;
@@ -1142,28 +1142,29 @@ class RankHost final : public Host {
   void sum_over_chosen_ghosts(double *per_particle) override { sum(per_particle, 4, 3, &chosen_); }
   void sum_over_chosen_ghosts(float *per_particle) override { sum(per_particle, 4, 3, &chosen_); }
 
-  void choose_told(const std::vector<char> &chosen, bool images) override
+  void choose_shared(const std::vector<char> &chosen, bool images) override
   {
-    told_ = chosen;
+    sent_ = chosen;
     images_ = images;
-    ranks_.call("choose_told", rank_, {}, &Ranks::choose_ghosts);
+    ranks_.call("choose_shared", rank_, {}, &Ranks::choose_ghosts);
   }
 
-  void tell(const float *per_particle) override
-  { ranks_.tell(rank_, {told_, {per_particle, per_particle + 4 * told_.size()}}); }
+  void send(const float *per_particle) override
+  { ranks_.send(rank_, {sent_, {per_particle, per_particle + 4 * sent_.size()}}); }
 
-  void hear(int turn, float *per_particle) override
+  void receive(int colour, float *per_particle) override
   {
     const std::vector<Share> &shares = ranks_.shares();
     for (std::size_t from = 0; from < shares.size(); ++from) {
-      if (static_cast<int>(from) % ranks_.turns != turn) continue;
-      const Ranks::Told told = ranks_.hear(from, rank_);
+      if (static_cast<int>(from) % ranks_.rank_colours != colour) continue;
+      const Ranks::Message message = ranks_.receive(from, rank_);
       if (from == rank_ && !images_) continue;
       for (std::size_t i = 0; i < shares[rank_].particles.size(); ++i)
-        for (std::size_t k = 0; told_[i] && k < shares[from].particles.size(); ++k) {
-          if (!told.chosen[k] || shares[from].particles[k] != shares[rank_].particles[i]) continue;
+        for (std::size_t k = 0; sent_[i] && k < shares[from].particles.size(); ++k) {
+          if (!message.chosen[k] || shares[from].particles[k] != shares[rank_].particles[i])
+            continue;
           if (from == rank_ && k == i) continue;
-          for (std::size_t d = 0; d < 3; ++d) per_particle[4 * i + d] += told.values[4 * k + d];
+          for (std::size_t d = 0; d < 3; ++d) per_particle[4 * i + d] += message.values[4 * k + d];
         }
     }
   }
@@ -1210,7 +1211,7 @@ class RankHost final : public Host {
 
   Ranks &ranks_;
   std::size_t rank_;
-  std::vector<char> chosen_, told_;
+  std::vector<char> chosen_, sent_;
   bool images_ = false;
 };
 
@@ -1426,7 +1427,7 @@ void check_calls(long calls, const ProjectionResult &result, long per_round)
 }
 
 // Bodies lie across the ranks, and each rank has some of their particles twice.
-void test_bodies_on_two_ranks(double tolerance, int turns)
+void test_bodies_on_two_ranks(double tolerance, int rank_colours)
 {
   const double bound = 100.0 * tolerance / TIMESTEP;    // as in test_two_ranks
   const ContactProblem whole = make_crystal_of_bodies();
@@ -1449,7 +1450,7 @@ void test_bodies_on_two_ranks(double tolerance, int turns)
         Division division = divide(whole, owner);
         complete(whole.bodies, division.shares);
         Ranks ranks(division.shares, whole.particles);
-        ranks.turns = turns;
+        ranks.rank_colours = rank_colours;
         const auto outcomes =
             solve_on_ranks(whole, ranks, division.contacts, name, tolerance, hide_contacts);
         check_agreement(outcomes, ranks, solve_on_one_rank(whole, name, tolerance), bound);
@@ -1460,7 +1461,7 @@ void test_bodies_on_two_ranks(double tolerance, int turns)
       }
 }
 
-void test_two_ranks(double tolerance, int turns)
+void test_two_ranks(double tolerance, int rank_colours)
 {
   // Rounding in another order moves the last iteration by no more than the tolerance; along a few
   // contacts that is less than 100 times the tolerance over the step.
@@ -1485,7 +1486,7 @@ void test_two_ranks(double tolerance, int turns)
       for (const bool hide_contacts : {false, true}) {
         const Division division = divide(whole, owner);
         Ranks ranks(division.shares, whole.particles);
-        ranks.turns = turns;
+        ranks.rank_colours = rank_colours;
         const auto outcomes =
             solve_on_ranks(whole, ranks, division.contacts, name, tolerance, hide_contacts);
         check_agreement(outcomes, ranks, solve_on_one_rank(whole, name, tolerance), bound);
@@ -1685,9 +1686,9 @@ int main()
   test_iterations_of_all_rounds_are_limited();
   test_concave_wall_is_linearised_again();
   for (const double tolerance : {TOLERANCE, SINGLE_TOLERANCE}) {
-    for (const int turns : {1, 2}) {
-      test_two_ranks(tolerance, turns);
-      test_bodies_on_two_ranks(tolerance, turns);
+    for (const int rank_colours : {1, 2}) {
+      test_two_ranks(tolerance, rank_colours);
+      test_bodies_on_two_ranks(tolerance, rank_colours);
     }
   }
   test_two_ranks_with_nothing();

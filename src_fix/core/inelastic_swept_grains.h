@@ -1,11 +1,11 @@
 // What coloured sweeps move, by number: particles that turn with nothing, and bodies. Their states
-// (inelastic_sweep_kernels.h) are linear in the impulses. One mover more, which nothing moves,
+// (inelastic_sweep_kernels.h) are linear in the impulses. One grain more, which nothing moves,
 // stands for lanes that are empty.
 
 #pragma once
 
 #include "inelastic_contact_problem.h"
-#include "inelastic_packed_groups.h"
+#include "inelastic_packed_batches.h"
 #include "inelastic_packed_kernels.h"
 
 #include <cmath>
@@ -13,17 +13,17 @@
 
 namespace inelastic {
 
-template <typename Group> class SweptMovers {
+template <typename Batch> class SweptGrains {
  public:
-  using State = typename Group::State;
+  using State = typename Batch::State;
   using Vector = packed::Vector<float>;
 
-  // Numbers the movers of a problem. A mobility, 1 / mass, is in these units.
+  // Numbers the grains of a problem. A mobility, 1 / mass, is in these units.
   void find(const ContactProblem &problem, double mobility_unit);
 
   int number() const { return static_cast<int>(moves_.size()); }
-  std::size_t slots() const { return mover_.size(); }
-  int of(int slot) const { return mover_[slot]; }
+  std::size_t slots() const { return grain_.size(); }
+  int of(int slot) const { return grain_[slot]; }
   const std::vector<char> &moves() const { return moves_; }
   // Whether a slot is a further image of a body's member.
   bool is_copy(int slot) const { return is_copy_[slot]; }
@@ -32,7 +32,7 @@ template <typename Group> class SweptMovers {
   float slide_in_single(int slot) const { return std::sqrt(mobility_[of(slot)]); }
 
   // Writes the places of the states, and the rows of a constraint, of which root^2 is the diagonal.
-  void write_rows(const ContactProblem &problem, std::size_t c, double root, Group &group,
+  void write_rows(const ContactProblem &problem, std::size_t c, double root, Batch &batch,
                   int lane) const;
 
   // Sets the states of what impulses have not moved.
@@ -44,12 +44,12 @@ template <typename Group> class SweptMovers {
 
  private:
   void find_bodies(const RigidBodies &bodies, double mobility_unit);
-  bool is_body(std::size_t mover) const { return 9 * mover < spin_root_.size(); }
+  bool is_body(std::size_t grain) const { return 9 * grain < spin_root_.size(); }
 
-  std::vector<int> mover_;         // per slot
+  std::vector<int> grain_;         // per slot
   std::vector<char> is_copy_;      // per slot
-  std::vector<char> moves_;        // per mover: whether impulses move it
-  std::vector<float> mobility_;    // per mover: the inverse mass, in packed units
+  std::vector<char> moves_;        // per grain: whether impulses move it
+  std::vector<float> mobility_;    // per grain: the inverse mass, in packed units
   // Per body 9: F of F F^T = I^-1 by columns, in packed units; per member of a body its arm.
   std::vector<double> spin_root_, arm_;
 };

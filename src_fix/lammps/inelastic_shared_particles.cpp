@@ -1,4 +1,4 @@
-#include "inelastic_told_particles.h"
+#include "inelastic_shared_particles.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -19,7 +19,7 @@ constexpr int VECTOR = 3;    // numbers
 
 }    // namespace
 
-ToldParticles::ToldParticles(MPI_Comm world)
+SharedParticles::SharedParticles(MPI_Comm world)
 {
   // Messages of others never come between.
   MPI_Comm_dup(world, &world_);
@@ -27,14 +27,14 @@ ToldParticles::ToldParticles(MPI_Comm world)
   MPI_Comm_size(world_, &ranks_);
 }
 
-ToldParticles::~ToldParticles()
+SharedParticles::~SharedParticles()
 {
-  finish_telling();
+  finish_sending();
   MPI_Comm_free(&world_);
 }
 
 // Sends each rank its list, and returns the lists from all of them.
-ToldParticles::Lists ToldParticles::exchange(const Lists &to_ranks) const
+SharedParticles::Lists SharedParticles::exchange(const Lists &to_ranks) const
 {
   if (ranks_ == 1) return to_ranks;    // a LAMMPS without MPI has functions that do nothing
   std::vector<int> sent(ranks_), received(ranks_), out_from(ranks_, 0), in_from(ranks_, 0);
@@ -56,8 +56,8 @@ ToldParticles::Lists ToldParticles::exchange(const Lists &to_ranks) const
 
 // Lists the chosen particles with their atoms. Returns for each rank which of its own they are:
 // pairs of its place there and its number here.
-ToldParticles::Lists ToldParticles::list_particles(const std::vector<char> &chosen,
-                                                   const std::vector<double> &owner)
+SharedParticles::Lists SharedParticles::list_particles(const std::vector<char> &chosen,
+                                                       const std::vector<double> &owner)
 {
   const auto particle_of = [&](int atom) {
     return std::pair(static_cast<int>(owner[2 * atom]), static_cast<int>(owner[2 * atom + 1]));
@@ -81,9 +81,9 @@ ToldParticles::Lists ToldParticles::list_particles(const std::vector<char> &chos
   return to_owners;
 }
 
-// Returns, of the particles that this rank owns, for each rank whom it tells of them: triples of
+// Returns, of the particles that this rank owns, for each rank whom it sends them to: triples of
 // its number of the particle, another rank that has chosen it, and that one's number.
-ToldParticles::Lists ToldParticles::ranks_of_owned(const Lists &to_owners) const
+SharedParticles::Lists SharedParticles::ranks_of_owned(const Lists &to_owners) const
 {
   const Lists from_ranks = exchange(to_owners);
   std::vector<Chosen> chosen;
@@ -91,7 +91,7 @@ ToldParticles::Lists ToldParticles::ranks_of_owned(const Lists &to_owners) const
     for (std::size_t k = 0; k < from_ranks[rank].size(); k += 2)
       chosen.emplace_back(from_ranks[rank][k], rank, from_ranks[rank][k + 1]);
   std::sort(chosen.begin(), chosen.end());
-  Lists tell(ranks_);
+  Lists to_ranks(ranks_);
   for (auto begin = chosen.begin(); begin != chosen.end();) {
     const auto end = std::find_if(begin, chosen.end(), [&](const Chosen &one) {
       return std::get<0>(one) != std::get<0>(*begin);
@@ -100,54 +100,54 @@ ToldParticles::Lists ToldParticles::ranks_of_owned(const Lists &to_owners) const
       for (auto to = begin; to != end; ++to)
         if (to != from)
           for (const int number : {std::get<2>(*from), std::get<1>(*to), std::get<2>(*to)})
-            tell[std::get<1>(*from)].push_back(number);
+            to_ranks[std::get<1>(*from)].push_back(number);
     begin = end;
   }
-  return tell;
+  return to_ranks;
 }
 
-void ToldParticles::choose(const std::vector<char> &chosen, const std::vector<double> &owner,
-                           bool images, int turn)
+void SharedParticles::choose(const std::vector<char> &chosen, const std::vector<double> &owner,
+                             bool images, int colour)
 {
-  finish_telling();
+  finish_sending();
   others_.clear();
   several_.clear();
-  turn_ = turn;
+  rank_colour_ = colour;
   const Lists to_owners = list_particles(chosen, owner);
   const int particles = static_cast<int>(first_atom_.size()) - 1;
   sum_.resize(particles);
   own_.resize(atoms_.size());
   for (int k = 0; images && k < particles; ++k)
     if (first_atom_[k + 1] > first_atom_[k] + 1) several_.push_back(k);
-  Lists told(ranks_), names(ranks_);    // the numbers of this rank, and those of the others
+  Lists sent(ranks_), names(ranks_);    // the numbers of this rank, and those of the others
   for (const std::vector<int> &list : exchange(ranks_of_owned(to_owners)))
     for (std::size_t k = 0; k < list.size(); k += 3) {
       const int rank = list[k + 1];
-      // The first number of a list is this rank's turn.
-      if (names[rank].empty()) names[rank].push_back(turn);
-      told[rank].push_back(list[k]);
+      // The first number of a list is this rank's colour.
+      if (names[rank].empty()) names[rank].push_back(colour);
+      sent[rank].push_back(list[k]);
       names[rank].push_back(list[k + 2]);
     }
-  const Lists heard = exchange(names);
+  const Lists received = exchange(names);
   for (int rank = 0; rank < ranks_; ++rank) {
-    if (heard[rank].empty()) continue;
-    Other other{rank, heard[rank].front(), told[rank], {}, {}, {}};
-    other.heard.assign(heard[rank].begin() + 1, heard[rank].end());
-    other.out.resize(VECTOR * other.told.size());
-    other.in.resize(VECTOR * other.heard.size());
+    if (received[rank].empty()) continue;
+    Other other{rank, received[rank].front(), sent[rank], {}, {}, {}};
+    other.received.assign(received[rank].begin() + 1, received[rank].end());
+    other.out.resize(VECTOR * other.sent.size());
+    other.in.resize(VECTOR * other.received.size());
     others_.push_back(std::move(other));
   }
 }
 
-void ToldParticles::finish_telling()
+void SharedParticles::finish_sending()
 {
-  for (MPI_Request &request : telling_) MPI_Wait(&request, MPI_STATUS_IGNORE);
-  telling_.clear();
+  for (MPI_Request &request : sending_) MPI_Wait(&request, MPI_STATUS_IGNORE);
+  sending_.clear();
 }
 
-void ToldParticles::tell(const float *per_particle)
+void SharedParticles::send(const float *per_particle)
 {
-  finish_telling();
+  finish_sending();
   for (std::size_t particle = 0; particle < sum_.size(); ++particle) {
     Vector &sum = sum_[particle] = {};
     for (int k = first_atom_[particle]; k < first_atom_[particle + 1]; ++k) {
@@ -157,20 +157,20 @@ void ToldParticles::tell(const float *per_particle)
   }
   for (Other &other : others_) {
     float *out = other.out.data();
-    for (const int particle : other.told) out = std::copy_n(sum_[particle].data(), VECTOR, out);
-    telling_.emplace_back();
+    for (const int particle : other.sent) out = std::copy_n(sum_[particle].data(), VECTOR, out);
+    sending_.emplace_back();
     MPI_Isend(other.out.data(), static_cast<int>(other.out.size()), MPI_FLOAT, other.rank, 0,
-              world_, &telling_.back());
+              world_, &sending_.back());
   }
 }
 
-void ToldParticles::hear(int turn, float *per_particle)
+void SharedParticles::receive(int colour, float *per_particle)
 {
   const auto add = [&](int atom, const float *vector) {
     for (int d = 0; d < VECTOR; ++d)
       per_particle[4 * static_cast<std::size_t>(atom) + d] += vector[d];
   };
-  if (turn == turn_)
+  if (colour == rank_colour_)
     for (const int particle : several_)
       for (int k = first_atom_[particle]; k < first_atom_[particle + 1]; ++k) {
         Vector of_others;
@@ -178,11 +178,11 @@ void ToldParticles::hear(int turn, float *per_particle)
         add(atoms_[k], of_others.data());
       }
   for (Other &other : others_) {
-    if (other.turn != turn) continue;
+    if (other.colour != colour) continue;
     MPI_Recv(other.in.data(), static_cast<int>(other.in.size()), MPI_FLOAT, other.rank, 0, world_,
              MPI_STATUS_IGNORE);
     const float *in = other.in.data();
-    for (const int particle : other.heard) {
+    for (const int particle : other.received) {
       for (int k = first_atom_[particle]; k < first_atom_[particle + 1]; ++k) add(atoms_[k], in);
       in += VECTOR;
     }

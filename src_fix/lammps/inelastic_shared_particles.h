@@ -1,9 +1,9 @@
-// What ranks tell one another of the particles that several of them have, in single messages from
+// What ranks send one another of the particles that several of them have, in single messages from
 // rank to rank. LAMMPS's own communication passes a value on from face to face of the grid of
 // ranks, and waits in every call; here a rank goes on with its work while its messages travel.
 
-#ifndef INELASTIC_TOLD_PARTICLES_H
-#define INELASTIC_TOLD_PARTICLES_H
+#ifndef INELASTIC_SHARED_PARTICLES_H
+#define INELASTIC_SHARED_PARTICLES_H
 
 #include <mpi.h>
 
@@ -12,29 +12,29 @@
 
 namespace LAMMPS_NS::Inelastic_NS {
 
-class ToldParticles {
+class SharedParticles {
  public:
-  explicit ToldParticles(MPI_Comm world);
-  ~ToldParticles();
-  ToldParticles(const ToldParticles &) = delete;
-  ToldParticles &operator=(const ToldParticles &) = delete;
+  explicit SharedParticles(MPI_Comm world);
+  ~SharedParticles();
+  SharedParticles(const SharedParticles &) = delete;
+  SharedParticles &operator=(const SharedParticles &) = delete;
 
   // Finds out who has which of the chosen particles. `chosen` and `owner` are per atom, ghosts
   // included: of each particle the rank that owns it and its place there, 3 numbers per atom, the
-  // third without meaning. `turn` is this rank's. Collective.
+  // third without meaning. `colour` is this rank's. Collective.
   void choose(const std::vector<char> &chosen, const std::vector<double> &owner, bool images,
-              int turn);
+              int colour);
 
-  // As Host::tell and Host::hear.
-  void tell(const float *per_particle);
-  void hear(int turn, float *per_particle);
+  // As Host::send and Host::receive.
+  void send(const float *per_particle);
+  void receive(int colour, float *per_particle);
 
  private:
-  // A rank that has chosen particles that this one has chosen, too, and which of these messages are
-  // of, in their order.
+  // Another rank with which this one shares chosen particles, and the particles of the vectors in a
+  // message to it and from it, in the order of the message.
   struct Other {
-    int rank, turn;
-    std::vector<int> told, heard;
+    int rank, colour;
+    std::vector<int> sent, received;
     std::vector<float> out, in;
   };
   using Vector = std::array<float, 3>;
@@ -43,17 +43,17 @@ class ToldParticles {
   Lists list_particles(const std::vector<char> &chosen, const std::vector<double> &owner);
   Lists exchange(const Lists &to_ranks) const;
   Lists ranks_of_owned(const Lists &to_owners) const;
-  void finish_telling();
+  void finish_sending();
 
   MPI_Comm world_;
   int me_ = 0, ranks_ = 1;
-  int turn_ = 0;
+  int rank_colour_ = 0;
   // The atoms of chosen particles, one particle after the other, and where each particle begins.
   std::vector<int> atoms_, first_atom_;
-  std::vector<int> several_;         // particles of several atoms that hear one another
-  std::vector<Vector> sum_, own_;    // told last: of a particle, of each atom
+  std::vector<int> several_;         // particles of several atoms that receive from one another
+  std::vector<Vector> sum_, own_;    // sent last: of a particle, of each atom
   std::vector<Other> others_;
-  std::vector<MPI_Request> telling_;
+  std::vector<MPI_Request> sending_;
 };
 
 }    // namespace LAMMPS_NS::Inelastic_NS

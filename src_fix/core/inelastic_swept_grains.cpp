@@ -1,4 +1,4 @@
-#include "inelastic_swept_movers.h"
+#include "inelastic_swept_grains.h"
 
 #include "inelastic_vector3.h"
 
@@ -35,29 +35,29 @@ namespace {
 
 }    // namespace
 
-template <typename Group>
-void SweptMovers<Group>::find(const ContactProblem &problem, double mobility_unit)
+template <typename Batch>
+void SweptGrains<Batch>::find(const ContactProblem &problem, double mobility_unit)
 {
   const int slots = problem.slots();
-  mover_.resize(slots);
-  int movers = HAS_BODIES<Group> ? static_cast<int>(problem.bodies.size()) : 0;
+  grain_.resize(slots);
+  int grains = HAS_BODIES<Batch> ? static_cast<int>(problem.bodies.size()) : 0;
   for (int i = 0; i < slots; ++i)
-    mover_[i] = HAS_BODIES<Group> && problem.is_member(i) ? problem.bodies.body[i] : movers++;
-  mobility_.assign(movers, 0.0f);
-  moves_.assign(movers, 0);
+    grain_[i] = HAS_BODIES<Batch> && problem.is_member(i) ? problem.bodies.body[i] : grains++;
+  mobility_.assign(grains, 0.0f);
+  moves_.assign(grains, 0);
   for (int i = 0; i < slots; ++i) {
-    mobility_[mover_[i]] = static_cast<float>(problem.inverse_mass_of(i) * mobility_unit);
-    moves_[mover_[i]] = problem.is_mobile(i);
+    mobility_[grain_[i]] = static_cast<float>(problem.inverse_mass_of(i) * mobility_unit);
+    moves_[grain_[i]] = problem.is_mobile(i);
   }
   is_copy_.assign(slots, 0);
-  if constexpr (HAS_BODIES<Group>) find_bodies(problem.bodies, mobility_unit);
+  if constexpr (HAS_BODIES<Batch>) find_bodies(problem.bodies, mobility_unit);
 }
 
-template <typename Group>
-void SweptMovers<Group>::find_bodies(const RigidBodies &bodies, double mobility_unit)
+template <typename Batch>
+void SweptGrains<Batch>::find_bodies(const RigidBodies &bodies, double mobility_unit)
 {
   spin_root_.resize(9 * bodies.size());
-  arm_.assign(3 * mover_.size(), 0.0);
+  arm_.assign(3 * grain_.size(), 0.0);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     find_root(&bodies.inverse_inertia[6 * b], std::sqrt(mobility_unit), &spin_root_[9 * b]);
     for (int k = bodies.start[b]; k < bodies.start[b + 1]; ++k) {
@@ -68,21 +68,21 @@ void SweptMovers<Group>::find_bodies(const RigidBodies &bodies, double mobility_
   }
 }
 
-template <typename Group>
-void SweptMovers<Group>::write_rows(const ContactProblem &problem, std::size_t c, double root,
-                                    Group &group, int lane) const
+template <typename Batch>
+void SweptGrains<Batch>::write_rows(const ContactProblem &problem, std::size_t c, double root,
+                                    Batch &batch, int lane) const
 {
   const ContactSet &contacts = problem.contacts;
   const double *const n = &contacts.normal[3 * c];
-  group.first[lane] = static_cast<std::uint32_t>(of(contacts.first[c]) * sizeof(State));
-  group.second[lane] = static_cast<std::uint32_t>(of(contacts.second[c]) * sizeof(State));
-  if constexpr (!HAS_BODIES<Group>) {
+  batch.first[lane] = static_cast<std::uint32_t>(of(contacts.first[c]) * sizeof(State));
+  batch.second[lane] = static_cast<std::uint32_t>(of(contacts.second[c]) * sizeof(State));
+  if constexpr (!HAS_BODIES<Batch>) {
     for (int d = 0; d < 3; ++d)
-      group.row[lane % 4][4 * (lane / 4) + d] = static_cast<float>(n[d] / root);
+      batch.row[lane % 4][4 * (lane / 4) + d] = static_cast<float>(n[d] / root);
   } else {
     for (const bool is_first : {true, false}) {
       const int slot = is_first ? contacts.first[c] : contacts.second[c];
-      swept::Eight &row = is_first ? group.first_row[lane] : group.second_row[lane];
+      swept::Eight &row = is_first ? batch.first_row[lane] : batch.second_row[lane];
       row = swept::Eight{};
       if (!problem.is_mobile(slot)) continue;
       const double by = (is_first ? 1.0 : -1.0) / root;
@@ -97,17 +97,17 @@ void SweptMovers<Group>::write_rows(const ContactProblem &problem, std::size_t c
   }
 }
 
-template <typename Group> void SweptMovers<Group>::stop(std::vector<State> &states) const
+template <typename Batch> void SweptGrains<Batch>::stop(std::vector<State> &states) const
 {
   states.assign(moves_.size() + 1, State{});
-  if constexpr (!HAS_BODIES<Group>)
+  if constexpr (!HAS_BODIES<Batch>)
     for (std::size_t m = 0; m < moves_.size(); ++m) states[m].lanes[3] = mobility_[m];
 }
 
-template <typename Group>
-void SweptMovers<Group>::push(int slot, const Vector &impulse, std::vector<State> &states) const
+template <typename Batch>
+void SweptGrains<Batch>::push(int slot, const Vector &impulse, std::vector<State> &states) const
 {
-  if constexpr (HAS_BODIES<Group>) {
+  if constexpr (HAS_BODIES<Batch>) {
     const auto m = static_cast<std::size_t>(of(slot));
     const typename Vector::Lanes by = impulse.lanes;
     const float sliding = slide_in_single(slot);
@@ -122,14 +122,14 @@ void SweptMovers<Group>::push(int slot, const Vector &impulse, std::vector<State
   }
 }
 
-template <typename Group>
-void SweptMovers<Group>::velocities(const std::vector<State> &states,
+template <typename Batch>
+void SweptGrains<Batch>::velocities(const std::vector<State> &states,
                                     std::vector<Vector> &velocity) const
 {
-  velocity.resize(mover_.size());
-  for (std::size_t i = 0; i < mover_.size(); ++i) {
-    const std::size_t m = mover_[i];
-    if constexpr (HAS_BODIES<Group>) {
+  velocity.resize(grain_.size());
+  for (std::size_t i = 0; i < grain_.size(); ++i) {
+    const std::size_t m = grain_[i];
+    if constexpr (HAS_BODIES<Batch>) {
       const swept::Eight &state = states[m].lanes;
       const double sliding = slide(static_cast<int>(i));
       double v[3] = {sliding * state[0], sliding * state[1], sliding * state[2]};
@@ -148,7 +148,7 @@ void SweptMovers<Group>::velocities(const std::vector<State> &states,
   }
 }
 
-template class SweptMovers<swept::ParticleGroup>;
-template class SweptMovers<swept::BodyGroup>;
+template class SweptGrains<swept::ParticleBatch>;
+template class SweptGrains<swept::BodyBatch>;
 
 }    // namespace inelastic

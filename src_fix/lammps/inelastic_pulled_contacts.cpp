@@ -1,26 +1,26 @@
-#include "inelastic_held_contacts.h"
+#include "inelastic_pulled_contacts.h"
 
 #include <algorithm>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
 
-double HeldContacts::gap(const Contact &contact) const
+double PulledContacts::gap(const Contact &contact) const
 {
   const double open = std::max(0.0, contact.gap_now - step_.eps(in_eps::CLOSED));
   return std::min(open, most_closed(contact));
 }
 
-// Returns the most by which the step may close the gap of a held contact [length]: the accuracy's
+// Returns the most by which the step may close the gap of a pulled contact [length]: the accuracy's
 // part of what it has to stop, or as much as the surfaces would part without contacts, which adds
 // nothing to the kinetic energy.
-double HeldContacts::most_closed(const Contact &contact) const
+double PulledContacts::most_closed(const Contact &contact) const
 {
-  return std::max(step_.settings.accuracy * contact.to_stop,
+  return std::max(step_.settings.accuracy * contact.length_to_stop,
                   step_.problem.timestep * contact.predicted_speed);
 }
 
-long HeldContacts::follow(std::size_t c, double gap_at_end, double opening, double along)
+long PulledContacts::follow(std::size_t c, double gap_at_end, double opening, double along)
 {
   const double tolerance = step_.settings.tolerance;
   inelastic::ContactSet &contacts = step_.problem.contacts;
@@ -31,7 +31,7 @@ long HeldContacts::follow(std::size_t c, double gap_at_end, double opening, doub
     gap = std::min(gap, contact.gap_now - row.wall_motion);
     if (step_.relinearisations > MOST_ROUNDS) return 0;
   } else {
-    if (gap_at_end <= tolerance || !step_.holds(c) || along < LEAST_ALONG ||
+    if (gap_at_end <= tolerance || !step_.pulls(c) || along < LEAST_ALONG ||
         step_.relinearisations > MOST_ROUNDS / 2)
       return 0;
     if (contacts.impulse[c] > 0.0) {

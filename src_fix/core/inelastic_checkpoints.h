@@ -10,15 +10,15 @@
 namespace inelastic {
 
 // When the residual is worth a look.
-class Looks {
+class Checkpoints {
  public:
-  explicit Looks(long sweeps) : next_(sweeps + 1) {}
+  explicit Checkpoints(long sweeps) : next_(sweeps + 1) {}
 
   // `of_target` is that of swept::Swept.
-  bool is_time(long sweep, double of_target) const { return sweep >= next_ && of_target <= hint_; }
+  bool is_due(long sweep, double of_target) const { return sweep >= next_ && of_target <= hint_; }
 
   // Takes what a look has found.
-  void see(long sweep, double of_target, double unsolved)
+  void note(long sweep, double of_target, double unsolved)
   {
     constexpr double MOST = 3.0, LEAST = 0.5;
     constexpr long PART = 40;
@@ -26,7 +26,7 @@ class Looks {
     next_ = sweep + 2 + sweep / PART;
   }
 
-  void wait(long until) { next_ = until; }
+  void wait_until(long until) { next_ = until; }
 
  private:
   long next_;

@@ -1,4 +1,4 @@
-#include "inelastic_shared_movers.h"
+#include "inelastic_shared_grains.h"
 
 #include <algorithm>
 #include <cmath>
@@ -29,17 +29,17 @@ namespace {
 
 // Returns what from_other_ranks needs, of this rank's constraints, per slot: of particles sums of n
 // n^T, of bodies sums of the roots of mobilities.
-template <typename Group>
-std::vector<double> SharedMovers<Group>::sums_of(const ContactProblem &problem,
+template <typename Batch>
+std::vector<double> SharedGrains<Batch>::sums_of(const ContactProblem &problem,
                                                  const std::vector<std::size_t> &working) const
 {
   const ContactSet &contacts = problem.contacts;
-  std::vector<double> sums(NUMBERS * movers_.slots(), 0.0);
+  std::vector<double> sums(NUMBERS * grains_.slots(), 0.0);
   for (const std::size_t c : working) {
     const double *const n = &contacts.normal[3 * c];
     for (const int slot : {contacts.first[c], contacts.second[c]}) {
       double *const of_slot = &sums[NUMBERS * static_cast<std::size_t>(slot)];
-      if constexpr (HAS_BODIES<Group>) {
+      if constexpr (HAS_BODIES<Batch>) {
         of_slot[0] += std::sqrt(mobility_of(problem, c, slot));
       } else {
         const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
@@ -50,19 +50,19 @@ std::vector<double> SharedMovers<Group>::sums_of(const ContactProblem &problem,
   return sums;
 }
 
-template <typename Group>
-void SharedMovers<Group>::find(const ContactProblem &problem,
+template <typename Batch>
+void SharedGrains<Batch>::find(const ContactProblem &problem,
                                const std::vector<std::size_t> &working, Host &host)
 {
   has_ghosts_ = host.has_ghosts();
-  turns_ = has_ghosts_ ? host.turns() : 1;
-  turn_ = has_ghosts_ ? host.turn() : 0;
-  told_.assign(movers_.slots(), Vector{});
-  heard_ = told_;
+  rank_colours_ = has_ghosts_ ? host.rank_colours() : 1;
+  rank_colour_ = has_ghosts_ ? host.rank_colour() : 0;
+  sent_.assign(grains_.slots(), Vector{});
+  received_ = sent_;
   shared_slots_.clear();
   if (!has_ghosts_) return;
   const ContactSet &contacts = problem.contacts;
-  const std::size_t slots = movers_.slots();
+  const std::size_t slots = grains_.slots();
   std::vector<double> count(slots, 0.0);
   for (std::size_t c = 0; c < contacts.size(); ++c)
     for (const int slot : {contacts.first[c], contacts.second[c]}) count[slot] += 1.0;
@@ -70,48 +70,49 @@ void SharedMovers<Group>::find(const ContactProblem &problem,
   const std::vector<double> all_count = of_all_ranks(count, 1, host);
   const std::vector<double> none(sums.size(), 0.0);
   std::vector<double> all_sums;
-  for (int turn = 0; turn < turns_; ++turn) {
-    const std::vector<double> of_turn = of_all_ranks(turn == turn_ ? sums : none, NUMBERS, host);
-    if (turn == turn_) all_sums = of_turn;
+  for (int colour = 0; colour < rank_colours_; ++colour) {
+    const std::vector<double> of_colour =
+        of_all_ranks(colour == rank_colour_ ? sums : none, NUMBERS, host);
+    if (colour == rank_colour_) all_sums = of_colour;
   }
-  shared_.assign(movers_.number(), 0);
-  of_others_.assign(NUMBERS * static_cast<std::size_t>(movers_.number()), 0.0f);
+  shared_.assign(grains_.number(), 0);
+  of_others_.assign(NUMBERS * static_cast<std::size_t>(grains_.number()), 0.0f);
   for (int slot = 0; slot < static_cast<int>(slots); ++slot) {
-    const auto i = static_cast<std::size_t>(slot), m = static_cast<std::size_t>(movers_.of(slot));
-    if (problem.is_wall(slot) || !movers_.moves()[m]) continue;
-    // A slot of a particle that is in no constraint need not hear of others.
-    const bool is_here = HAS_BODIES<Group> || count[i] > 0.5;
+    const auto i = static_cast<std::size_t>(slot), m = static_cast<std::size_t>(grains_.of(slot));
+    if (problem.is_wall(slot) || !grains_.moves()[m]) continue;
+    // A slot of a particle that is in no constraint receives nothing.
+    const bool is_here = HAS_BODIES<Batch> || count[i] > 0.5;
     if (is_here && all_count[i] > count[i] + 0.5) shared_[m] = 1;
     for (std::size_t k = 0; k < NUMBERS; ++k)
       of_others_[NUMBERS * m + k] += static_cast<float>(
-          (movers_.is_copy(slot) ? 0.0 : all_sums[NUMBERS * i + k]) - sums[NUMBERS * i + k]);
+          (grains_.is_copy(slot) ? 0.0 : all_sums[NUMBERS * i + k]) - sums[NUMBERS * i + k]);
   }
   list(host);
 }
 
-// Lists the slots of the shared movers.
-template <typename Group> void SharedMovers<Group>::list(Host &host)
+// Lists the slots of the shared grains.
+template <typename Batch> void SharedGrains<Batch>::list(Host &host)
 {
-  std::vector<char> chosen(movers_.slots());
+  std::vector<char> chosen(grains_.slots());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     chosen[i] = is_shared(static_cast<int>(i));
     if (chosen[i]) shared_slots_.push_back(static_cast<int>(i));
   }
   before_visit_.resize(shared_slots_.size());
-  // A body's images on this rank move with it; those of a particle are movers of their own.
-  host.choose_told(chosen, !HAS_BODIES<Group>);
+  // A body's images on this rank move with it; those of a particle are grains of their own.
+  host.choose_shared(chosen, !HAS_BODIES<Batch>);
 }
 
-template <typename Group>
-double SharedMovers<Group>::from_other_ranks(const ContactProblem &problem, std::size_t c) const
+template <typename Batch>
+double SharedGrains<Batch>::from_other_ranks(const ContactProblem &problem, std::size_t c) const
 {
   if (!has_ghosts_) return 0.0;
   double sum = 0.0;
   for (const int slot : {problem.contacts.first[c], problem.contacts.second[c]}) {
     if (!is_shared(slot)) continue;
-    const auto m = static_cast<std::size_t>(movers_.of(slot));
+    const auto m = static_cast<std::size_t>(grains_.of(slot));
     const double mobility = mobility_of(problem, c, slot);
-    if constexpr (HAS_BODIES<Group>) {
+    if constexpr (HAS_BODIES<Batch>) {
       sum += std::sqrt(mobility) * std::max(0.0f, of_others_[m]);
     } else {
       // By the inequality of Cauchy and Schwarz: (sum |n . n_d|)^2 <= count sum (n . n_d)^2.
@@ -126,17 +127,17 @@ double SharedMovers<Group>::from_other_ranks(const ContactProblem &problem, std:
   return sum;
 }
 
-template <typename Group>
-void SharedMovers<Group>::keep_before_visit(const PackedGroups<Group> &at_cuts,
+template <typename Batch>
+void SharedGrains<Batch>::keep_before_visit(const PackedBatches<Batch> &at_cuts,
                                             const std::vector<State> &states, float along)
 {
   if (!has_ghosts_) return;
-  if constexpr (HAS_BODIES<Group>) {
+  if constexpr (HAS_BODIES<Batch>) {
     changes_.resize(at_cuts.lanes());
     for (std::size_t k = 0; k < changes_.size(); ++k) {
-      const Group &group = at_cuts.group(k);
+      const Batch &batch = at_cuts.batch(k);
       const auto lane = k % swept::WIDTH;
-      changes_[k] = group.now[lane] + along * (group.now[lane] - group.before[lane]);
+      changes_[k] = batch.now[lane] + along * (batch.now[lane] - batch.before[lane]);
     }
   } else {
     for (std::size_t k = 0; k < shared_slots_.size(); ++k)
@@ -144,60 +145,60 @@ void SharedMovers<Group>::keep_before_visit(const PackedGroups<Group> &at_cuts,
   }
 }
 
-template <typename Group>
-void SharedMovers<Group>::tell_changes(const PackedGroups<Group> &at_cuts,
+template <typename Batch>
+void SharedGrains<Batch>::send_changes(const PackedBatches<Batch> &at_cuts,
                                        const std::vector<State> &states, Host &host)
 {
   if (!has_ghosts_) return;
-  if constexpr (HAS_BODIES<Group>) {
+  if constexpr (HAS_BODIES<Batch>) {
     for (std::size_t k = 0; k < changes_.size(); ++k)
-      changes_[k] = at_cuts.group(k).now[k % swept::WIDTH] - changes_[k];
+      changes_[k] = at_cuts.batch(k).now[k % swept::WIDTH] - changes_[k];
     sum_up_changes(at_cuts);
   } else {
     for (std::size_t k = 0; k < shared_slots_.size(); ++k) {
       const int i = shared_slots_[k];
-      told_[i].lanes = states[i].lanes - before_visit_[k].lanes;
+      sent_[i].lanes = states[i].lanes - before_visit_[k].lanes;
     }
   }
-  host.tell(numbers(told_));
+  host.send(numbers(sent_));
 }
 
-template <typename Group>
-void SharedMovers<Group>::tell_all(const PackedGroups<Group> &at_cuts, swept::When when,
+template <typename Batch>
+void SharedGrains<Batch>::send_all(const PackedBatches<Batch> &at_cuts, swept::When when,
                                    const std::vector<State> &states, Host &host)
 {
   if (!has_ghosts_) return;
-  if constexpr (HAS_BODIES<Group>) {
+  if constexpr (HAS_BODIES<Batch>) {
     changes_.resize(at_cuts.lanes());
     for (std::size_t k = 0; k < changes_.size(); ++k) {
-      const Group &group = at_cuts.group(k);
-      changes_[k] = (when == swept::When::NOW ? group.now : group.before)[k % swept::WIDTH];
+      const Batch &batch = at_cuts.batch(k);
+      changes_[k] = (when == swept::When::NOW ? batch.now : batch.before)[k % swept::WIDTH];
     }
     sum_up_changes(at_cuts);
   } else {
-    for (const int slot : shared_slots_) told_[slot].lanes = states[slot].lanes;
+    for (const int slot : shared_slots_) sent_[slot].lanes = states[slot].lanes;
   }
-  host.tell(numbers(told_));
+  host.send(numbers(sent_));
 }
 
 // Sums up the impulses of changes_, in scaled units, for each member of a shared body, in packed
 // units.
-template <typename Group>
-void SharedMovers<Group>::sum_up_changes(const PackedGroups<Group> &at_cuts)
+template <typename Batch>
+void SharedGrains<Batch>::sum_up_changes(const PackedBatches<Batch> &at_cuts)
 {
-  if constexpr (HAS_BODIES<Group>) {
-    for (const int slot : shared_slots_) told_[slot] = Vector{};
+  if constexpr (HAS_BODIES<Batch>) {
+    for (const int slot : shared_slots_) sent_[slot] = Vector{};
     for (std::size_t place = 0; place < changes_.size(); ++place) {
       if (changes_[place] == 0.0f) continue;
-      const Group &group = at_cuts.group(place);
-      const swept::Rest &rest = at_cuts.rest_of(place);
+      const Batch &batch = at_cuts.batch(place);
+      const swept::Details &details = at_cuts.details_of(place);
       const auto lane = place % swept::WIDTH;
       for (const bool is_first : {true, false}) {
-        const int slot = static_cast<int>(is_first ? rest.first[lane] : rest.second[lane]);
+        const int slot = static_cast<int>(is_first ? details.first[lane] : details.second[lane]);
         if (!is_shared(slot)) continue;
-        const swept::Eight &row = is_first ? group.first_row[lane] : group.second_row[lane];
-        const float by = changes_[place] / movers_.slide_in_single(slot);
-        for (int d = 0; d < 3; ++d) told_[slot].lanes[d] += by * row[d];
+        const swept::Eight &row = is_first ? batch.first_row[lane] : batch.second_row[lane];
+        const float by = changes_[place] / grains_.slide_in_single(slot);
+        for (int d = 0; d < 3; ++d) sent_[slot].lanes[d] += by * row[d];
       }
     }
   }
@@ -205,21 +206,21 @@ void SharedMovers<Group>::sum_up_changes(const PackedGroups<Group> &at_cuts)
 
 // Of a particle that this rank has several times every slot hears the same: the first of them
 // counts.
-template <typename Group>
-void SharedMovers<Group>::hear(int turn, std::vector<State> &states, Host &host)
+template <typename Batch>
+void SharedGrains<Batch>::receive(int colour, std::vector<State> &states, Host &host)
 {
   if (!has_ghosts_) return;
-  if constexpr (HAS_BODIES<Group>) {
-    for (const int slot : shared_slots_) heard_[slot] = Vector{};
-    host.hear(turn, numbers(heard_));
+  if constexpr (HAS_BODIES<Batch>) {
+    for (const int slot : shared_slots_) received_[slot] = Vector{};
+    host.receive(colour, numbers(received_));
     for (const int slot : shared_slots_)
-      if (!movers_.is_copy(slot)) movers_.push(slot, heard_[slot], states);
+      if (!grains_.is_copy(slot)) grains_.push(slot, received_[slot], states);
   } else {
-    host.hear(turn, numbers(states));
+    host.receive(colour, numbers(states));
   }
 }
 
-template class SharedMovers<swept::ParticleGroup>;
-template class SharedMovers<swept::BodyGroup>;
+template class SharedGrains<swept::ParticleBatch>;
+template class SharedGrains<swept::BodyBatch>;
 
 }    // namespace inelastic

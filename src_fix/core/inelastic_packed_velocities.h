@@ -11,7 +11,7 @@
 
 namespace inelastic {
 
-template <typename Real> class PackedMovers {
+template <typename Real> class PackedVelocities {
  public:
   using Vector = packed::Vector<Real>;
 

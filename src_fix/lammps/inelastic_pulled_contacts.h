@@ -1,16 +1,16 @@
-// This room follows contacts that may pull, and hold, to the end of the step: which gap they are to
+// This room follows contacts that may pull to the end of the step: which gap they are to
 // close.
 
-#ifndef INELASTIC_HELD_CONTACTS_H
-#define INELASTIC_HELD_CONTACTS_H
+#ifndef INELASTIC_PULLED_CONTACTS_H
+#define INELASTIC_PULLED_CONTACTS_H
 
 #include "inelastic_step.h"
 
 namespace LAMMPS_NS::Inelastic_NS {
 
-class HeldContacts {
+class PulledContacts {
  public:
-  explicit HeldContacts(Step &step) : step_(step) {}
+  explicit PulledContacts(Step &step) : step_(step) {}
 
   // Rounds of a step that may change the gaps of constraints. Each one squares the error where a
   // body turns little; one that turns by a radian takes up to twenty.
@@ -23,7 +23,7 @@ class HeldContacts {
   // under a force, whatever its last one was.
   double gap(const Contact &contact) const;
 
-  // Sets the gap of constraint c, which may hold, so that the surfaces touch at the end of the
+  // Sets the gap of constraint c, which may pull, so that the surfaces touch at the end of the
   // step: the exact gap there is `gap_at_end`, the velocities open the linearised one by `opening`
   // [length], and `along` is the cosine of the angle by which the normal turns. Surfaces that turn
   // about one another part, though their linearised gap stays; they are closed by no more than

@@ -1,4 +1,4 @@
-#include "inelastic_packed_movers.h"
+#include "inelastic_packed_velocities.h"
 
 #include "inelastic_vector3.h"
 
@@ -52,7 +52,7 @@ namespace {
 }    // namespace
 
 template <typename Real>
-void PackedMovers<Real>::prepare(const ContactProblem &problem, double mobility_unit)
+void PackedVelocities<Real>::prepare(const ContactProblem &problem, double mobility_unit)
 {
   const auto slots = static_cast<std::size_t>(problem.slots());
   first_wall_ = problem.particles;
@@ -65,7 +65,7 @@ void PackedMovers<Real>::prepare(const ContactProblem &problem, double mobility_
   velocity_.assign(slots, Vector{});
 }
 
-template <typename Real> void PackedMovers<Real>::move(Host &host)
+template <typename Real> void PackedVelocities<Real>::move(Host &host)
 {
   host.sum_over_chosen_ghosts(reinterpret_cast<Real *>(sum_.data()));
   if (walls_move_) add_up_walls(host);
@@ -75,7 +75,7 @@ template <typename Real> void PackedMovers<Real>::move(Host &host)
       packed::Move<Real>{velocity_.size(), inverse_mass_.data(), sum_.data(), velocity_.data()});
 }
 
-template <typename Real> void PackedMovers<Real>::add_up_walls(Host &host)
+template <typename Real> void PackedVelocities<Real>::add_up_walls(Host &host)
 {
   std::vector<double> of_walls;
   for (std::size_t i = first_wall_; i < sum_.size(); ++i)
@@ -87,7 +87,7 @@ template <typename Real> void PackedMovers<Real>::add_up_walls(Host &host)
 }
 
 template <typename Real>
-void PackedMovers<Real>::pack_bodies(const RigidBodies &bodies, double mobility_unit)
+void PackedVelocities<Real>::pack_bodies(const RigidBodies &bodies, double mobility_unit)
 {
   rods_.clear();
   bodies_.clear();
@@ -99,7 +99,8 @@ void PackedMovers<Real>::pack_bodies(const RigidBodies &bodies, double mobility_
 
 // Returns false if the body is no rod.
 template <typename Real>
-bool PackedMovers<Real>::pack_rod(const RigidBodies &bodies, std::size_t b, double mobility_unit)
+bool PackedVelocities<Real>::pack_rod(const RigidBodies &bodies, std::size_t b,
+                                      double mobility_unit)
 {
   RodShape shape;
   if (!is_rod<Real>(bodies, b, shape)) return false;
@@ -117,7 +118,8 @@ bool PackedMovers<Real>::pack_rod(const RigidBodies &bodies, std::size_t b, doub
 
 // The arms of a body are in units of their own, a power of two near the largest of them.
 template <typename Real>
-void PackedMovers<Real>::pack_body(const RigidBodies &bodies, std::size_t b, double mobility_unit)
+void PackedVelocities<Real>::pack_body(const RigidBodies &bodies, std::size_t b,
+                                       double mobility_unit)
 {
   packed::Body<Real> body;
   body.first = bodies.start[b];
@@ -143,7 +145,7 @@ void PackedMovers<Real>::pack_body(const RigidBodies &bodies, std::size_t b, dou
   bodies_.push_back(body);
 }
 
-template class PackedMovers<float>;
-template class PackedMovers<double>;
+template class PackedVelocities<float>;
+template class PackedVelocities<double>;
 
 }    // namespace inelastic
