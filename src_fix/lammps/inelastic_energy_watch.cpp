@@ -108,7 +108,8 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
     const double *const s = &sums_[SUMS * k];
     const double *const does = &does_[DOES * k];
     const double added = s[ADDED] - s[BY_LAW];
-    added_ = std::max(added_, added);
+    // What is added where surfaces part is told apart (steps_of_law).
+    if (does[PARTS] == 0.0) added_ = std::max(added_, added);
     const double least = 0.5 * s[MASS] * speed * speed + s[TARGETS] + ROUND_OFF * s[SIZE];
     const double most = least + s[TURNS];
     // Where surfaces part others may gain by that, whatever is given back.

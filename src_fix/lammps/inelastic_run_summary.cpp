@@ -113,10 +113,10 @@ void RunSummary::log_given_back(const EnergyWatch &energy) const
                    "that they gave back\n",
                    most_added);
   if (energy.steps_of_law() > 0)
-    utils::logmesg(lmp,
-                   "  in {} steps collisions, or bodies that turned far, added energy: a shorter "
-                   "timestep, or shorten yes, avoids it\n",
-                   energy.steps_of_law());
+    utils::logmesg(lmp, "  in {} steps collisions, or bodies that turned far, added energy{}\n",
+                   energy.steps_of_law(),
+                   step_.settings.shorten ? ", however short the step"
+                                          : ": a shorter timestep, or shorten yes, avoids it");
 }
 
 void RunSummary::log_hard_steps(const HardSteps::Counts &hard) const

@@ -160,10 +160,23 @@ def read_thermo(screen: str) -> dict[int, tuple[float, dict[int, dict[str, float
     return parts
 
 
+def read_energy_told(screen: str) -> dict[int, int]:
+    """In how many steps of each part collisions added energy, as the summaries of runs count."""
+    told: dict[int, int] = {}
+    part = 0
+    for line in screen.splitlines():
+        if begins := re.match(r"@part (\d+) eps", line):
+            part = int(begins.group(1))
+        elif found := re.match(r"  in (\d+) steps collisions, or bodies that turned far", line):
+            told[part] = told.get(part, 0) + int(found.group(1))
+    return told
+
+
 def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
     """Check all parts of a scene that ran in a folder. See `scene_generator` for the facts."""
     report = Report()
     left = 0.0
+    energy_told = read_energy_told(screen)
     for number, (tolerance, thermo) in read_thermo(screen).items():
         particles = read_tables(folder / f"particles.{number:02d}.dump")
         contacts = read_tables(folder / f"contacts.{number:02d}.dump", CONTACTS)
@@ -182,6 +195,7 @@ def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
             last = part.frame(table, rows, thermo[table.step], of_bodies, last, final)
         # Without `shorten` a step may leave more than 2 EPS, which later ones take apart. (The part
         # behind `run every` is empty.)
+        part.judge_energy(energy_told.get(number, 0))
         if last is not None:
             left = last.deepest + last.thermo["f_contact[11]"]
     return report
@@ -347,6 +361,8 @@ class _Part:
         # The largest speed of a sphere of this part so far, pushes included.
         self.fastest = 0.0
         self.push_unknown = self.lines_unknown = False
+        # Of each step that gained too much energy, where and how much.
+        self.energy_found: dict[int, tuple[str, str]] = {}
         self.shapes: list[Shape] = facts["shapes"]
         self.to_v = facts["acceleration_of_force"]
         self.curved = (
@@ -1426,8 +1442,19 @@ class _Part:
             most = 0.5 * mass * (10 * of.speed) ** 2 + (of.allowed + turning)[mine].sum()
             more = of.gained[spheres].sum()
             if more > most * (1 + 1e-9) + 10 * ROUND_OFF * of.size[spheres].sum():
-                self.wrong(
-                    "energy",
+                what = (
                     f"in the step before the cluster of {int(last.id[spheres[0]])}, {len(spheres)} "
-                    f"spheres, gained {more:.6g}, {most:.6g} allowed",
+                    f"spheres, gained {more:.6g}, {most:.6g} allowed"
                 )
+                self.energy_found.setdefault(new.step, (self.where, what))
+
+    def judge_energy(self, told: int) -> None:
+        """(c) Report the steps that gained too much.
+
+        With `shorten` the summary counts those in which halving did not keep collisions from it:
+        three that meet at once, of which one has just parted from another.
+        """
+        may = told if {"law restitution", "shorten"} <= set(self.facts["words"]) else 0
+        if len(self.energy_found) > may:
+            for where, what in self.energy_found.values():
+                self.report.wrong("energy", where, what)
