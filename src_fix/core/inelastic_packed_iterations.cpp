@@ -33,23 +33,23 @@ template <typename Real> void PackedIterations<Real>::prepare(const Start &start
   for (const PackedConstraints<Real> *const some : {&working_, &idle_})
     some->add_inverse_diagonals(inverse_diagonals_);
   for (std::vector<Real> *const state : states()) state->assign(near.size(), 0);
-  grains_.prepare(start.problem, start.problem.timestep * (scales.impulse / scales.length));
+  velocities_.prepare(start.problem, start.problem.timestep * (scales.impulse / scales.length));
   targets_.begin(start);
   set_targets();
 }
 
 template <typename Real> void PackedIterations<Real>::set_targets()
 {
-  targets_.set(grains_.velocity());
+  targets_.set(velocities_.velocity());
   for (PackedConstraints<Real> *const some : {&working_, &idle_}) some->set_targets(targets_);
 }
 
 template <typename Real> void PackedIterations<Real>::keep_velocities()
-{ targets_.keep(grains_.velocity()); }
+{ targets_.keep(velocities_.velocity()); }
 
 template <typename Real> double PackedIterations<Real>::moved_since_kept(double accuracy)
 {
-  targets_.compare(grains_.velocity());
+  targets_.compare(velocities_.velocity());
   Real most = 0;
   for (std::size_t k = 0; k < working_.size(); ++k) {
     if (!working_.set[k].is_loaded(unbound_[k])) continue;
@@ -67,8 +67,8 @@ packed::Passed PackedIterations<Real>::advance(const Weights &weights, double st
   packed::Passed passed = packed::advance_impulses(packed::Pass<Real, HalfLine>{
       working_.size(), working_.ends.data(), working_.normal.data(), working_.diagonal.data(),
       working_.compliance.data(), working_.set.data(), working_.inverse_target.data(),
-      grains_.velocity().data(), unbound_.data(), change_before_.data(), gap_before_.data(),
-      grains_.sum(), static_cast<Real>(step), static_cast<Real>(step_before_),
+      velocities_.velocity().data(), unbound_.data(), change_before_.data(), gap_before_.data(),
+      velocities_.sum(), static_cast<Real>(step), static_cast<Real>(step_before_),
       static_cast<Real>(weights.along), static_cast<Real>(weights.beyond),
       static_cast<Real>(weights.back), static_cast<Real>(blur)});
   step_before_ = step;
@@ -84,7 +84,7 @@ template <typename Real> void PackedIterations<Real>::look(double idle_gap)
   if (++looks_ % SET_IDLE_EVERY == 0) set_idle();
   looked_.resize((idle_.size() + 3) / 4);
   packed::find_gaps(packed::Look<Real>{idle_.size(), idle_.ends.data(), idle_.normal.data(),
-                                       grains_.velocity().data(), looked_.data()});
+                                       velocities_.velocity().data(), looked_.data()});
   const Real *const gap = reinterpret_cast<const Real *>(looked_.data());
   std::vector<std::size_t> near;
   for (std::size_t k = 0; k < idle_.size(); ++k)

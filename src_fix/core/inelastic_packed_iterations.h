@@ -58,7 +58,7 @@ template <typename Real> class PackedIterations {
 
   // Ends an iteration: computes the changes of velocity of the present impulses. Collective. The
   // host must know which ghosts are in constraints (Host::choose_ghosts).
-  void finish(Host &host) { grains_.move(host); }
+  void finish(Host &host) { velocities_.move(host); }
 
   // Makes the idle constraints working whose gaps are not above `idle_gap`, in packed units. Makes
   // the working ones idle that have no impulse and gaps above it, where they are more than a few.
@@ -89,7 +89,7 @@ template <typename Real> class PackedIterations {
   std::array<std::vector<Real> *, 3> states() { return {&unbound_, &change_before_, &gap_before_}; }
 
   PackedConstraints<Real> working_, idle_;
-  PackedVelocities<Real> grains_;
+  PackedVelocities<Real> velocities_;
   PackedTargets<Real> targets_;
   // As in packed::Pass
   std::vector<Real> unbound_, change_before_, gap_before_;

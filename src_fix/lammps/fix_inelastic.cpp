@@ -129,9 +129,9 @@ void FixInelastic::init()
   // With equal radii the pair style's own list serves, and no second one is built. A list that is
   // of another kind than the last one is empty until a run is set up.
   constexpr int NO_RUN = 0;
-  if (update->whichflag != NO_RUN) length_.choose_list();
-  neighbor->add_request(this,
-                        length_.has_one_cutoff() ? NeighConst::REQ_DEFAULT : NeighConst::REQ_SIZE);
+  if (update->whichflag != NO_RUN) length_.list().choose_list();
+  neighbor->add_request(
+      this, length_.list().has_one_cutoff() ? NeighConst::REQ_DEFAULT : NeighConst::REQ_SIZE);
 }
 
 // LAMMPS sets the run up: the list is new, and no step has been made.
@@ -139,7 +139,7 @@ void FixInelastic::begin_run()
 {
   walls_.warn();
   check_.begin_run();
-  constraints_.begin_run(length_.smallest_radius());
+  constraints_.begin_run(length_.list().smallest_radius());
   length_.begin_run();
   constraints_.overlaps().begin_run();
   trials_.begin_run();
@@ -161,7 +161,7 @@ void FixInelastic::check_scene()
         walls_.number_of_walls(), walls_before, id);
   find_frozen();
   if (bodies_) bodies_->find_fix();
-  length_.measure_radii();
+  length_.list().measure_radii();
 }
 
 // Groups can be deleted, and their numbers be given to other ones.
@@ -366,7 +366,7 @@ void FixInelastic::finish(const inelastic::ProjectionResult &result)
   }
   maxexchange = state_.exchange_size();
   next_reneighbor = length_.needs_new_list() ? update->ntimestep + 1 : -1;
-  constraints_.adapt_margin(length_.reach());
+  constraints_.adapt_margin(length_.list().reach());
 }
 
 // The time step stays shortened until the next step, also with `run pre no`; restart files tell the

@@ -20,7 +20,7 @@ Constraints::Constraints(LAMMPS *lmp, Step &step, GhostExchange &ranks, PhaseClo
                          Movers &movers) :
     Pointers(lmp), step_(step), ranks_(ranks), clock_(clock), movers_(movers), walls_(walls),
     overlaps_(lmp, step, ranks), rules_(step, overlaps_), rows_(step, rules_, laws, guesses),
-    entangled_(step), locked_(lmp, step), pairs_(lmp, step, rules_, rows_, entangled_, movers),
+    entangled_(lmp, step, rows_, overlaps_), pairs_(lmp, step, rules_, rows_, entangled_, movers),
     wall_constraints_(lmp, step, rules_, rows_, walls, ranks, movers)
 {
 }
@@ -39,35 +39,11 @@ void Constraints::collect()
   step_.excess = 0.0;
   step_.relinearisations = 0;
   overlaps_.begin_step();
-  entangled_.clear();
   came_back_ = relinearised_ = solved_relinearised_ = false;
   pairs_.collect(margin_);
   wall_constraints_.collect(margin_);
   ranks_.fail_together(step_.problem_found);
-  find_locked();
-}
-
-// Locked bodies make a start bad, and count as overlapping by as much as a push may open.
-void Constraints::find_locked()
-{
-  locked_.clear();
-  if (!step_.settings.unlock || !is_start_) return;
-  locked_.find();
-  for (const LockedBodies::Pair &pair : locked_.pairs())
-    overlaps_.note(-PUSH_LIMIT * (atom->radius[pair.first] + atom->radius[pair.second]), pair.first,
-                   atom->tag[pair.second]);
-}
-
-void Constraints::entangle()
-{
-  entangled_.find(locked_.pairs());
-  for (const LockedBodies::Pair &pair : locked_.pairs()) {
-    const int i = pair.first, j = pair.second;
-    const double size = atom->radius[i] + atom->radius[j];
-    // Along the line between the centres, which disentangle() sets.
-    const double any[3] = {1.0, 0.0, 0.0};
-    rows_.add({atom->tag[j], -PUSH_LIMIT * size, size}, 0.0, i, j, any);
-  }
+  entangled_.begin_step();
 }
 
 // The velocities are those of the step, `problem` is its problem.
@@ -129,7 +105,7 @@ void Constraints::adapt_margin(double reach)
 {
   constexpr double MORE = 1.1, FEWER = 0.95;
   const double least = step_.eps(in_eps::MARGIN);
-  is_start_ = is_start_ && step_.bad_start;
+  entangled_.end_step();
   margin_ *= came_back_ ? MORE : FEWER;
   margin_ = std::clamp(margin_, least, std::max(least, reach));
 }

@@ -28,11 +28,7 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   bool walls_move() const { return walls_.any_moves(); }
   OverlapWatch &overlaps() { return overlaps_; }
   const OverlapWatch &overlaps() const { return overlaps_; }
-  const EntangledBodies &entangled() const { return entangled_; }
-  // Before a push, in its phase: finds entangled bodies, and adds the constraints that take locked
-  // ones apart.
-  void entangle();
-  void disentangle() { entangled_.disentangle(atom, overlaps_); }
+  EntangledBodies &entangled() { return entangled_; }
   const GapRules &rules() const { return rules_; }
   void use(NeighList *list) { pairs_.use(list); }
 
@@ -67,7 +63,6 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   void adapt_margin(double reach);
 
  private:
-  void find_locked();
   bool need_relinearising() const;
   long relinearise();
 
@@ -80,9 +75,6 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   GapRules rules_;
   ContactRows rows_;
   EntangledBodies entangled_;
-  LockedBodies locked_;
-  // All steps since the fix was defined have pushed a start apart.
-  bool is_start_ = true;
   PairConstraints pairs_;
   WallConstraints wall_constraints_;
   double margin_ = -1.0;    // [length] what comes nearer than this is in the problem from the start

@@ -4,7 +4,6 @@
 
 #include "atom.h"
 #include "memory.h"
-#include "update.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,12 +21,6 @@ ContactOutput::~ContactOutput()
 {
   memory->destroy(per_atom_);
   memory->destroy(local_);
-}
-
-void ContactOutput::set_walls(int number_of_walls)
-{
-  wall_force_.assign(3 * static_cast<std::size_t>(number_of_walls), 0.0);
-  wall_force_total_ = wall_force_;
 }
 
 void ContactOutput::take(const inelastic::ProjectionResult &result, long shortened_steps,
@@ -83,8 +76,7 @@ void ContactOutput::clear_sums(bool virial_per_atom)
   contact_force_.assign(size, 0.0);
   contact_count_.assign(2 * static_cast<std::size_t>(step_.problem.slots()), 0.0);
   if (virial_per_atom) { virial_.assign(2 * size, 0.0); }
-  std::fill(wall_force_.begin(), wall_force_.end(), 0.0);
-  wall_force_step_ = -1;
+  wall_forces_.clear();
   local_rows_ = 0;
   counts_ = Counts{};
   largest_change_ = 0.0;
@@ -110,7 +102,7 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   for (int d = 0; d < 3; ++d) {
     contact_force_[3 * i + d] += strength * n[d];
     contact_force_[3 * j + d] -= strength * n[d];
-    if (is_wall) wall_force_[3 * (contact.wall() - 1) + d] -= strength * n[d];
+    if (is_wall) wall_forces_.of(contact.wall() - 1)[d] -= strength * n[d];
   }
   if (!is_wall) contact_count_[2 * j] += 1.0;
   const double to_point = atom->radius[i] + (is_wall ? contact.gap_now : 0.5 * contact.gap_now);
@@ -173,16 +165,6 @@ void ContactOutput::share(const VirialTarget &virial)
     per_atom_[i][1] = contact_count_[2 * i + 1];
     for (int d = 0; d < 3; ++d) per_atom_[i][2 + d] = contact_force_[3 * i + d];
   }
-}
-
-double ContactOutput::wall_force(int wall, int direction)
-{
-  if (wall_force_step_ != update->ntimestep) {
-    MPI_Allreduce(wall_force_.data(), wall_force_total_.data(),
-                  static_cast<int>(wall_force_.size()), MPI_DOUBLE, MPI_SUM, world);
-    wall_force_step_ = update->ntimestep;
-  }
-  return wall_force_total_[3 * wall + direction];
 }
 
 void ContactOutput::grow(int atoms)

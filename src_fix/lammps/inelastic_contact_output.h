@@ -7,6 +7,7 @@
 
 #include "inelastic_projection.h"
 #include "inelastic_step.h"
+#include "inelastic_wall_forces.h"
 
 #include "pointers.h"
 
@@ -51,7 +52,7 @@ class ContactOutput : protected Pointers {
   };
 
   // Call it once, when the fix is defined.
-  void set_walls(int number_of_walls);
+  void set_walls(int number_of_walls) { wall_forces_.set_walls(number_of_walls); }
 
   // LAMMPS says which virial it wants in this step, and where it is to be added.
   struct VirialTarget {
@@ -72,7 +73,7 @@ class ContactOutput : protected Pointers {
 
   double vector(int n) const { return vector_[n]; }
   // One component of the force on a wall (0 = the first one), on all ranks. Collective.
-  double wall_force(int wall, int direction);
+  double wall_force(int wall, int direction) { return wall_forces_.total(wall, direction, world); }
   double **per_atom() { return per_atom_; }
   double **local() { return local_; }
   int local_rows() const { return local_rows_; }
@@ -110,10 +111,8 @@ class ContactOutput : protected Pointers {
   Counts counts_;
   // 3 per slot (inelastic_unknowns.h), and 2: contacts with particles, and with walls
   std::vector<double> contact_force_, contact_count_;
-  std::vector<double> virial_;        // 6 per slot
-  std::vector<double> wall_force_;    // 3 per wall, this rank's share
-  std::vector<double> wall_force_total_;
-  bigint wall_force_step_ = -1;
+  std::vector<double> virial_;    // 6 per slot
+  WallForces wall_forces_;
   double largest_change_ = 0.0;
 };
 

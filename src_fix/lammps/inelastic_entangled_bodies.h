@@ -10,21 +10,29 @@
 #include "inelastic_locked_bodies.h"
 #include "inelastic_step.h"
 
+#include "pointers.h"
+
 #include <cstdint>
 #include <unordered_set>
-#include <vector>
 
 namespace LAMMPS_NS::Inelastic_NS {
 
-class EntangledBodies {
- public:
-  explicit EntangledBodies(Step &step) : step_(step) {}
+class ContactRows;
+class OverlapWatch;
 
-  void clear() { pairs_.clear(); }
+class EntangledBodies : protected Pointers {
+ public:
+  EntangledBodies(class LAMMPS *lmp, Step &step, ContactRows &rows, OverlapWatch &overlaps);
+
   bool empty() const { return pairs_.empty(); }
 
-  // Finds the entangled bodies: among the constraints of the step, and those that are locked.
-  void find(const std::vector<LockedBodies::Pair> &locked);
+  // At the start of a step: finds locked bodies. They make a start bad, and count as overlapping by
+  // as much as a push may open.
+  void begin_step();
+
+  // Before a push, in its phase: finds the entangled bodies, among the constraints of the step and
+  // those that are locked, and adds the constraints that take these apart.
+  void find();
 
   // Tells whether particles i and j belong to two entangled bodies, in the phase in which these are
   // pushed.
@@ -32,14 +40,20 @@ class EntangledBodies {
   { return step_.phase == Phase::PUSH && !pairs_.empty() && pairs_.count(pair(i, j)); }
 
   // Sets the normals and gaps of the constraints between such bodies.
-  void disentangle(const Atom *atom, const class OverlapWatch &overlaps);
+  void disentangle();
+
+  void end_step() { is_start_ = is_start_ && step_.bad_start; }
 
  private:
   // The same number for all pairs of spheres of two bodies (or of a body and a free sphere).
   std::uint64_t pair(int i, int j) const;
 
   Step &step_;
+  ContactRows &rows_;
+  OverlapWatch &overlaps_;
+  LockedBodies locked_;
   std::unordered_set<std::uint64_t> pairs_;
+  bool is_start_ = true;    // all steps since the fix was defined have pushed a start apart
 };
 
 }    // namespace LAMMPS_NS::Inelastic_NS

@@ -85,7 +85,7 @@ void PushApart::ask_for_all(bool gives_way)
       contacts.gap[c] = -step_.rows[c].wall_motion;
     contacts.impulse[c] = 0.0;
   }
-  if (movers_.any_turns()) constraints_.disentangle();
+  if (movers_.any_turns()) constraints_.entangled().disentangle();
 }
 
 // Counts bad overlaps, and looks how far they open and what the push leaves of them. Returns
@@ -146,7 +146,7 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   problem.predicted_velocity = step_.velocity;
   step_.phase = Phase::PUSH;
   step_.relinearisations = 0;
-  if (movers_.any_turns()) constraints_.entangle();
+  if (movers_.any_turns()) constraints_.entangled().find();
   const inelastic::ContactSet with_locked = problem.contacts;
   // What no longer opens while it gives way may be the rest, which opens at once: so it is tried.
   if (in_vain_ > 0) gives_way_ = false;

@@ -5,6 +5,7 @@
 #ifndef INELASTIC_STEP_LENGTH_H
 #define INELASTIC_STEP_LENGTH_H
 
+#include "inelastic_list_reach.h"
 #include "inelastic_step.h"
 
 #include "pointers.h"
@@ -20,21 +21,15 @@ class StepLength : protected Pointers {
  public:
   StepLength(class LAMMPS *lmp, Step &step, GhostExchange &ranks);
 
-  // Finds the largest and smallest radius of the group. Errors: no radius, or one within the
-  // tolerance. Collective.
-  void measure_radii();
-  double smallest_radius() const { return smallest_radius_; }    // [length]
-  // Chooses the kind of neighbour list for a run: by one cutoff for all pairs, if radii are so
-  // similar that this wastes little, or by the radii of each pair.
-  void choose_list();
-  bool has_one_cutoff() const { return one_cutoff_; }
+  // How far the neighbour list reaches.
+  ListReach &list() { return list_; }
+  const ListReach &list() const { return list_; }
 
   // At the start of a run.
   void begin_run();
 
-  // The neighbour list is new: takes the positions, and how far the list reaches. Errors: those of
-  // measure_radii(), a tolerance below the round-off of positions, and a list that is too short for
-  // the spheres. Collective.
+  // The neighbour list is new: takes the positions. Errors: those of ListReach::built().
+  // Collective.
   void list_built();
 
   // At the start of a step: measures how far atoms have moved since the list was built. Collective.
@@ -67,16 +62,9 @@ class StepLength : protected Pointers {
   bool is_shortened() const;
   void set_regular_timestep(double timestep);
 
-  double reach() const { return list_reach_; }    // [length]
   long shortened_steps() const { return shortened_steps_; }
 
  private:
-  const char *name_of_group() const;
-  void warn_of_tolerance() const;
-  std::vector<double> radii_of_types() const;
-  double least_listed(const std::vector<double> &radius) const;
-  void check_reach(const std::vector<double> &radius) const;
-  void check_reach_of_types(const std::vector<double> &radius) const;
   void set_timestep(double timestep);
   void measure_farthest();
   double part_of_farthest();
@@ -87,9 +75,7 @@ class StepLength : protected Pointers {
 
   Step &step_;
   GhostExchange &ranks_;
-  double smallest_radius_ = 0.0;    // [length] in the group, on all ranks
-  bool one_cutoff_ = true;
-  double list_reach_ = 0.0;    // [length] the gap beyond which a pair may lack in a new list
+  ListReach list_;
   // [length] The largest relative displacement since the list was built
   double spread_at_start_ = 0.0;
   double growth_ = 0.0;     // [length] of a radius since then
@@ -100,7 +86,7 @@ class StepLength : protected Pointers {
   // lists.
   double farthest_[3] = {EXTREME, EXTREME, EXTREME};
   std::vector<double> position_at_build_, radius_at_build_;
-  std::vector<double> displacement_, unhindered_;    // room
+  std::vector<double> vectors_;    // room for 3 numbers per atom
   // [time] The length with which this step was tried first; 0 before that
   double first_timestep_ = 0.0;
   bool shortened_ = false;           // restore() must undo it

@@ -194,14 +194,14 @@ bool StepTrials::refine(inelastic::ProjectionResult &result)
 }
 
 double StepTrials::least_length() const
-{ return std::numeric_limits<double>::epsilon() * length_.smallest_radius(); }
+{ return std::numeric_limits<double>::epsilon() * length_.list().smallest_radius(); }
 
 inelastic::ProjectionResult StepTrials::project(long max_iterations, bool to_targets)
 {
   const PhaseClock::Within within(clock_, PhaseClock::SOLVE);
   // No step goes further than the list reaches: it is shortened, or it is an error.
   constexpr double BEYOND_REACH = 10.0;
-  const double reach = (step_.settings.shorten ? 1.0 : BEYOND_REACH) * length_.reach();
+  const double reach = (step_.settings.shorten ? 1.0 : BEYOND_REACH) * length_.list().reach();
   inelastic::SolverLimits limits = {step_.settings.tolerance, max_iterations, reach};
   limits.least_length = least_length();
   // The accuracy is that of momentum, and a push is none.

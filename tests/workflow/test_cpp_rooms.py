@@ -1,4 +1,4 @@
-"""The C++ rooms: short files, thresholds of EPS in one place, sets known by their class alone."""
+"""The C++ rooms: short, thresholds of EPS in one place, sets known by their class alone."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from pathlib import Path
 
 SOURCES = Path(__file__).parents[2] / "src_fix"
 MOST_LINES = 500
+MOST_MEMBERS = 15
+# LAMMPS's own class, which all rooms of the fix belong to.
+HAS_ALL_ROOMS = "FixInelastic"
 COMMENT = re.compile(r"//[^\n]*")
 THRESHOLDS = "inelastic_thresholds.h"
 # A factor of EPS beside it, and a number in what is asked of Step::eps.
@@ -32,6 +35,42 @@ def test_no_file_is_longer_than_its_reader_can_hold() -> None:
     }
     assert len(lengths) > 150
     assert {name: lines for name, lines in lengths.items() if lines > MOST_LINES} == {}
+
+
+def bodies_of_classes(text: str) -> dict[str, str]:
+    """Return what stands between the braces of each class or struct."""
+    found = {}
+    for head in re.finditer(r"\b(?:class|struct)\s+(?:alignas\(\d+\)\s+)?(\w+)[^;{()]*\{", text):
+        depth, end = 1, head.end()
+        while depth:
+            depth += {"{": 1, "}": -1}.get(text[end], 0)
+            end += 1
+        found[head.group(1)] = text[head.end() : end - 1]
+    return found
+
+
+def private_members(body: str) -> list[str]:
+    """Return the data members of a class whose names end with an underscore, as all private do."""
+    for pair in (r"\{[^{}]*\}", r"\([^()]*\)", r"<[^<>;]*>"):
+        while re.search(pair, body):
+            body = re.sub(pair, " ", body)
+    return re.findall(r"\b[a-z]\w*_\b", body)
+
+
+def test_no_class_has_more_members_than_its_reader_can_hold() -> None:
+    assert private_members("A f(int x_) const { return b_; } int c_ = 0, d_; B e_{c_};") == [
+        "c_",
+        "d_",
+        "e_",
+    ]
+    members = {
+        name: len(set(private_members(body)))
+        for text in code_of(".h", ".cpp").values()
+        for name, body in bodies_of_classes(text).items()
+    }
+    assert members["StepLength"] > 10
+    del members[HAS_ALL_ROOMS]
+    assert {name: count for name, count in members.items() if count > MOST_MEMBERS} == {}
 
 
 def factors_of_eps(name: str, text: str) -> list[str]:
