@@ -243,7 +243,9 @@ bool StepLength::may_shorten_unsolved(bool law_parts) const
   // What a law asks for can be had in a step that is short enough, however short the list has made
   // it. A bed that is being crushed cannot be helped by steps that are ever shorter.
   const double from = law_parts ? first_timestep_ : step_.regular_timestep;
-  return step_.settings.shorten && update->dt > SHORTEST_UNSOLVED * from;
+  const double shortest =
+      std::max(SHORTEST_UNSOLVED * from, 2.0 * SHORTEST_STEP * step_.regular_timestep);
+  return step_.settings.shorten && update->dt > shortest;
 }
 
 void StepLength::shorten(double factor, const std::string &named)
