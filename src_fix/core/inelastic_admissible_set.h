@@ -99,4 +99,7 @@ template <typename Real> class HalfLine {
   Real least_ = 0;    // l <= 0
 };
 
+// The set of today's contacts: solvers, kernels, laws and rules name this alone.
+template <typename Real> using AdmissibleSet = HalfLine<Real>;
+
 }    // namespace inelastic

@@ -34,7 +34,7 @@ void ContactSet::clear()
 
 void ContactSet::add(int first_particle, int second_slot, const double *unit_normal,
                      double gap_value, double impulse_guess, double compliance_value,
-                     const HalfLine<double> &admissible, double refinement_value)
+                     const AdmissibleSet<double> &admissible, double refinement_value)
 {
   first.push_back(first_particle);
   second.push_back(second_slot);

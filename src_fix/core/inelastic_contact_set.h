@@ -43,14 +43,14 @@ struct ContactSet {
   std::vector<double> gap;           // [length]
   std::vector<double> impulse;       // [mass length / time]
   std::vector<double> compliance;    // [time / mass]
-  std::vector<HalfLine<double>> set;
+  std::vector<AdmissibleSet<double>> set;
   std::vector<double> refinement;    // > 0, at most 1
 
   std::size_t size() const { return gap.size(); }
   void clear();
   void add(int first_particle, int second_slot, const double *unit_normal, double gap_value,
            double impulse_guess, double compliance_value = 0.0,
-           const HalfLine<double> &admissible = {}, double refinement_value = 1.0);
+           const AdmissibleSet<double> &admissible = {}, double refinement_value = 1.0);
 
   // Tells whether any contact has a compliance.
   bool has_springs() const;

@@ -17,7 +17,7 @@ template <typename Real> struct PackedConstraints {
   std::vector<packed::Ends> ends;
   std::vector<packed::Vector<Real>> normal;    // the fourth number: the gap at the start
   std::vector<Real> diagonal, compliance;
-  std::vector<HalfLine<Real>> set;                         // of the changes since the start
+  std::vector<AdmissibleSet<Real>> set;                    // of the changes since the start
   std::vector<Real> least_target, part, inverse_target;    // inelastic_packed_targets.h
 
   std::size_t size() const { return source.size(); }

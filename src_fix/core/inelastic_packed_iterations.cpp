@@ -64,7 +64,7 @@ template <typename Real> double PackedIterations<Real>::moved_since_kept(double 
 template <typename Real>
 packed::Passed PackedIterations<Real>::advance(const Weights &weights, double step, double blur)
 {
-  packed::Passed passed = packed::advance_impulses(packed::Pass<Real, HalfLine>{
+  packed::Passed passed = packed::advance_impulses(packed::Pass<Real, AdmissibleSet>{
       working_.size(), working_.ends.data(), working_.normal.data(), working_.diagonal.data(),
       working_.compliance.data(), working_.set.data(), working_.inverse_target.data(),
       velocities_.velocity().data(), unbound_.data(), change_before_.data(), gap_before_.data(),

@@ -93,13 +93,14 @@ template <typename Real> class PackedIterations {
   PackedTargets<Real> targets_;
   // As in packed::Pass
   std::vector<Real> unbound_, change_before_, gap_before_;
-  std::vector<double> start_;                    // impulses, in the order of the problem
-  std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
-  double step_before_ = 0.0;                     // 1 / L of the last iteration
-  double inverse_diagonals_ = 0.0;               // their sum over all constraints
-  std::vector<Vector> looked_;                   // gaps of the idle ones, four in each
-  int looks_ = 0;                                // since the start of the search
-  Real idle_gap_ = 0;                            // above it a constraint without an impulse is idle
+  std::vector<double> start_;    // impulses, in the order of the problem
+  std::vector<AdmissibleSet<double>>
+      of_impulses_;                   // which impulses are admissible, in that order
+  double step_before_ = 0.0;          // 1 / L of the last iteration
+  double inverse_diagonals_ = 0.0;    // their sum over all constraints
+  std::vector<Vector> looked_;        // gaps of the idle ones, four in each
+  int looks_ = 0;                     // since the start of the search
+  Real idle_gap_ = 0;                 // above it a constraint without an impulse is idle
 };
 
 }    // namespace inelastic

@@ -233,9 +233,9 @@ namespace {
 
 }    // namespace
 
-INELASTIC_CLONES Passed advance_impulses(const Pass<float, HalfLine> &pass)
+INELASTIC_CLONES Passed advance_impulses(const Pass<float, AdmissibleSet> &pass)
 { return advance(pass); }
-INELASTIC_CLONES Passed advance_impulses(const Pass<double, HalfLine> &pass)
+INELASTIC_CLONES Passed advance_impulses(const Pass<double, AdmissibleSet> &pass)
 { return advance(pass); }
 
 INELASTIC_CLONES void find_gaps(const Look<float> &look)

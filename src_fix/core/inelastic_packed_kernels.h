@@ -85,8 +85,8 @@ struct Passed {
 
 // Makes a gradient step from the present changes and the step of the momentum, and projects. `sum`
 // gets the sums of the next changes.
-Passed advance_impulses(const Pass<float, HalfLine> &pass);
-Passed advance_impulses(const Pass<double, HalfLine> &pass);
+Passed advance_impulses(const Pass<float, AdmissibleSet> &pass);
+Passed advance_impulses(const Pass<double, AdmissibleSet> &pass);
 
 // find_gaps works on these arrays of `count` constraints.
 template <typename Real> struct Look {

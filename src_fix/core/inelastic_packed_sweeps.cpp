@@ -12,7 +12,7 @@ namespace {
   constexpr std::size_t MOST_LANES = 2;
 
   bool is_loaded(const swept::Lanes &batch, int lane)
-  { return HalfLine<float>::above(batch.idle[lane]).is_loaded(batch.now[lane]); }
+  { return AdmissibleSet<float>::above(batch.idle[lane]).is_loaded(batch.now[lane]); }
 
 }    // namespace
 

@@ -104,9 +104,10 @@ template <typename Batch> class PackedSweeps {
   Packed idle_;
   std::vector<std::size_t> far_;    // in the problem: idle constraints that are not packed yet
   std::vector<State> states_, before_;
-  std::vector<Vector> velocity_;                 // per slot
-  std::vector<double> start_;                    // impulses, in the order of the problem
-  std::vector<HalfLine<double>> of_impulses_;    // which impulses are admissible, in that order
+  std::vector<Vector> velocity_;    // per slot
+  std::vector<double> start_;       // impulses, in the order of the problem
+  std::vector<AdmissibleSet<double>>
+      of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;
   std::vector<swept::Looked> looked_;
   float idle_gap_ = 0.0f;    // above it a constraint without an impulse is idle

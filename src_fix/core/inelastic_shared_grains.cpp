@@ -172,7 +172,8 @@ void SharedGrains<Batch>::send_all(const PackedBatches<Batch> &at_cuts, swept::W
     changes_.resize(at_cuts.lanes());
     for (std::size_t k = 0; k < changes_.size(); ++k) {
       const Batch &batch = at_cuts.batch(k);
-      changes_[k] = (when == swept::When::NOW ? batch.now : batch.before)[k % swept::WIDTH];
+      const swept::Eight &impulses = when == swept::When::NOW ? batch.now : batch.before;
+      changes_[k] = impulses[k % swept::WIDTH];
     }
     sum_up_changes(at_cuts);
   } else {

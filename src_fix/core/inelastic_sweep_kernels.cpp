@@ -241,7 +241,7 @@ namespace {
     return most;
   }
 
-  using Set = HalfLine<float>;
+  using Set = AdmissibleSet<float>;
 
   // Writes the gaps of constraints with some impulses, of which `opened` is what all make of them.
   template <typename Size, typename Batch>

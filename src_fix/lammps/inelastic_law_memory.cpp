@@ -28,7 +28,7 @@ const double *LawEntry::unpack(const double *in)
   for (double &component : normal) component = *in++;
   demand.parts = *in++ != 0.0;
   demand.parting_speed = *in++;
-  demand.set = inelastic::HalfLine<double>::above(*in++);
+  demand.set = inelastic::AdmissibleSet<double>::above(*in++);
   impulse = *in++;
   speed = *in++;
   for (double &value : remembered) value = *in++;

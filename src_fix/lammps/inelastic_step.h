@@ -145,7 +145,7 @@ struct Step : RunState, StepState {
   // Tells whether a row pulls: it may, and with the present impulse it does not open.
   bool pulls(std::size_t c) const
   {
-    const inelastic::HalfLine<double> set = problem.contacts.set[c];
+    const inelastic::AdmissibleSet<double> set = problem.contacts.set[c];
     return set.may_pull() && set.is_loaded(problem.contacts.impulse[c]);
   }
 

@@ -47,14 +47,14 @@ struct ContactState {
 // the inelastic law: the surfaces do not overlap, and the contact pushes alone.
 struct Demand {
   // The contact may pull, by up to an impulse [mass length / time], >= 0.
-  static Demand pulls(double up_to) { return {false, 0.0, HalfLine<double>::pulls(up_to)}; }
+  static Demand pulls(double up_to) { return {false, 0.0, AdmissibleSet<double>::pulls(up_to)}; }
   // The surfaces part at least with a speed s [length / time], >= 0.
   static Demand parts_with(double speed) { return {true, speed, {}}; }
 
   // Whether s is asked for, too: w is then the smaller one of the two gaps above
   bool parts = false;
   double parting_speed = 0.0;    // s [length / time], >= 0
-  HalfLine<double> set;          // [mass length / time]
+  AdmissibleSet<double> set;     // [mass length / time]
 
   bool is_inelastic() const { return !parts && !set.may_pull(); }
 };

@@ -86,11 +86,11 @@ void add_contacts(inelastic::ContactProblem &problem, nb::handle given)
   const auto refinement = array<Scalars>(given, "refinement");
   for (std::size_t c = 0; c < gap.size(); ++c) {
     const auto wall_or_particle = static_cast<int>(second.data()[c]);
-    problem.contacts.add(static_cast<int>(first.data()[c]),
-                         wall_or_particle < 0 ? problem.slot_of_wall(0) : wall_or_particle,
-                         normal.data() + 3 * c, gap.data()[c], guess.data()[c],
-                         compliance.data()[c], inelastic::HalfLine<double>::above(least.data()[c]),
-                         refinement.data()[c]);
+    problem.contacts.add(
+        static_cast<int>(first.data()[c]),
+        wall_or_particle < 0 ? problem.slot_of_wall(0) : wall_or_particle, normal.data() + 3 * c,
+        gap.data()[c], guess.data()[c], compliance.data()[c],
+        inelastic::AdmissibleSet<double>::above(least.data()[c]), refinement.data()[c]);
   }
 }
 

@@ -439,7 +439,7 @@ void test_residual()
   const double normal[3] = {0.0, 0.0, 1.0};
   ContactSet contacts;
   const auto add = [&](int c) {
-    contacts.add(0, 1, normal, 0.0, impulses[c], 0.0, HalfLine<double>::pulls(-least[c]));
+    contacts.add(0, 1, normal, 0.0, impulses[c], 0.0, AdmissibleSet<double>::pulls(-least[c]));
     return residual(gaps, contacts);
   };
   add(0);

@@ -16,8 +16,8 @@ THRESHOLDS = "inelastic_thresholds.h"
 FACTOR = re.compile(r"[\w.)]\s*\*\s*(?:step_\.)?settings\.tolerance|settings\.tolerance\s*\*")
 EPS = re.compile(r"\beps\(((?:[^()]|\([^()]*\))*)\)")
 NUMBER = re.compile(r"(?<![\w.])\d")
-# The number that a half line is made of, and one that is written out.
-LEAST = re.compile(r"\bset(?:\[[^\]]*\]|\.back\(\))?\.least\b|\bHalfLine<\w+>\s*\{")
+# The number that a half line is made of, and its name: others say AdmissibleSet.
+LEAST = re.compile(r"\bset(?:\[[^\]]*\]|\.back\(\))?\.least\b|\bHalfLine\b")
 SET = "inelastic_admissible_set.h"
 
 
@@ -99,4 +99,4 @@ def test_only_its_class_knows_what_a_set_is_made_of() -> None:
     known = {name: LEAST.findall(text) for name, text in code.items() if name != SET}
     assert {name: found for name, found in known.items() if found} == {}
     assert LEAST.search("contacts.set[c].least = 0.0")
-    assert LEAST.search("HalfLine<double>{0.0}")
+    assert LEAST.search("HalfLine<double>::pulls(1.0)")
