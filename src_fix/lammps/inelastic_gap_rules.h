@@ -68,8 +68,8 @@ class GapRules {
   // a dense start spheres jam for a moment, and cannot all be taken apart at once.
   long keep_within_tolerance(const std::vector<double> &velocity);
 
-  // What constraint c asks for beyond its gap at the start of the step [length], because bodies turn
-  // or walls curve.
+  // What constraint c asks for beyond its gap at the start of the step [length], because bodies
+  // turn or walls curve.
   double closed_by_turning(std::size_t c) const;
 
   OverlapWatch &overlaps() { return overlaps_; }

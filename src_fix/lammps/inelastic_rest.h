@@ -118,7 +118,7 @@ class Rest : protected Pointers {
   RestTrial trial_;
   RestTrial::Begun begun_;    // of the trial
   HoldStill hold_still_;
-  std::vector<Fate> fates_;    // by cluster
+  std::vector<Fate> fates_;                  // by cluster
   std::vector<Directions> held_in_trial_;    // by cluster, of those that pass
   // By particle, ghosts included: whether it is stopped if its cluster rests or passes; and by
   // owned particle its unit then (inelastic_cluster_motions.h).

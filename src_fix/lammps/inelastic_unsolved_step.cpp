@@ -111,11 +111,11 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
     cause = fmt::format("Bodies spin by up to {:.3g} radians in this step: lower the timestep{}",
                         angle, or_shorter);
   else if (law_parts())
-    cause = fmt::format("The contact law asks more surfaces to part than may have room to do so "
-                        "in one step: lower the timestep{}{}",
-                        or_shorter,
-                        obstacles_move() ? ". Or walls or frozen spheres close in, and leave no room"
-                                         : "");
+    cause = fmt::format(
+        "The contact law asks more surfaces to part than may have room to do so "
+        "in one step: lower the timestep{}{}",
+        or_shorter,
+        obstacles_move() ? ". Or walls or frozen spheres close in, and leave no room" : "");
   if (!step_.settings.warn_only) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
 }
