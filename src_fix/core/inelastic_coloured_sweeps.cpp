@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 namespace inelastic {
 
@@ -51,10 +53,46 @@ namespace {
 
 }    // namespace
 
-// ROUND_OFF where double precision refuses what is solved in single precision.
+// What double precision says of the impulses that sweeps have come to, time after time, and the
+// best ones of these.
+class ColouredSweeps::Refinement {
+ public:
+  // The impulses of the solve have been judged, here and below.
+  explicit Refinement(const Solve &solve) : solve_(solve) { keep(); }
+
+  // Tells whether more sweeps are of use.
+  bool goes_on()
+  {
+    constexpr double PROGRESS = 0.9;
+    constexpr int MOST_IN_VAIN = 12;
+    if (solve_.result.residual.largest() < residual_.largest()) keep();
+    if (solve_.unsolved() > PROGRESS * least_) return ++in_vain_ < MOST_IN_VAIN;
+    least_ = solve_.unsolved();
+    in_vain_ = 0;
+    return true;
+  }
+
+  // Whether the present impulses are no better than others.
+  bool has_better() const { return !(solve_.result.residual.largest() <= residual_.largest()); }
+  const std::vector<double> &best() const { return best_; }
+
+ private:
+  void keep()
+  {
+    best_ = solve_.problem.contacts.impulse;
+    residual_ = solve_.result.residual;
+  }
+
+  const Solve &solve_;
+  std::vector<double> best_;
+  Residual residual_;
+  double least_ = std::numeric_limits<double>::infinity();
+  int in_vain_ = 0;
+};
+
+// ROUND_OFF where single precision gets no further.
 template <typename Batch>
-End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Settling<PackedSweeps<Batch>> &settling,
-                          Solve &solve)
+End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, Solve &solve)
 {
   const SolverLimits &limits = solve.limits;
   const Scales &scales = solve.scales();
@@ -64,7 +102,9 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Settling<PackedSweeps<Bat
   Checkpoints checkpoints(result.iterations);
   Upkeep upkeep(result.iterations);
   ResidualTrend progress;
+  Settling settling(sweeps, limits.accuracy > 0.0 && limits.coarseness == 1.0, result.iterations);
   const long begun = result.iterations;
+  long refined = begun;
   double first = 0.0, blur = 0.0;
   while (!solve.is_out_of_iterations()) {
     const swept::Swept mine = sweeps.sweep(momentum.next().along, blur, host);
@@ -74,7 +114,7 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Settling<PackedSweeps<Bat
     const double of_target = maxima[0], change = maxima[1];
     if (first == 0.0) first = change;
     if (!std::isfinite(uphill) || !(change <= DIVERGED * first)) return End::GO_ON;
-    progress.see(result.iterations - begun, of_target);
+    progress.see(result.iterations - refined, of_target);
     result.trend.see(result.iterations, scales.length * change);
     blur = SINGLE_ROUND_OFF * maxima[2];
 
@@ -84,19 +124,26 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Settling<PackedSweeps<Bat
       const bool near = unsolved <= 1.0;
       const bool settled = near && settling.has_settled(limits.accuracy, host);
       if (settled) unsolved = find_unsolved(sweeps, blur, host);    // the targets are new
-      if (settled && unsolved <= 1.0) {
+      const bool solved = settled && unsolved <= 1.0;
+      if (solved || (near && find_unsolved(sweeps, 0.0, host) > 1.0)) {
         sweeps.impulses(scales, solve.impulse());
-        return solve.judge() ? End::SOLVED : End::ROUND_OFF;
-      }
-      if (near && !settled)
+        if (solve.judge() && solved) return End::SOLVED;
+        if (!refinement.goes_on()) return End::ROUND_OFF;
+        sweeps.recentre(solve.idle_gap(), host);
+        blur = 0.0;
+        progress = ResidualTrend();
+        refined = result.iterations;
+        checkpoints.wait_until(refined + (refined - begun) / 20);
+      } else if (near && !settled) {
         checkpoints.wait_until(result.iterations + std::max(3L, result.iterations / 10));
+      }
     }
     if ((result.iterations - begun) % PLATEAU_EVERY == 0)
       if (const auto end = leave_plateau(sweeps, blur, solve)) return *end;
     if ((result.iterations - begun) % CHECK_EVERY == 0) {
       sweeps.impulses(scales, solve.impulse());
       if (is_infeasible(solve.problem, solve.gap_operator(), limits, host)) return End::INFEASIBLE;
-      if (result.iterations - begun >= LONG && progress.least() >= STUCK * progress.earlier())
+      if (result.iterations - refined >= LONG && progress.least() >= STUCK * progress.earlier())
         return End::GO_ON;
     }
     momentum.see(uphill);
@@ -112,27 +159,22 @@ template <typename Batch> End ColouredSweeps::search(PackedSweeps<Batch> &sweeps
   double refused = sweeps.prepare(solve.start(), solve.idle_gap(), solve.host) ? 0.0 : 1.0;
   solve.host.reduce(nullptr, 0, &refused, 1);
   if (refused > 0.0) return End::GO_ON;
-  Settling settling(sweeps, limits.accuracy > 0.0 && limits.coarseness == 1.0,
-                    solve.result.iterations);
-  for (int k = 0; k < MOST_SEARCHES; ++k) {
-    if (k > 0) sweeps.go_on(solve.idle_gap());
-    const std::vector<double> before = solve.impulse();
-    const Residual residual_before = solve.result.residual;
-    const End end = sweep(sweeps, settling, solve);
-    if (end == End::SOLVED) return end;
-    if (end == End::ROUND_OFF) continue;
-    // The next search goes on from the better one of the impulses reached and those before. Where
-    // there is no solution it begins anew: it shares out what is lacking.
-    if (end == End::GO_ON) {
-      sweeps.impulses(solve.scales(), solve.impulse());
-      if (solve.judge()) return End::SOLVED;
-      if (solve.result.residual.largest() <= residual_before.largest()) return end;
-    }
-    solve.impulse() = before;
-    solve.judge();
-    return End::GO_ON;
+  const std::vector<double> guess = solve.impulse();
+  Refinement refinement(solve);
+  const End end = sweep(sweeps, refinement, solve);
+  if (end == End::SOLVED) return end;
+  if (end == End::GO_ON) {
+    sweeps.impulses(solve.scales(), solve.impulse());
+    if (solve.judge()) return End::SOLVED;
   }
-  return End::ROUND_OFF;
+  // The next search goes on from the best impulses. Where there is no solution it begins anew: it
+  // shares out what is lacking.
+  const bool begins_anew = end == End::INFEASIBLE;
+  if (begins_anew || refinement.has_better()) {
+    solve.impulse() = begins_anew ? guess : refinement.best();
+    solve.judge();
+  }
+  return begins_anew ? End::GO_ON : end;
 }
 
 End ColouredSweeps::run(Solve &solve)

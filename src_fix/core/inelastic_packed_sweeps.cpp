@@ -35,7 +35,9 @@ bool PackedSweeps<Batch>::prepare(const Start &start, double idle_gap, Host &hos
     some->clear(grains_.number(), has_springs);
   const std::size_t lanes = pack(true, near) + pack(false, near);
   far_ = std::move(far);
-  begin_search();
+  grains_.stop(states_);
+  before_ = states_;
+  targets_.begin(*given_);
   set_targets();
   return lanes <= MOST_LANES * near.size() + 2 * ConstraintColours::NUMBER * WIDTH;
 }
@@ -73,28 +75,28 @@ ConstraintColours PackedSweeps<Batch>::colour(const std::vector<int> &first,
   return {one, other, grains_.moves()};
 }
 
-// Begins with impulses that have not changed yet.
-template <typename Batch> void PackedSweeps<Batch>::begin_search()
+template <typename Batch> void PackedSweeps<Batch>::recentre(double idle_gap, Host &host)
 {
-  grains_.stop(states_);
-  before_ = states_;
-  targets_.begin(*given_);
-}
-
-template <typename Batch> void PackedSweeps<Batch>::go_on(double idle_gap)
-{
+  const std::vector<Vector> moved = velocities();
   start_ = given_->problem.contacts.impulse;
   idle_gap_ = static_cast<float>(idle_gap / given_->scales.length);
   for (Packed *const some : {&at_cuts_, &inside_, &idle_})
-    for (std::size_t place = 0; place < some->lanes(); ++place)
-      if (!some->is_empty(place)) write_start(*some, place);
-  begin_search();
+    for (std::size_t g = 0; g < some->batches.size(); ++g) {
+      Batch &batch = some->batches[g];
+      const swept::Eight before = batch.before - batch.now;
+      for (std::size_t place = g * WIDTH; place < (g + 1) * WIDTH; ++place)
+        if (!some->is_empty(place)) write_start(*some, place);
+      batch.before = before;
+    }
+  grains_.stop(states_);
+  targets_.recentre(*given_, moved);
   // Of what is far only this is packed: as long as something is far, nothing else is idle.
   std::vector<std::size_t> near, far;
   for (const std::size_t c : far_) (given_->gap[c] > idle_gap ? far : near).push_back(c);
   write_idle(near);
   far_ = std::move(far);
   wake_near();
+  refresh(host);
   set_targets();
 }
 
@@ -118,7 +120,7 @@ void PackedSweeps<Batch>::write(std::size_t c, Packed &packed, std::size_t place
   write_start(packed, place);
 }
 
-// Writes what each search begins with.
+// Writes what belongs to the impulse that is the centre, of which there is no change yet.
 template <typename Batch>
 void PackedSweeps<Batch>::write_start(Packed &packed, std::size_t place) const
 {

@@ -30,10 +30,10 @@ template <typename Batch> class PackedSweeps {
   // common that batches would be mostly empty. Collective; what is returned is this rank's answer.
   bool prepare(const Start &start, double idle_gap, Host &host);
 
-  // Begins another search from the impulses of the last one, which are those of the problem now, as
-  // double precision has judged them: what `prepare` was given refers to what is new. Colours and
-  // batches stay.
-  void go_on(double idle_gap);
+  // Makes the present impulses the centre of what follows. They are those of the problem now, and
+  // double precision has judged them: what `prepare` was given refers to what is new. Colours,
+  // batches and the last change of the impulses stay. Collective.
+  void recentre(double idle_gap, Host &host);
 
   // Extrapolates all impulses by `along` times their last change, and visits each working
   // constraint once.
@@ -85,7 +85,6 @@ template <typename Batch> class PackedSweeps {
   void write(std::size_t c, Packed &packed, std::size_t place) const;
   void write_start(Packed &packed, std::size_t place) const;
   void write_idle(const std::vector<std::size_t> &constraints);
-  void begin_search();
   void wake_near();
   void wake(const std::vector<std::size_t> &near);
   float look_at(const Packed &packed, std::vector<Unloaded> &unloaded);

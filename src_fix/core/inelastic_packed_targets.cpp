@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace inelastic {
 
@@ -43,6 +44,17 @@ template <typename Real> void PackedTargets<Real>::begin(const Start &start)
   kept_.assign(slots, Vector{});
   kept_before_ = kept_;
   set(kept_);
+}
+
+template <typename Real>
+void PackedTargets<Real>::recentre(const Start &start, const std::vector<Vector> &moved)
+{
+  std::vector<Vector> kept = std::move(kept_), kept_before = std::move(kept_before_);
+  begin(start);
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    kept_[i].lanes = kept[i].lanes - moved[i].lanes;
+    kept_before_[i].lanes = kept_before[i].lanes - moved[i].lanes;
+  }
 }
 
 template <typename Real> void PackedTargets<Real>::set(const std::vector<Vector> &velocity)

@@ -23,6 +23,9 @@ template <typename Real> class PackedTargets {
 
   // Begins a search.
   void begin(const Start &start);
+  // Goes on with it from the impulses of a new start, which have moved the slots by these
+  // velocities since the last one.
+  void recentre(const Start &start, const std::vector<Vector> &moved);
 
   // Takes the velocities of which targets are a part.
   void set(const std::vector<Vector> &velocity);

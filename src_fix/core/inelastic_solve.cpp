@@ -28,10 +28,10 @@ double Solve::idle_gap() const
 
 double Solve::set_targets()
 {
-  const double unsolved = kept_.targets.judge(problem, limits, kept_.gap_operator, kept_.gap, host);
-  result.accurate = unsolved <= 1.0;
+  unsolved_ = kept_.targets.judge(problem, limits, kept_.gap_operator, kept_.gap, host);
+  result.accurate = unsolved_ <= 1.0;
   result.unresolved = kept_.targets.unresolved();
-  return unsolved;
+  return unsolved_;
 }
 
 bool Solve::judge()

@@ -49,6 +49,8 @@ class Solve {
   // Sets the targets of impulses whose gaps are known. Returns the largest residual as a part of
   // its target. Collective.
   double set_targets();
+  // Returns what set_targets() has returned last.
+  double unsolved() const { return unsolved_; }
 
   // Sets the gaps of the impulses. Collective.
   void find_gaps() { kept_.gap_operator.apply(problem, impulse().data(), kept_.gap.data(), host); }
@@ -85,6 +87,7 @@ class Solve {
   Scales scales_;
   double mass_ratio_;    // of the heaviest to the lightest that can move
   bool chose_ghosts_ = false;
+  double unsolved_ = 0.0;
 };
 
 }    // namespace inelastic
