@@ -145,8 +145,12 @@ inelastic::SolverResult HoldStill::project(const Held &held)
     }
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
         step_.eps(in_eps::ALLOWED - ADDED_BESIDE_REST);
+    // What the step has left of its residual stays: it is not for this room to solve it once more.
+    const double left = step_.linear_gap_at_end(c, solved_);
+    const double residual = problem.contacts.is_loaded(c) ? left : std::min(left, 0.0);
     contacts.add_of(problem.contacts, c);
-    contacts.gap.back() = std::min(problem.contacts.gap[c] + problem.timestep * along, ends_within);
+    contacts.gap.back() =
+        std::min(problem.contacts.gap[c] + problem.timestep * along - residual, ends_within);
     // With the step's own impulse the contact still pushes, or pulls by no more than it may.
     contacts.set.back() =
         problem.contacts.set[c].changes_of(problem.contacts.impulse[c]).after(0.0);
