@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
@@ -215,6 +216,8 @@ long Rest::try_clusters(double least_length)
     refinement *= FINER;
     of_coarser.swap(of_trial);
   }
+  // One that fails goes on as in the step, and may push another one.
+  while (fail_pushed_by_others()) {}
   return trial_.iterations();
 }
 
@@ -253,23 +256,52 @@ bool Rest::judge_trial(bool solved, const std::vector<ClusterMotion> &of_coarser
 // Collective.
 bool Rest::drop_what_is_not_held()
 {
-  const Clusters &clusters = motions_.clusters();
-  std::vector<double> none(clusters.size(), 0.0), lost(clusters.size(), 0.0);
+  std::vector<double> lost(motions_.size(), 0.0);
   for (std::size_t i = 0; i < held_.size(); ++i) {
-    const int k = clusters.of(static_cast<int>(i));
-    if (!begun_.particles[i] || held_[i] || fates_[k] != Fate::PASSES) continue;
+    const int slot = static_cast<int>(i);
+    if (!begun_.particles[i] || held_[i] || !passes(slot)) continue;
     begun_.particles[i] = 0;
-    lost[k] = 1.0;
+    lost[motions_.clusters().of(slot)] = 1.0;
   }
-  clusters.over_ranks(1, none, 1, lost);
+  return fail(lost);
+}
+
+// Fails clusters that pass and have a contact whose force in the trial is another one than in the
+// step, with something that goes on as it does in the step: that would take no part in the force.
+// Returns whether there are some. Collective.
+bool Rest::fail_pushed_by_others()
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  std::vector<double> pushed(motions_.size(), 0.0);
+  for (std::size_t c = 0; c < trial_.impulse().size() && c < contacts.size(); ++c) {
+    const int i = contacts.first[c], j = contacts.second[c];
+    if (passes(i) == passes(j) || trial_.impulse()[c] == contacts.impulse[c]) continue;
+    const auto [mine, other] = passes(i) ? std::pair{i, j} : std::pair{j, i};
+    if (step_.problem.is_mobile(other)) pushed[motions_.clusters().of(mine)] = 1.0;
+  }
+  return fail(pushed);
+}
+
+// Fails those clusters that pass and are marked on some rank. Returns whether there are some.
+// Collective.
+bool Rest::fail(std::vector<double> marked)
+{
+  std::vector<double> none(marked.size(), 0.0);
+  motions_.clusters().over_ranks(1, none, 1, marked);
   double any = 0.0;
   for (std::size_t k = 0; k < fates_.size(); ++k) {
-    if (fates_[k] != Fate::PASSES || lost[k] == 0.0) continue;
+    if (fates_[k] != Fate::PASSES || marked[k] == 0.0) continue;
     fates_[k] = Fate::FAILS;
     any = 1.0;
   }
   ranks_.reduce(nullptr, 0, &any, 1);
   return any > 0.0;
+}
+
+bool Rest::passes(int slot) const
+{
+  const int k = motions_.clusters().of(slot);
+  return k != Clusters::NONE && fates_[k] == Fate::PASSES;
 }
 
 bool Rest::is_stopped(int slot) const
@@ -302,11 +334,6 @@ HoldStill::Held Rest::held_now() const
 void Rest::take_trial()
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
-  const Clusters &clusters = motions_.clusters();
-  const auto passes = [&](int slot) {
-    const int k = clusters.of(slot);
-    return k != Clusters::NONE && fates_[k] == Fate::PASSES;
-  };
   for (std::size_t c = 0; c < trial_.impulse().size() && c < contacts.size(); ++c)
     if (passes(contacts.first[c]) || passes(contacts.second[c]))
       contacts.impulse[c] = trial_.impulse()[c];

@@ -18,9 +18,9 @@
 // rigid body.
 //
 // After some quiet steps, those of most of its particles, the step is solved on trial as if the
-// held particles had begun it at rest (inelastic_rest_trial.h). If nothing held then moves, the
-// cluster is at rest; if not the step stays as it was solved, and the cluster is looked at again
-// later.
+// held particles had begun it at rest (inelastic_rest_trial.h). If nothing held then moves, and
+// the cluster pushes nothing else that moves, it is at rest; if not the step stays as it was
+// solved, and the cluster is looked at again later.
 //
 // Slow motion looks like an error of the solver: that of a light particle, for instance, which
 // follows two heavy ones that it drives apart. Where held particles touch others that are not held,
@@ -93,6 +93,9 @@ class Rest : protected Pointers {
   RestTrial::Begun begin_trial() const;
   void mark_held(Fate fate);
   bool drop_what_is_not_held();
+  bool fail_pushed_by_others();
+  bool fail(std::vector<double> marked);
+  bool passes(int slot) const;
   bool is_stopped(int slot) const;
   bool any_stopped() const;
   HoldStill::Held held_now() const;

@@ -9,14 +9,24 @@ import pytest
 from tests.random_scenes.curved_beds import CARRIED, judge_bed
 from tests.random_scenes.scene_loop import Programs, installed
 
-pytestmark = pytest.mark.validation
-
 
 @pytest.fixture(scope="module")
 def programs() -> Programs:
     return installed()
 
 
+# A sphere that came to rest on its trial pushed another one, which did not feel it.
+FOUND = (1735,)
+
+
+@pytest.mark.parametrize("seed", FOUND)
+def test_beds_that_have_found_something(seed: int, tmp_path: Path, programs: Programs) -> None:
+    """What earlier versions failed on stays right."""
+    bed = judge_bed(seed, tmp_path / "bed", programs)
+    assert not bed.verdict.problems, bed.verdict.line()
+
+
+@pytest.mark.validation
 @pytest.mark.parametrize("seed", range(1, 61))
 def test_a_bed_in_a_curved_container(seed: int, tmp_path: Path, programs: Programs) -> None:
     """No step adds more energy than it may, no grain is off the exact projection, walls carry all.
