@@ -42,7 +42,7 @@ namespace {
     const long made = solve.result.iterations;
     solve.plateau.see(made, find_unsolved(sweeps, blur, solve.host));
     const bool tries = solve.is_time_for_slow_modes();
-    if (!tries && !solve.is_on_plateau()) return std::nullopt;
+    if (!tries && !solve.may_end_on_plateau()) return std::nullopt;
     sweeps.impulses(solve.scales(), solve.impulse());
     if (solve.ends_on_plateau(tries)) return End::SOLVED;
     // Above the tolerance the next search goes on, after twice as long.

@@ -112,8 +112,9 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
     const double added[3] = {now[0] - before[0], now[1] - before[1], now[2] - before[2]};
     of_slot[i] = problem.timestep * std::max(norm(now), norm(added));
   }
-  // The largest part of a target, the largest target, and the largest part that is unresolved.
-  double maxima[3] = {0.0, 0.0, 0.0};
+  // The largest part of a target, the largest target, the largest part that is unresolved, and the
+  // residual.
+  double maxima[5] = {0.0, 0.0, 0.0, 0.0, 0.0};
   resolved_.resize(contacts.size());
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double by_velocity =
@@ -125,12 +126,15 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
     const double left = counts == Counts::ALL ? residual.largest() : residual.feasibility;
     maxima[0] = std::max(maxima[0], left / target);
     maxima[2] = std::max(maxima[2], part_[c] * left / resolved_[c]);
+    maxima[3] = std::max(maxima[3], residual.feasibility);
+    maxima[4] = std::max(maxima[4], residual.complementarity);
     if (contacts.is_loaded(c) || gap[c] < NEAR * limits.tolerance)
       maxima[1] = std::max(maxima[1], target);
   }
-  host.reduce(nullptr, 0, maxima, 3);
+  host.reduce(nullptr, 0, maxima, 5);
   largest_ = maxima[1];
   unresolved_ = maxima[2];
+  residual_ = {maxima[3], maxima[4]};
   return maxima[0];
 }
 

@@ -61,6 +61,8 @@ class ContactTargets {
                            Host &host);
 
   // The functions below give what the last judge() has found.
+  // The residual (inelastic_solver.h) over all ranks.
+  const Residual &residual() const { return residual_; }
   // [length] The lower bound of each target, whatever the changes of velocity are.
   const std::vector<double> &least() const { return least_; }
   // The factor from a length h |change of velocity| to a target: A/16, or A/48, times the
@@ -91,6 +93,7 @@ class ContactTargets {
   std::vector<double> least_, part_, resolved_;
   // [length] per slot: the impulses on it, and with its own motion, for the round-off
   std::vector<double> carried_, length_;
+  Residual residual_;
   double largest_ = 0.0, unresolved_ = 0.0;
 };
 

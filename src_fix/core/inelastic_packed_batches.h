@@ -18,8 +18,8 @@ template <typename Batch> class PackedBatches {
  public:
   static constexpr int WIDTH = swept::WIDTH;
 
-  std::vector<Batch> batches;
-  std::vector<swept::Details> details;
+  swept::Array<Batch> batches;
+  swept::Array<swept::Details> details;
 
   // Empties all. Lanes that are empty have the states of nobody, a grain that nothing moves.
   void clear(int nobody, bool has_springs);

@@ -37,8 +37,8 @@ double Solve::set_targets()
 bool Solve::judge()
 {
   find_gaps();
-  result.residual = residual_over_ranks(kept_.gap.data(), problem.contacts, host);
   set_targets();
+  result.residual = kept_.targets.residual();
   return result.accurate;
 }
 

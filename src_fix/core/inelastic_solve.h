@@ -73,8 +73,14 @@ class Solve {
   // Tells whether the residual has not come down for so long that it is worth to look why.
   bool is_on_plateau() const { return plateau.lasts(result.iterations, Network::LEAST_ON_PLATEAU); }
 
+  // Tells whether that is so long that a search may end, by the network of contacts as it was when
+  // most_on_plateau() was called last: it changes little in a search.
+  bool may_end_on_plateau() const
+  { return is_on_plateau() && plateau.lasts(result.iterations, most_on_plateau_); }
+
   // Returns after how many iterations without progress a search ends. Collective.
-  long most_on_plateau() { return find_network(problem, host).most_on_plateau(); }
+  long most_on_plateau()
+  { return most_on_plateau_ = find_network(problem, host).most_on_plateau(); }
 
   // Tells whether a search ends on a plateau: with `tries` slow modes are tried first. Otherwise
   // the impulses, which are judged here, will do if their residual has not come down for long and
@@ -88,6 +94,7 @@ class Solve {
   double mass_ratio_;    // of the heaviest to the lightest that can move
   bool chose_ghosts_ = false;
   double unsolved_ = 0.0;
+  long most_on_plateau_ = 0;
 };
 
 }    // namespace inelastic

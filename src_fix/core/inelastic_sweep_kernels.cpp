@@ -293,7 +293,7 @@ namespace {
   }
 
   template <typename Size, typename Batch>
-  INELASTIC_INLINE double unsolved_of_all(const std::vector<Batch> &batches, const Details *springs,
+  INELASTIC_INLINE double unsolved_of_all(const Array<Batch> &batches, const Details *springs,
                                           const typename Batch::State *states, float blur)
   {
     using V = typename Size::Numbers;
@@ -316,7 +316,7 @@ namespace {
   }
 
   template <typename Size, typename Batch>
-  INELASTIC_INLINE float look_at_all(const std::vector<Batch> &batches, const Details *details,
+  INELASTIC_INLINE float look_at_all(const Array<Batch> &batches, const Details *details,
                                      const Details *springs, const typename Batch::State *states,
                                      Looked *looked)
   {
@@ -371,7 +371,7 @@ namespace {
   }
 
   template <typename Size, typename Batch>
-  INELASTIC_INLINE void add_all(const std::vector<Batch> &batches, When when,
+  INELASTIC_INLINE void add_all(const Array<Batch> &batches, When when,
                                 typename Batch::State *states)
   {
     for (const Batch &batch : batches)
@@ -420,22 +420,21 @@ namespace {
   }
 
   // The passes over batches of each kind, by vectors of eight and of four numbers.
-#define INELASTIC_PASSES(BATCH)                                                                    \
-  INELASTIC_CLONES void wide_sweep(BATCH *batches, const Details *springs, std::size_t count,      \
-                                   BATCH::State *states, float along, float blur, Swept &swept)    \
-  { sweep_all<Wide>(batches, springs, count, states, along, blur, swept); }                        \
-  INELASTIC_CLONES double wide_unsolved(const std::vector<BATCH> &batches, const Details *springs, \
-                                        const BATCH::State *states, float blur)                    \
-  { return unsolved_of_all<Wide>(batches, springs, states, blur); }                                \
-  INELASTIC_CLONES float wide_look(const std::vector<BATCH> &batches, const Details *details,      \
-                                   const Details *springs, const BATCH::State *states,             \
-                                   Looked *looked)                                                 \
-  { return look_at_all<Wide>(batches, details, springs, states, looked); }                         \
-  INELASTIC_CLONES void wide_targets(BATCH *batches, const Details *details, std::size_t count,    \
-                                     const float *changed, float most)                             \
-  { set_all_targets<Wide>(batches, details, count, changed, most); }                               \
-  INELASTIC_CLONES void wide_add(const std::vector<BATCH> &batches, When when,                     \
-                                 BATCH::State *states)                                             \
+#define INELASTIC_PASSES(BATCH)                                                                 \
+  INELASTIC_CLONES void wide_sweep(BATCH *batches, const Details *springs, std::size_t count,   \
+                                   BATCH::State *states, float along, float blur, Swept &swept) \
+  { sweep_all<Wide>(batches, springs, count, states, along, blur, swept); }                     \
+  INELASTIC_CLONES double wide_unsolved(const Array<BATCH> &batches, const Details *springs,    \
+                                        const BATCH::State *states, float blur)                 \
+  { return unsolved_of_all<Wide>(batches, springs, states, blur); }                             \
+  INELASTIC_CLONES float wide_look(const Array<BATCH> &batches, const Details *details,         \
+                                   const Details *springs, const BATCH::State *states,          \
+                                   Looked *looked)                                              \
+  { return look_at_all<Wide>(batches, details, springs, states, looked); }                      \
+  INELASTIC_CLONES void wide_targets(BATCH *batches, const Details *details, std::size_t count, \
+                                     const float *changed, float most)                          \
+  { set_all_targets<Wide>(batches, details, count, changed, most); }                            \
+  INELASTIC_CLONES void wide_add(const Array<BATCH> &batches, When when, BATCH::State *states)  \
   { add_all<Wide>(batches, when, states); }
 
   INELASTIC_PASSES(ParticleBatch)
@@ -443,34 +442,34 @@ namespace {
 
 }    // namespace
 
-#define INELASTIC_CHOICES(BATCH)                                                                \
-  void sweep(BATCH *batches, const Details *springs, std::size_t count, BATCH::State *states,   \
-             float along, float blur, Swept &swept)                                             \
-  {                                                                                             \
-    if (is_wide())                                                                              \
-      wide_sweep(batches, springs, count, states, along, blur, swept);                          \
-    else                                                                                        \
-      sweep_all<Narrow>(batches, springs, count, states, along, blur, swept);                   \
-  }                                                                                             \
-  double find_unsolved(const std::vector<BATCH> &batches, const Details *springs,               \
-                       const BATCH::State *states, float blur)                                  \
-  {                                                                                             \
-    return is_wide() ? wide_unsolved(batches, springs, states, blur)                            \
-                     : unsolved_of_all<Narrow>(batches, springs, states, blur);                 \
-  }                                                                                             \
-  float look(const std::vector<BATCH> &batches, const Details *details, const Details *springs, \
-             const BATCH::State *states, Looked *looked)                                        \
-  {                                                                                             \
-    return is_wide() ? wide_look(batches, details, springs, states, looked)                     \
-                     : look_at_all<Narrow>(batches, details, springs, states, looked);          \
-  }                                                                                             \
-  void set_targets(BATCH *batches, const Details *details, std::size_t count,                   \
-                   const float *changed, float most)                                            \
-  {                                                                                             \
-    is_wide() ? wide_targets(batches, details, count, changed, most)                            \
-              : set_all_targets<Narrow>(batches, details, count, changed, most);                \
-  }                                                                                             \
-  void add_impulses(const std::vector<BATCH> &batches, When when, BATCH::State *states)         \
+#define INELASTIC_CHOICES(BATCH)                                                              \
+  void sweep(BATCH *batches, const Details *springs, std::size_t count, BATCH::State *states, \
+             float along, float blur, Swept &swept)                                           \
+  {                                                                                           \
+    if (is_wide())                                                                            \
+      wide_sweep(batches, springs, count, states, along, blur, swept);                        \
+    else                                                                                      \
+      sweep_all<Narrow>(batches, springs, count, states, along, blur, swept);                 \
+  }                                                                                           \
+  double find_unsolved(const Array<BATCH> &batches, const Details *springs,                   \
+                       const BATCH::State *states, float blur)                                \
+  {                                                                                           \
+    return is_wide() ? wide_unsolved(batches, springs, states, blur)                          \
+                     : unsolved_of_all<Narrow>(batches, springs, states, blur);               \
+  }                                                                                           \
+  float look(const Array<BATCH> &batches, const Details *details, const Details *springs,     \
+             const BATCH::State *states, Looked *looked)                                      \
+  {                                                                                           \
+    return is_wide() ? wide_look(batches, details, springs, states, looked)                   \
+                     : look_at_all<Narrow>(batches, details, springs, states, looked);        \
+  }                                                                                           \
+  void set_targets(BATCH *batches, const Details *details, std::size_t count,                 \
+                   const float *changed, float most)                                          \
+  {                                                                                           \
+    is_wide() ? wide_targets(batches, details, count, changed, most)                          \
+              : set_all_targets<Narrow>(batches, details, count, changed, most);              \
+  }                                                                                           \
+  void add_impulses(const Array<BATCH> &batches, When when, BATCH::State *states)             \
   { is_wide() ? wide_add(batches, when, states) : add_all<Narrow>(batches, when, states); }
 
 INELASTIC_CHOICES(ParticleBatch)

@@ -15,9 +15,23 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
 namespace inelastic::swept {
+
+// Numbers of which new ones have no value yet: that of a batch would be written twice.
+template <typename T> struct WithoutValue : std::allocator<T> {
+  template <typename U> struct rebind {
+    using other = WithoutValue<U>;
+  };
+  template <typename U> void construct(U *place) { ::new (static_cast<void *>(place)) U; }
+  template <typename U, typename Value> void construct(U *place, Value &&value)
+  { ::new (static_cast<void *>(place)) U(std::forward<Value>(value)); }
+};
+template <typename T> using Array = std::vector<T, WithoutValue<T>>;
 
 // Halves of a vector are read as vectors, too.
 typedef float Four __attribute__((vector_size(16), may_alias));
@@ -83,9 +97,9 @@ void sweep(BodyBatch *batches, const Details *springs, std::size_t count, BodyBa
            float along, float blur, Swept &swept);
 
 // Returns, between two sweeps, the largest residual, beyond the blur, as a part of its target.
-double find_unsolved(const std::vector<ParticleBatch> &batches, const Details *springs,
+double find_unsolved(const Array<ParticleBatch> &batches, const Details *springs,
                      const ParticleBatch::State *states, float blur);
-double find_unsolved(const std::vector<BodyBatch> &batches, const Details *springs,
+double find_unsolved(const Array<BodyBatch> &batches, const Details *springs,
                      const BodyBatch::State *states, float blur);
 
 // What a look at a batch finds.
@@ -95,9 +109,9 @@ struct alignas(32) Looked {
 };
 
 // Looks at all batches; returns their largest residual, as a length in packed units.
-float look(const std::vector<ParticleBatch> &batches, const Details *details,
-           const Details *springs, const ParticleBatch::State *states, Looked *looked);
-float look(const std::vector<BodyBatch> &batches, const Details *details, const Details *springs,
+float look(const Array<ParticleBatch> &batches, const Details *details, const Details *springs,
+           const ParticleBatch::State *states, Looked *looked);
+float look(const Array<BodyBatch> &batches, const Details *details, const Details *springs,
            const BodyBatch::State *states, Looked *looked);
 
 // Sets the targets of `count` batches as PackedTargets::target has them, from its `changed` and
@@ -109,9 +123,8 @@ void set_targets(BodyBatch *batches, const Details *details, std::size_t count,
 
 // Adds to the states what all impulses make of them, those now or before the last sweep.
 enum class When { NOW, BEFORE };
-void add_impulses(const std::vector<ParticleBatch> &batches, When when,
-                  ParticleBatch::State *states);
-void add_impulses(const std::vector<BodyBatch> &batches, When when, BodyBatch::State *states);
+void add_impulses(const Array<ParticleBatch> &batches, When when, ParticleBatch::State *states);
+void add_impulses(const Array<BodyBatch> &batches, When when, BodyBatch::State *states);
 
 // Extrapolates the states by `along` times their last change, and keeps them as they were in
 // `before`.

@@ -24,8 +24,8 @@ SolverResult Uzawa::solve(ContactProblem &problem, const SolverLimits &limits, H
   double step = 0.0;    // 1 / L; 0 = not yet known
   while (true) {
     gap_operator_.apply(problem, contacts.impulse.data(), gap_.data(), host);
-    result.residual = residual_over_ranks(gap_.data(), contacts, host);
     result.accurate = targets_.judge_feasibility(problem, limits, gap_operator_, gap_, host) <= 1.0;
+    result.residual = targets_.residual();
     result.unresolved = targets_.unresolved();
     if (result.accurate) return ended(Status::CONVERGED);
     if (!std::isfinite(result.residual.feasibility)) return ended(Status::NOT_FINITE);
