@@ -3,6 +3,7 @@
 // undefined-behaviour sanitizers; the solvers are judged in test_solver*.py. Returns 1 when a check
 // failed.
 
+#include "inelastic_coloured_sweeps.h"
 #include "inelastic_constraint_colours.h"
 #include "inelastic_contact_problem.h"
 #include "inelastic_contact_set.h"
@@ -12,6 +13,7 @@
 #include "inelastic_projection.h"
 #include "inelastic_random.h"
 #include "inelastic_rigid_bodies.h"
+#include "inelastic_search_chain.h"
 #include "inelastic_solver.h"
 
 #include <algorithm>
@@ -649,6 +651,21 @@ void test_crystal(const ContactProblem &crystal)
       CHECK_ALL_NEAR(velocity_of(problem), other_solver, 100.0 * TOLERANCE / TIMESTEP);
     other_solver = velocity_of(problem);
   }
+}
+
+// Sweeps alone, which work in single precision: what they find is refined until double precision
+// takes it, to a part of 1e-9 of the gaps at the start.
+void test_sweeps_refine_what_they_find(const ContactProblem &crystal)
+{
+  SerialHost host;
+  SearchChain::Searches searches;
+  searches.push_back(std::make_unique<ColouredSweeps>());
+  SearchChain sweeps(std::move(searches));
+  ContactProblem problem = crystal;
+  const SolverResult result = sweeps.solve(problem, {TOLERANCE, 10000}, host);
+  CHECK(result.status == Status::CONVERGED);
+  const std::vector<double> gaps = gaps_of(problem, velocity_of(problem));
+  CHECK_AT_MOST(residual(gaps.data(), problem.contacts).largest(), TOLERANCE + ROUNDING * TIMESTEP);
 }
 
 void test_iteration_limit()
@@ -1670,6 +1687,10 @@ int main()
   test_column();
   test_crystal(make_crystal(4));
   test_crystal(make_crystal_of_bodies());
+  test_sweeps_refine_what_they_find(make_crystal(4));
+  test_sweeps_refine_what_they_find(make_column(100, true));
+  test_sweeps_refine_what_they_find(make_column(300, true));
+  test_sweeps_refine_what_they_find(make_crystal_of_bodies());
   test_iteration_limit();
   test_residual_trend();
   test_no_room();
