@@ -10,8 +10,9 @@
 //
 // Sweeps and accelerated gradients need as many iterations as the root of the condition number of
 // A, and a heavy grain on light ones makes that as large as the ratio of masses. Conjugate
-// gradients need as many as A has different eigenvalues, and the heavy grains are few. Where the
-// search is not for a few slow modes, sweeps are faster: it therefore comes when these get nowhere.
+// gradients need as many as A has different eigenvalues, and the heavy grains are few. So it is
+// with a few grains wedged between nearly parallel walls. Where the search is not for a few slow
+// modes, sweeps are faster: it therefore comes when these get nowhere.
 
 #pragma once
 

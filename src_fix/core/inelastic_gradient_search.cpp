@@ -84,7 +84,9 @@ std::optional<End> GradientSearch<Real>::judge_prospects(Solve &solve) const
       is_infeasible(solve.problem, solve.gap_operator(), solve.limits, solve.host);
   const bool blurred = tolerance < BELOW_ROUND_OFF * result.round_off;
   const bool stuck = result.iterations >= LONG && trend.least() > STUCK * trend.earlier();
-  if (!infeasible && solve.is_time_for_slow_modes() && solve.solve_slow_modes()) return End::SOLVED;
+  if (!infeasible && solve.is_time_for_slow_modes() && solve.may_have_slow_modes() &&
+      solve.solve_slow_modes())
+    return End::SOLVED;
   if (!infeasible && !blurred && !stuck) return std::nullopt;
   if (solve.judge()) return End::SOLVED;
   if (infeasible) return End::INFEASIBLE;

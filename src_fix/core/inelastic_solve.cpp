@@ -60,15 +60,21 @@ void Solve::choose_ghosts()
 
 bool Solve::is_time_for_slow_modes()
 {
+  constexpr double VERY_DIFFERENT = 1000.0;
+  return plateau.is_time_to_try(result.iterations, mass_ratio_ >= VERY_DIFFERENT);
+}
+
+bool Solve::may_have_slow_modes()
+{
   // With a ratio of n the smallest eigenvalues of A fall to about its n-th part.
-  constexpr double DIFFERENT = 30.0, VERY_DIFFERENT = 1000.0;
-  return mass_ratio_ >= DIFFERENT &&
-      plateau.is_time_to_try(result.iterations, mass_ratio_ >= VERY_DIFFERENT);
+  constexpr double DIFFERENT = 30.0;
+  return mass_ratio_ >= DIFFERENT ||
+      plateau.lasts(result.iterations, find_network(problem, host).enough_iterations());
 }
 
 bool Solve::ends_on_plateau(bool tries)
 {
-  if (tries && solve_slow_modes()) return true;
+  if (tries && may_have_slow_modes() && solve_slow_modes()) return true;
   if (!plateau.lasts(result.iterations, most_on_plateau())) return false;
   const bool accurate = judge();
   if (limits.to_targets) return accurate;

@@ -62,9 +62,14 @@ class Solve {
   // Forgets how residuals have come down: the next ones are those of more constraints.
   void forget_trends() { result.trend = trend_of_targets = ResidualTrend(); }
 
-  // Tells whether masses are so different that a few slow modes may be what keeps the residual up,
-  // and these are to be solved otherwise now.
+  // Tells whether the residual has stayed where it is for so long that it is time to look whether a
+  // few slow modes keep it up.
   bool is_time_for_slow_modes();
+
+  // Tells whether a few slow modes may keep the residual up: where masses are very different, or it
+  // has stayed for longer than conjugate gradients would take with the present impulses, as among
+  // a few grains that are wedged between nearly parallel walls. Collective.
+  bool may_have_slow_modes();
 
   // Tries conjugate gradients (inelastic_conjugate_gradients.h). If they solve the problem this
   // returns true. Otherwise all stays as it was but the number of iterations. Collective.

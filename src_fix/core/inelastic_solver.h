@@ -122,15 +122,22 @@ constexpr double WELL_RESOLVED = 1.0e-4;
 struct Network {
   double contacts = 0.0, particles = 0.0;
 
-  // Returns after how many iterations without progress a search ends: conjugate gradients, which
-  // sweeps and accelerated gradients do not surpass, would have ended. Chains, and a few contacts
+  // Returns in about how many iterations conjugate gradients end, one way or the other; sweeps and
+  // accelerated gradients do not surpass them.
+  long enough_iterations() const
+  {
+    constexpr double EACH = 0.75;
+    return static_cast<long>(EACH * contacts);
+  }
+
+  // Returns after how many iterations without progress a search ends. Chains, and a few contacts
   // such as those of grains between walls that close at an angle, are no network, and are solved to
   // the end, however long that takes.
   long most_on_plateau() const
   {
-    constexpr double FEW = 60.0, CHAIN = 1.5, EACH = 0.75;
+    constexpr double FEW = 60.0, CHAIN = 1.5;
     if (contacts < std::max(FEW, CHAIN * particles)) return std::numeric_limits<long>::max();
-    return std::max(LEAST_ON_PLATEAU, static_cast<long>(EACH * contacts));
+    return std::max(LEAST_ON_PLATEAU, enough_iterations());
   }
   static constexpr long LEAST_ON_PLATEAU = 150;
 };

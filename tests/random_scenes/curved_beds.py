@@ -232,8 +232,14 @@ def curved_bed(seed: int) -> Scene:
 
 
 def carried(folder: Path) -> float:
-    """By what part of the weight the forces of walls are off, on the average of the last steps."""
+    """By what part of the weight the forces of walls are off, on the average of the last steps.
+
+    NaN of a run without these steps.
+    """
     frames = read_tables(folder / "particles.02.dump")
+    if not frames:
+        # It was cut off before, which is a finding by itself.
+        return np.nan
     weight = GRAVITY * frames[-1]["mass"].sum()
     lifted = []
     # The first frame is that of a half kick.

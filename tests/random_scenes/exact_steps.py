@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lammps_inelastic import core
 from lammps_inelastic.workflow.tradeoff.states import records_in
-from tests.helpers.grainwise import MOST, Exact, compare, grains_of
+from tests.helpers.grainwise import MOST, compare
 from tests.random_scenes.scene_checker import REGULAR, Table, read_tables
 from tests.random_scenes.scene_walls import Shape, views
 
@@ -72,13 +72,6 @@ def fastest_given_back(record: core.Record, regular_timestep: float) -> float:
     return float(min(opens[deep].max(initial=0.0), most))
 
 
-def largest_differences(record: core.Record, one: Exact, other: Exact) -> Array:
-    """By how much the velocities of each grain differ in two solutions, its spheres' included."""
-    grains, off = grains_of(record), one.velocity - other.velocity
-    of_members = grains.largest_of_members(np.linalg.norm(off, axis=1))
-    return np.maximum(np.linalg.norm(grains.centre(off), axis=1), of_members)
-
-
 @dataclass(frozen=True)
 class AgainstExact:
     """How many steps were compared, the largest error of a grain over its bound, and findings."""
@@ -93,9 +86,7 @@ def against_exact(
 ) -> AgainstExact:
     """Compare the recorded steps of a run in a folder.
 
-    A grain may be off by 10 b, and by what the accuracy promises of any step (grainwise.py). A step
-    that has reached the tolerance alone, which the summary tells, is known to no more: of it the
-    exact projections with and without what is given back are compared, and may differ by 10 b.
+    A grain may be off by 10 b, and by what the accuracy promises of any step (grainwise.py).
 
     Parameters
     ----------
@@ -111,20 +102,21 @@ def against_exact(
             continue
         without = gives_nothing_back(record, frames[record.step + 1], shapes)
         found = compare(without, gravity=gravity, nominal_timestep=timestep)
-        off, accuracy = np.maximum(found.error, found.member_error), MOST * found.allowed
-        b = fastest_given_back(record, timestep) / found.unit
-        if np.any(off > TIMES_AS_FAST * b + accuracy):
+        off = np.maximum(found.error, found.member_error)
+        b = fastest_given_back(record, timestep)
+        if np.any(off > TIMES_AS_FAST * b / found.unit + MOST * found.allowed):
             own = compare(record, gravity=gravity, nominal_timestep=timestep)
+            # What has reached the tolerance alone, which the summary says, is known to no more.
             if not own.kept and not_accurate:
-                off = largest_differences(record, own.exact, found.exact) / found.unit
-                accuracy = np.full_like(off, (own.exact.bound + found.exact.bound) / found.unit)
-        ratio = off / (TIMES_AS_FAST * b + accuracy)
+                b = REGULAR * record.tolerance / timestep
+        b /= found.unit
+        ratio = off / (TIMES_AS_FAST * b + MOST * found.allowed)
         k = int(np.argmax(ratio))
         compared += 1
         worst = max(worst, float(ratio[k]))
         if ratio[k] > 1:
             problems.append(
                 f"exact projection: step {record.step}: a grain is off by {off[k]:.4g} g h, where "
-                f"10 b is {TIMES_AS_FAST * b:.4g} and {accuracy[k]:.4g} is the accuracy"
+                f"10 b is {TIMES_AS_FAST * b:.4g} and {MOST * found.allowed[k]:.4g} is the accuracy"
             )
     return AgainstExact(compared, worst, problems)
