@@ -155,7 +155,6 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, S
 
 template <typename Batch> End ColouredSweeps::search(PackedSweeps<Batch> &sweeps, Solve &solve)
 {
-  const SolverLimits &limits = solve.limits;
   double refused = sweeps.prepare(solve.start(), solve.idle_gap(), solve.host) ? 0.0 : 1.0;
   solve.host.reduce(nullptr, 0, &refused, 1);
   if (refused > 0.0) return End::GO_ON;
