@@ -430,10 +430,10 @@ FEW = {
 @pytest.mark.parametrize(
     ("name", "variables", "message"),
     [
-        ("spheres", {"drag": 100}, "drag times dt must be below 1, not 1"),
+        ("spheres", {"drag": 50}, "drag times dt must be below 1, not 1"),
         ("spheres", {"dt": 1, "drag": 1}, "drag times dt must be below 1, not 1"),
         ("dimers", {"drag": 1e300}, "drag times dt must be below 1"),
-        ("clusters", {"drag": 200}, "drag times dt must be below 1, not 2"),
+        ("clusters", {"drag": 100}, "drag times dt must be below 1, not 2"),
         ("spheres", {"particles": 2147483647}, "no room: particles of this diameter would fill"),
         ("dimers", {"diameter": 0.5, "aspect_ratio": 2}, "dimers are too long: aspect_ratio times"),
         ("dimers", {"diameter": 0.2}, "no room: the dimers would fill"),

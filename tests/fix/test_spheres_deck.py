@@ -70,8 +70,8 @@ def test_ten_thousand_spheres_start(lmp: Runner) -> None:
         ({"diameter": 0.22}, "no room: particles of this diameter would fill 1.11"),
         # More than there is memory for.
         ({"particles": 2147483647}, "no room: particles of this diameter would fill 299"),
-        ({"drag": 100}, "drag times dt must be below 1, not 1"),
-        ({"drag": 75}, "drag times dt_resting must be below 1, not 1.5"),
+        ({"drag": 50}, "drag times dt must be below 1, not 1"),
+        ({"drag": 30}, "drag times dt_resting must be below 1, not 1.5"),
     ],
 )
 def test_wrong_parameters(
