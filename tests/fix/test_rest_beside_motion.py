@@ -16,7 +16,7 @@ AFTER_THE_FALL = 60
 
 
 def fenced(folder: Path, lone: bool) -> str:
-    """Return a deck: a bed is poured behind a fence of frozen spheres, with a lone one beyond it."""
+    """Return a deck: a bed is poured behind a fence of frozen spheres, a lone one lies beyond."""
     bed = random_points(250, [[0.06, 0.94], [0.06, 1.6], [0.06, 0.94]], 0.1, seed=5)
     heights, depths = np.meshgrid(np.arange(12), np.arange(10))
     fence = np.column_stack(
