@@ -18,6 +18,7 @@ POURED = {
     "steps_agitated": 2,
     "steps_settling": 2,
     "steps_resting": 2,
+    "waiting": 0,
     "steps_tightening": 2,
     "steps_measuring": 1,
 }

@@ -421,6 +421,7 @@ FEW = {
     "steps_agitated": 2,
     "steps_settling": 2,
     "steps_resting": 1,
+    "waiting": 0,
     "steps_tightening": 1,
     "steps_measuring": 1,
     "dump_every": 1000,

@@ -46,6 +46,7 @@ def test_beds_that_are_stopped_are_named(deck: str, tmp_path: Path) -> None:
             "steps_agitated": int(random.integers(10, 60)),
             "steps_settling": int(random.integers(0, 120)),
             "steps_resting": int(random.integers(0, 20)),
+            "waiting": 0,
             "steps_tightening": 0,
             "steps_measuring": 0,
             "dt_measuring": 0.01,
