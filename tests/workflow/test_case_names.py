@@ -19,6 +19,7 @@ from lammps_inelastic.workflow.provenance.finished import FINISHED
 from lammps_inelastic.workflow.report import read_data
 from lammps_inelastic.workflow.results.store import (
     StoredStudy,
+    origin_of,
     read_result,
     read_studies,
     write_result,
@@ -27,7 +28,7 @@ from lammps_inelastic.workflow.results.store import (
 from lammps_inelastic.workflow.running.folder import Folder, write_json
 from lammps_inelastic.workflow.shipped import STUDIES, STUDIES_FOLDER
 from lammps_inelastic.workflow.study import Case, Study, read_study
-from lammps_inelastic.workflow.study.case_name import name_in, name_of
+from lammps_inelastic.workflow.study.case_name import name_before, name_in, name_of
 from tests.helpers.study_run import numbers_of, same
 
 KEPT = Path(__file__).parents[2] / "results"
@@ -83,10 +84,17 @@ def as_version_02_left_it(study: Study, root: Path) -> None:
     write_studies(root / f"{study.name}.h5", [StoredStudy(study.name, "", study.text, found)])
 
 
+@pytest.fixture(scope="module")
+def records_of_02() -> dict[Path, Mapping[str, Any]]:
+    """Return the records of all stored results by their paths seen from the folder of all."""
+    paths = sorted(KEPT.rglob("*.h5"))
+    return {path.relative_to(KEPT): origin_of(path)[1] for path in paths}
+
+
 @pytest.mark.parametrize("study", BEFORE_AND_NOW)
-def test_names_before_and_now(study: str) -> None:
-    cases = read_study(STUDIES_FOLDER / f"{study}.toml").cases
-    assert BEFORE_AND_NOW[study] in [(case.name_before, case.name) for case in cases]
+def test_names_before_and_now(study: str, records_of_02: dict[Path, Mapping[str, Any]]) -> None:
+    names = [(one["case"], path.stem) for path, one in records_of_02.items()]
+    assert BEFORE_AND_NOW[study] in names
 
 
 def test_names_of_all_shipped_cases() -> None:
@@ -148,26 +156,39 @@ def test_a_deck_with_a_long_name_leaves_room_for_the_seed() -> None:
     assert name_of(stages, HASH) == f"{'d' * 30}_seed=12_change=tilt_x=1_{HASH}"
 
 
-def test_a_record_of_02_has_the_name_of_today() -> None:
-    for case in all_shipped():
-        stages = [
-            stage_of(stage.deck.name, stage.values, **stage.variables) for stage in case.stages
-        ]
-        record = json.loads(json.dumps({"case": case.name_before, "stages": stages}))
-        assert name_in(record) == case.name
-        assert name_in({**record, "case": case.name}) == case.name
+def test_a_record_of_02_has_the_name_of_today(
+    records_of_02: dict[Path, Mapping[str, Any]],
+) -> None:
+    """The files of the stored results have these names, and the records those of 0.2."""
+    assert len(records_of_02) > 500
+    for path, record in records_of_02.items():
+        name, digest = path.stem, path.stem[-len(HASH) :]
+        assert name_in(record) == name
+        assert name_in({**record, "case": name}) == name
+        assert name_before(record["stages"], digest) == record["case"]
+    assert any(path.stem != record["case"] for path, record in records_of_02.items())
 
 
 def test_stored_results_in_the_form_of_02(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    records_of_02: dict[Path, Mapping[str, Any]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A folder `results` of 0.2, with its long names, some of them cut off before the seed."""
     study = read_study(STUDIES_FOLDER / "counting.toml")
     old = tmp_path / "results" / "counting"
     old.mkdir(parents=True)
-    cases = [case for case in study.cases if case.name != case.name_before][::3]
-    for case in cases:
-        shutil.copyfile(KEPT / "counting" / f"{case.name}.h5", old / f"{case.name_before}.h5")
+    long = {
+        path: record
+        for path, record in records_of_02.items()
+        if path.parent.name == "counting" and path.stem != record["case"]
+    }
+    chosen = dict([*long.items()][::3])
+    cases = [case for case in study.cases if any(case.is_of(one, True) for one in chosen.values())]
+    assert len(cases) == len(chosen) > 5
+    for path, record in chosen.items():
+        shutil.copyfile(KEPT / path, old / f"{record['case']}.h5")
     assert any(len(path.stem) > 160 and "seed" not in path.stem for path in old.iterdir())
     page = "lammps_inelastic.workflow.report.report_files"
     monkeypatch.setattr(f"{page}.write_report", lambda *_: None)
@@ -179,9 +200,10 @@ def test_stored_results_in_the_form_of_02(
         in capsys.readouterr().out
     )
     (counting,) = (one for one in read_studies(out / "paper.h5") if one.name == "counting")
-    assert [one.case for one in counting.results] == [case.name for case in cases]
-    for one in counting.results:
-        assert (out / "results" / "counting" / f"{one.case}.h5").is_file()
+    assert {one.case for one in counting.results} == {path.stem for path in chosen}
+    for case, one in zip(cases, counting.results, strict=True):
+        assert case.is_of(one.record, True)
+        assert (out / "results" / "counting" / f"{case.name}.h5").is_file()
 
 
 @pytest.mark.slow

@@ -6,12 +6,15 @@ import json
 import os
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.provenance.finished import FINISHED
+from lammps_inelastic.workflow.results.store import read_result, write_result
 from lammps_inelastic.workflow.running.folder import FAILED, Folder
 from lammps_inelastic.workflow.study import read_study
 from tests.helpers.few_spheres import TINY
@@ -142,6 +145,46 @@ def test_a_damaged_result_in_a_job(study: Path) -> None:
     assert "kept as " in said.stdout
     assert "few: 1 done, 1 there before" in said.stdout
     assert same(before, numbers_of(out / "few.h5"))
+
+
+def with_another_default(record: dict[str, Any]) -> dict[str, Any]:
+    """Return a record as if a variable that nobody sets had had another default then."""
+    (stage,) = json.loads(json.dumps(record["stages"]))
+    assert "drag" not in stage["values"]
+    stage["variables"]["drag"] = 7
+    return {**record, "stages": [stage]}
+
+
+def test_a_run_and_a_result_of_earlier_defaults_are_kept(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The study has not changed, the deck's default has: the case is run, and nothing is lost."""
+    path, out = study / "few.toml", study / "out"
+    read, folder = read_study(path), Folder(out)
+    first, _ = read.cases
+    result, run = folder.result(read, first), folder.case(first)
+    old = read_result(result)
+    write_result(result, replace(old, record=with_another_default(dict(old.record))))
+    record = json.loads((run / FINISHED).read_text())
+    (run / FINISHED).write_text(json.dumps(with_another_default(record)))
+    content, files = result.read_bytes(), sorted(one.name for one in run.iterdir())
+    assert main(["status", str(path), "--out", str(out)]) == 0
+    assert "1 missing, 1 measured" in capsys.readouterr().out
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "few: 1 done, 1 there before" in said
+    words = "of a deck with other defaults than today's"
+    for kept in (result, run):
+        assert f"{kept}: {words}; kept as {kept.name}.earlier" in said
+    earlier = result.with_name(f"{result.name}.earlier")
+    assert earlier.read_bytes() == content
+    runs = run.with_name(f"{run.name}.earlier")
+    assert sorted(one.name for one in runs.iterdir()) == files
+    assert read_result(result).variables == old.variables
+    # What is kept is in nobody's way.
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    assert "few: 2 there before" in capsys.readouterr().out
+    assert earlier.read_bytes() == content
 
 
 def test_set_aside_again_and_again(study: Path) -> None:

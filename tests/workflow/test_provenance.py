@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from lammps_inelastic.workflow.provenance.build_version import (
 from lammps_inelastic.workflow.provenance.run_record import code, differs
 from lammps_inelastic.workflow.provenance.same_runs import FILE, SameRuns, same_runs
 from lammps_inelastic.workflow.report.sections.provenance import codes_line
-from lammps_inelastic.workflow.results.store import Result, read_result, write_result
+from lammps_inelastic.workflow.results.store import Result, origin_of, read_result, write_result
 from lammps_inelastic.workflow.running.folder import Folder
 from lammps_inelastic.workflow.running.gather import adopt_results, gather_results
 from lammps_inelastic.workflow.study import read_study
@@ -186,6 +187,174 @@ def test_stored_results_of_a_deck_with_another_default_are_taken_if_asked(
     assert gather_results(study, folder).results == []
     # It is there already.
     assert adopt_results(study, folder, kept, of_any_code=True) == 0
+
+
+def with_common_phases(few: Path, folder: Path) -> Path:
+    """Write the study of two cases with its numbers of steps as common values; return its path."""
+    text = (few / "few.toml").read_text()
+    steps = "".join(line for line in text.splitlines(True) if line.startswith("steps_"))
+    assert steps.count("\n") == 5
+    path = folder / "few.toml"
+    path.write_text(text.replace(steps, "") + f"[common]\n{steps}")
+    return path
+
+
+def test_a_stored_result_of_another_name_is_found_by_its_record(
+    few: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The study states as common values now what it had set, and so names have changed."""
+    path = with_common_phases(few, tmp_path)
+    study, before = read_study(path), read_study(few / "few.toml")
+    assert {case.name for case in study.cases}.isdisjoint(case.name for case in before.cases)
+    out = tmp_path / "out"
+    assert adopt_results(study, Folder(out), few / "out" / "results") == 2
+    for case, one in zip(study.cases, before.cases, strict=True):
+        kept = few / "out" / "results" / "few" / f"{one.name}.h5"
+        copy = out / "results" / "few" / f"{case.name}.h5"
+        assert copy.read_bytes() == kept.read_bytes()
+    results = gather_results(study, Folder(out)).results
+    assert [one.case for one in results] == [case.name for case in before.cases]
+    # They are there, and nothing is run, or counted as of another code.
+    capsys.readouterr()
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "few: 2 there before" in said
+    assert "other versions" not in said
+    assert main(["status", str(path), "--out", str(out)]) == 0
+    assert "few: 2 measured" in capsys.readouterr().out
+    assert adopt_results(study, Folder(out), few / "out" / "results") == 0
+
+
+def test_each_record_is_read_once_and_a_damaged_one_is_named_once(
+    few: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = tmp_path / "kept"
+    shutil.copytree(few / "out" / "results" / "few", kept / "few")
+    damaged = kept / "few" / "a.h5"
+    damaged.write_bytes(b"damaged")
+    read: list[Path] = []
+
+    def counted(path: Path) -> tuple[str, Any]:
+        read.append(path)
+        return origin_of(path)
+
+    monkeypatch.setattr("lammps_inelastic.workflow.running.kept_results.origin_of", counted)
+    study = read_study(with_common_phases(few, tmp_path))
+    assert adopt_results(study, Folder(tmp_path / "out"), kept, of_any_code=True) == 2
+    assert sorted(read) == sorted((kept / "few").glob("*.h5"))
+    assert capsys.readouterr().out.count(f"not taken: {damaged}: ") == 1
+
+
+def with_a_copy(path: Path, record: dict[str, Any]) -> None:
+    """Leave two results of one case."""
+    del record
+    shutil.copyfile(path, path.with_name("copy.h5"))
+
+
+def without_a_variable(_path: Path, record: dict[str, Any]) -> None:
+    del record["stages"][0]["variables"]["dump_every"]
+
+
+def with_an_unknown_variable(_path: Path, record: dict[str, Any]) -> None:
+    for part in ("variables", "values"):
+        record["stages"][0][part]["friction"] = 0.5
+
+
+def of_another_deck(_path: Path, record: dict[str, Any]) -> None:
+    record["stages"][0]["deck"] = "dimers"
+
+
+def of_another_value(_path: Path, record: dict[str, Any]) -> None:
+    record["stages"][0]["variables"]["solver"] = "another"
+
+
+def of_two_stages(_path: Path, record: dict[str, Any]) -> None:
+    record["stages"] *= 2
+
+
+@pytest.mark.parametrize(
+    ("change", "taken"),
+    [
+        (with_a_copy, 2),
+        # The study sets it: what the run had instead is not known.
+        (without_a_variable, 1),
+        (with_an_unknown_variable, 1),
+        (of_another_deck, 1),
+        (of_another_value, 1),
+        (of_two_stages, 1),
+    ],
+)
+def test_which_records_are_of_a_case(
+    change: Callable[[Path, dict[str, Any]], None], taken: int, few: Path, tmp_path: Path
+) -> None:
+    """What one has set, the other must know; one result is taken for one case."""
+    kept = tmp_path / "kept"
+    shutil.copytree(few / "out" / "results" / "few", kept / "few")
+    path = sorted((kept / "few").glob("*.h5"))[0]
+    record = json.loads(json.dumps(dict(read_result(path).record)))
+    change(path, record)
+    made_by(path, **record)
+    study = read_study(with_common_phases(few, tmp_path))
+    assert adopt_results(study, Folder(tmp_path / "out"), kept) == taken
+
+
+def test_a_result_under_the_name_of_another_case_is_not_taken_for_one(
+    few: Path, tmp_path: Path
+) -> None:
+    """Files of studies know results by their names, and would lose one of the two."""
+    kept = tmp_path / "kept"
+    shutil.copytree(few / "out" / "results" / "few", kept / "few")
+    first = read_study(few / "few.toml").cases[0]
+    path = kept / "few" / f"{first.name}.h5"
+    stages = json.loads(json.dumps(read_result(path).record["stages"]))
+    # As if 7 had been the default before.
+    stages[0]["variables"]["drag"] = 7
+    made_by(path, stages=stages)
+    text = (few / "few.toml").read_text().replace("[1, 2]", "1")
+    both = tmp_path / "few.toml"
+    both.write_text(f"{text}\n[[rows]]\n[[rows]]\ndrag = 7\n")
+    assert adopt_results(read_study(both), Folder(tmp_path / "both"), kept) == 0
+    # Alone it is that of the case with the value that it had.
+    both.write_text(f"{text}\n[[rows]]\ndrag = 7\n")
+    assert adopt_results(read_study(both), Folder(tmp_path / "one"), kept) == 1
+
+
+def test_what_has_all_values_comes_before_what_had_other_defaults(
+    few: Path, tmp_path: Path
+) -> None:
+    """Both are of the case where any code will do."""
+    kept = tmp_path / "kept"
+    shutil.copytree(few / "out" / "results" / "few", kept / "few")
+    path = results_of(few)[0]
+    stages = json.loads(json.dumps(read_result(path).record["stages"]))
+    stages[0]["variables"]["drag"] = 7
+    other = kept / "few" / "a.h5"
+    shutil.copyfile(path, other)
+    made_by(other, stages=stages)
+    study = read_study(with_common_phases(few, tmp_path))
+    folder = Folder(tmp_path / "out")
+    assert adopt_results(study, folder, kept, of_any_code=True) == 2
+    assert all(one.variables["drag"] != 7 for one in gather_results(study, folder).results)
+
+
+def test_a_case_with_a_file_knows_its_results_by_their_names(few: Path, tmp_path: Path) -> None:
+    """A record does not tell what was in the file."""
+    kept = tmp_path / "kept"
+    shutil.copytree(few / "out" / "results" / "few", kept / "few")
+    (tmp_path / "my.data").write_text("")
+    path = results_of(few)[0]
+    stages = json.loads(json.dumps(read_result(path).record["stages"]))
+    for part in ("variables", "values"):
+        stages[0][part] |= {"start": "inputs/my.data", "particles": 1000}
+    text = (few / "few.toml").read_text().replace("particles = 30\n", "start = './my.data'\n")
+    (tmp_path / "few.toml").write_text(text.replace("[1, 2]", "1"))
+    study = read_study(tmp_path / "few.toml")
+    made_by(kept / "few" / path.name, stages=stages)
+    assert study.cases[0].is_of({"stages": stages}, of_any_code=True)
+    out = Folder(tmp_path / "out")
+    assert adopt_results(study, out, kept, of_any_code=True) == 0
+    (kept / "few" / path.name).rename(kept / "few" / f"{study.cases[0].name}.h5")
+    assert adopt_results(study, out, kept, of_any_code=True) == 1
 
 
 def test_stored_results_of_a_fix_with_the_same_runs_are_taken(few: Path, tmp_path: Path) -> None:

@@ -121,6 +121,9 @@ def of_frames(name: str, choose: Callable[[list[str]], list[str]], said: str) ->
     return frames(name, choose), f"{name}: {said}"
 
 
+# The run of the second phase in a log: before it are one at the start and the two of the first
+# phase, of the fall and of what is left after it, which is nothing here.
+SECOND_PHASE = 3
 TOLD = r"that log\.lammps tells of"
 # What is damaged: what is said where the run is measured, looked at, exported. Runs that were
 # started by hand have no record; nothing else may say less.
@@ -182,15 +185,15 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
         f"{LOG}: its end is missing, and what is there does not tell of {PARTICLES} and",
     ),
     "a log cut in a run": (
-        lines(lambda log: log[: place(log, "Loop", 2)]),
+        lines(lambda log: log[: place(log, "Loop", SECOND_PHASE)]),
         f"{LOG}: nothing after step 100 of the run that begins at step 20: it is still under way",
     ),
     "a log cut between runs": (
-        lines(lambda log: log[: place(log, "Loop", 2) + 1]),
+        lines(lambda log: log[: place(log, "Loop", SECOND_PHASE) + 1]),
         f"{LOG}: its end is missing, and what is there does not tell of {CONTACTS}: it is still",
     ),
     "a log without a run": (
-        without_run(2),
+        without_run(SECOND_PHASE),
         f"{LOG}, line .*: a run begins at step 100, but the one before it ended at step 20",
     ),
     "a log without a line": (
@@ -374,7 +377,7 @@ def test_a_run_that_goes_on_can_be_looked_at(
     """What the log does not tell yet is no mistake, where contacts are counted by distance."""
     run, _ = runs
     (run / "finished.json").unlink()
-    lines(lambda log: log[: place(log, "Loop", 2) - 3])(run)
+    lines(lambda log: log[: place(log, "Loop", SECOND_PHASE) - 3])(run)
     frames(PARTICLES, lambda f: f[:-1])(run)
     command = ["look", str(run), *BOX, "--points", "1000", "--no-picture"]
     said = refusal(capsys, *command)

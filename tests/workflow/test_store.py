@@ -8,6 +8,7 @@ import hashlib
 import io
 import random
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from lammps_inelastic.workflow.running.folder import Folder
 from lammps_inelastic.workflow.running.one_case import Options
 from lammps_inelastic.workflow.running.run_and_gather import run_and_gather
 from lammps_inelastic.workflow.shipped import shipped_studies
-from lammps_inelastic.workflow.study import Study, read_study
+from lammps_inelastic.workflow.study import Case, Study, read_study
 
 
 def result_of(case: str, /, **variables: Any) -> Result:
@@ -204,8 +205,15 @@ def test_results_are_gathered_by_one_at_a_time(
     def write(*_: object) -> None:
         held.append(is_held())
 
+    def look(study: Study, *_: object) -> Iterator[tuple[Case, Result]]:
+        gather(study)
+        yield from ()
+
     place = f"lammps_inelastic.workflow.{module}"
-    monkeypatch.setattr(f"{place}.gather_results", gather)
+    if module == "running.run_and_gather":
+        monkeypatch.setattr(f"{place}.results_of", look)
+    else:
+        monkeypatch.setattr(f"{place}.gather_results", gather)
     monkeypatch.setattr(f"{place}.write_studies", write)
     if module == "cli.collect":
         assert main(["collect", "table-1", "--out", str(tmp_path)]) == 0

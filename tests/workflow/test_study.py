@@ -9,12 +9,21 @@ from typing import Any
 
 import pytest
 
+from lammps_inelastic.workflow.decks import find_deck
 from lammps_inelastic.workflow.errors import StudyError, WorkflowError
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.running.folder import Folder
 from lammps_inelastic.workflow.study import read_study
 
 HEAD = 'title = "t"\ndeck = "spheres"\n'
+# A run of 824 steps.
+STEPS = """[parameters]
+steps_agitated = 400
+steps_settling = 200
+steps_resting = 200
+steps_tightening = 20
+steps_measuring = 4
+"""
 DIGITS = "9" * 400
 
 
@@ -49,7 +58,7 @@ def mistakes_of(path: Path) -> list[str]:
             HEAD + "[outputs.profile]\naxes = 'x'",
             "outputs.profile.axes: no such key (did you mean axis?); allowed are axis, ",
         ),
-        (HEAD + "foo = 1", "foo: no such key; allowed are title, deck, parameters, rows, outputs"),
+        (HEAD + "foo = 1", "foo: no such key; allowed are title, deck, common, parameters, rows, "),
         (
             HEAD + "[parameters]\naspect_ratio = 1.5",
             "parameters.aspect_ratio: no variable of that name; allowed are spheres: particles, ",
@@ -129,7 +138,10 @@ def mistakes_of(path: Path) -> list[str]:
             HEAD + "[outputs]\npictures = ['0']",
             "must be a whole number from 0 to 92233720368547758",
         ),
-        (HEAD + "[outputs]\npictures = [825]", "it must be a step from 0 to 824, where the long"),
+        (
+            HEAD + STEPS + "[outputs]\npictures = [825]",
+            "it must be a step from 0 to 824, where the long",
+        ),
         (
             HEAD + "[outputs]\npictures = [0, 0]",
             "they must be at most 100 steps, each of them once",
@@ -242,7 +254,8 @@ def test_a_row_whose_deck_does_not_fit(write_study: Callable[..., Path]) -> None
 
 def test_pictures_of_the_longest_case(write_study: Callable[..., Path]) -> None:
     """Of a shorter one the last frame is drawn, so that a study may mix them."""
-    text = HEAD + "[parameters]\nsteps_settling = [100, 2000]\n[outputs]\npictures = [0, 2535]"
+    settling = "steps_settling = 200", "steps_settling = [100, 2000]"
+    text = HEAD + STEPS.replace(*settling) + "[outputs]\npictures = [0, 2535]"
     assert len(read_study(write_study(text)).cases) == 2
 
 
@@ -506,7 +519,10 @@ def test_combinations_row_by_row(write_study: Callable[..., Path]) -> None:
 def test_names_are_those_of_before_when_a_study_grows(write_study: Callable[..., Path]) -> None:
     before = read_study(write_study(HEAD + "[parameters]\nseed = [1, 2]")).cases
     # Another order, a variable at its default, more values, more rows, and a row twice.
-    grown = HEAD + "[parameters]\ndt = 0.01\nseed = [3, 2, 1]\n[[rows]]\n[[rows]]\n[[rows]]\ndrag=2"
+    dt = find_deck("spheres", Path()).parameters["dt"]
+    grown = (
+        HEAD + f"[parameters]\ndt = {dt}\nseed = [3, 2, 1]\n[[rows]]\n[[rows]]\n[[rows]]\ndrag=2"
+    )
     after = read_study(write_study(grown)).cases
     names = [case.name for case in after]
     assert len(set(names)) == len(names) == 6

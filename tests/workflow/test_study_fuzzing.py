@@ -39,6 +39,11 @@ tolerance = 0.005
 deck = "spheres"
 start = "random"
 
+[common]
+dt = 0.015
+[common.spheres]
+dt_resting = 0.03
+
 [outputs]
 box = [0.25, 0.75, 0.25, 0.75, 0.25, 0.75]
 points = 1000
@@ -144,6 +149,7 @@ OUTPUTS = st.dictionaries(
 STUDIES = st.fixed_dictionaries(
     {"title": st.just("t") | VALUES, "deck": DECKS | st.lists(DECKS, max_size=3) | VALUES},
     optional={
+        "common": TABLES | st.dictionaries(DECKS | LETTERS, TABLES | VALUES, max_size=3) | VALUES,
         "parameters": TABLES | VALUES,
         "rows": st.lists(TABLES, max_size=3) | VALUES,
         "outputs": OUTPUTS | VALUES,
@@ -179,9 +185,12 @@ def test_one_value_of_any_kind(name: str, value: object, tmp_path: Path) -> None
         ("tolerance = 0.005", "tolerance = -1", "rows[1].tolerance", 12),
         ('start = "random"', 'start = "random"\nfoo = 1', "rows[2].foo", 16),
         ('"spheres"', '"sphere"', "rows[2].deck", 14),
-        ("points = 1000", "points = 0", "outputs.points", 19),
-        ('axis = "x"', 'axis = "w"', "outputs.profile.axis", 22),
-        ("thickness = 0.1", "axes = 1", "outputs.profile.axes", 23),
+        ("dt = 0.015", "dt = [1]", "common.dt", 18),
+        ("dt_resting = 0.03", "dt_resting = 3", "common.spheres.dt_resting", 20),
+        ("[common.spheres]", "[common.sphere]", "common.sphere", 19),
+        ("points = 1000", "points = 0", "outputs.points", 24),
+        ('axis = "x"', 'axis = "w"', "outputs.profile.axis", 27),
+        ("thickness = 0.1", "axes = 1", "outputs.profile.axes", 28),
         ('deck = ["dimers", "settling"]', "deck = 5", "deck", 2),
         ('title = "', 'titel = "', "titel", 1),
     ],

@@ -4,9 +4,11 @@
     cases/CASE.part/       a run that is under way, or that was cut off
     cases/CASE.failed/     the last run that failed, with its log
     cases/CASE.damaged/    a run whose finished.json could not be read
+    cases/CASE.earlier/    a run of a deck with other defaults, which the one of today's replaces
     cases/.locks/CASE      locked while somebody runs or measures the case
     cases/.locks/results   locked while somebody gathers results
-    results/STUDY/CASE.h5  what was measured of it; CASE.h5.damaged where that could not be read
+    results/STUDY/CASE.h5  what was measured of it; CASE.h5.damaged where that could not be read,
+                           CASE.h5.earlier where it was of a deck with other defaults
     STUDY.h5               all results of a study
 
 Everything gets its name by a rename when it is complete: whatever is cut off, at any moment, leaves
@@ -37,6 +39,9 @@ State = Literal["measured", "finished", "running", "cut off", "failed", "missing
 
 UNKNOWN = "unknown"
 FAILED = "failed.json"
+# What is set aside gets one of these endings.
+DAMAGED, EARLIER = "damaged", "earlier"
+OTHER_DEFAULTS = "of a deck with other defaults than today's"
 
 
 @dataclass(frozen=True)
@@ -47,10 +52,12 @@ class Found:
     ----------
     measured : whether it is a result, of what the study asks for now
     damage : what is wrong with it; None if it can be read, or nothing is there
+    earlier : whether it is a result of a deck with other defaults
     """
 
     measured: bool = False
     damage: str | None = None
+    earlier: bool = False
 
 
 NOTHING = Found()
@@ -117,7 +124,10 @@ class Folder:
             outputs, record = origin_of(path)
         except WorkflowError as error:
             return Found(damage=str(error)) if os.path.lexists(path) else NOTHING
-        return Found(measured=answers(study, case, outputs, record, of_any_code))
+        return Found(
+            measured=answers(study, case, outputs, record, of_any_code),
+            earlier=not case.is_of(record, of_any_code),
+        )
 
     def is_measured(self, study: Study, case: Case) -> bool:
         """Say whether there is a result, of what the study asks for now."""
@@ -129,9 +139,10 @@ class Folder:
         return case.is_of(record) and is_file(self.case(case) / PARTICLES)
 
     def set_aside(self, study: Study, case: Case, found: Found) -> list[str]:
-        """Rename a result and a finished run that cannot be read; return a line about each.
+        """Rename a result and a run that cannot be read or are of other defaults of the decks.
 
-        Nothing of them is lost, and nothing of them is in the way. The case must be locked.
+        Nothing of them is lost, and nothing of them is in the way. The case must be locked. Returns
+        a line about each.
 
         Parameters
         ----------
@@ -139,11 +150,18 @@ class Folder:
         found : what `found` has returned of it
         """
         lines = []
+        result, run = self.result(study, case), self.case(case)
         if found.damage:
-            lines.append(f"{found.damage}; kept as {_renamed(self.result(study, case)).name}")
-        run = self.case(case)
-        if run.is_dir() and json_of(run / FINISHED) is None:
-            lines.append(f"{run / FINISHED}: cannot be read; kept as {_renamed(run).name}")
+            lines.append(f"{found.damage}; kept as {_renamed(result, DAMAGED).name}")
+        elif found.earlier:
+            lines.append(f"{result}: {OTHER_DEFAULTS}; kept as {_renamed(result, EARLIER).name}")
+        if run.is_dir():
+            record = json_of(run / FINISHED)
+            if record is None:
+                kept = _renamed(run, DAMAGED).name
+                lines.append(f"{run / FINISHED}: cannot be read; kept as {kept}")
+            elif not case.is_of(record):
+                lines.append(f"{run}: {OTHER_DEFAULTS}; kept as {_renamed(run, EARLIER).name}")
         return lines
 
     def obstacles(self, study: Study, cases: Iterable[Case]) -> list[str]:
@@ -291,11 +309,11 @@ def place_of(folder: Path, case: Case, ending: str = "") -> Path:
     return before if os.path.lexists(before) and not os.path.lexists(path) else path
 
 
-def _renamed(path: Path) -> Path:
-    """Rename something damaged so that it can be looked at; return its new name."""
+def _renamed(path: Path, ending: str) -> Path:
+    """Rename something so that it can be looked at, and is not in the way; return its new name."""
     number = 1
     while os.path.lexists(
-        target := path.with_name(f"{path.name}.damaged{'' if number == 1 else number}")
+        target := path.with_name(f"{path.name}.{ending}{'' if number == 1 else number}")
     ):
         number += 1
     with writing(target):

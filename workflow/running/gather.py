@@ -5,25 +5,35 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from ..errors import WorkflowError
 from ..files import whole
 from ..provenance.finished import other_run
 from ..provenance.run_record import differs
 from ..provenance.same_runs import same_runs
-from ..results.store import StoredStudy, origin_of, read_result
-from ..study import Study
-from .folder import Folder, answers, place_of
+from ..results.store import Result, StoredStudy, read_result
+from ..study import Case, Study
+from .folder import Folder, answers
+from .kept_results import KeptResults
 
 
 def gather_results(study: Study, folder: Folder, of_any_code: bool = False) -> StoredStudy:
-    """Return the results that there are of a study, in the order of its cases.
+    """Return the results that there are of a study; the parameters are those of `results_of`."""
+    results = [result for _, result in results_of(study, folder, of_any_code)]
+    return StoredStudy(study.name, study.title, study.text, results)
+
+
+def results_of(
+    study: Study, folder: Folder, of_any_code: bool = False
+) -> Iterator[tuple[Case, Result]]:
+    """Return the cases of a study that have a result, in their order, and what that is.
 
     A damaged result is left out, and named on stderr. Results of decks with other defaults are
-    there if they may be `of_any_code`.
+    there if they may be `of_any_code`. A stored result may have an earlier name of its case.
     """
-    results = []
     for case in study.cases:
         path = folder.result(study, case)
         if not os.path.lexists(path):
@@ -34,10 +44,9 @@ def gather_results(study: Study, folder: Folder, of_any_code: bool = False) -> S
             print(f"inelastic: left out: {damage}", file=sys.stderr)
             continue
         if answers(study, case, result.outputs, result.record, of_any_code):
-            results.append(result)
+            yield case, result
             if said := other_run(folder.case(case), result.record):
                 print(f"WARNING: {path} is {said}; delete it to measure that", file=sys.stderr)
-    return StoredStudy(study.name, study.title, study.text, results)
 
 
 def other_code(count: int, folder: Path) -> str:
@@ -52,6 +61,8 @@ def other_code(count: int, folder: Path) -> str:
 def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool = False) -> int:
     """Copy results that were kept elsewhere, for cases that have none; return how many.
 
+    A copy gets the name that its case has today.
+
     Parameters
     ----------
     study : study whose results they are
@@ -62,28 +73,24 @@ def adopt_results(study: Study, folder: Folder, source: Path, of_any_code: bool 
 
     Raises WorkflowError if that file is not as it must be.
     """
-    count = other = 0
     same = same_runs(source)
-    for case in study.cases:
-        kept = place_of(source / study.name, case, ".h5")
-        target = folder.result(study, case)
-        found = folder.found(study, case, of_any_code)
-        if found.measured or not kept.is_file():
+    kept = KeptResults(study, source / study.name)
+    found = {case.name: folder.found(study, case, of_any_code) for case in study.cases}
+    cases = [case for case in study.cases if not found[case.name].measured]
+
+    def is_of_this_code(case: Case, _outputs: str, record: Mapping[str, Any]) -> bool:
+        return of_any_code or not differs(case, record, same)
+
+    files = kept.of_cases(cases, of_any_code, is_of_this_code)
+    for case in cases:
+        if case.name not in files:
             continue
-        try:
-            outputs, record = origin_of(kept)
-        except WorkflowError as error:
-            print(f"not taken: {error}")
-            continue
-        fits = answers(study, case, outputs, record, of_any_code)
-        if not fits or (not of_any_code and differs(case, record, same)):
-            other += 1
-            continue
-        for line in folder.set_aside(study, case, found):
+        for line in folder.set_aside(study, case, found[case.name]):
             print(line)
-        with whole(target) as temporary:
-            shutil.copyfile(kept, temporary)
-        count += 1
-    if other:
+        with whole(folder.result(study, case)) as temporary:
+            shutil.copyfile(files[case.name], temporary)
+    left = [case for case in cases if case.name not in files]
+    others = kept.of_cases(left, True, lambda *_: True)
+    if other := sum(case.name in others or kept.has(case) for case in left):
         print(f"not taken: {other}, of other versions of the fix, of the decks or of the study")
-    return count
+    return len(files)

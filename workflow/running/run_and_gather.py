@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from ..progress import Display
 from ..provenance.run_record import differs
-from ..results.store import write_studies
+from ..results.store import StoredStudy, write_studies
 from ..study import Case, Study
 from .folder import Folder
-from .gather import gather_results, other_code
+from .gather import other_code, results_of
 from .launch import run_study
 from .one_case import Options, Outcome
 
@@ -47,10 +47,10 @@ def run_and_gather(
         print_outcome(study, outcome)
         file = folder.root / f"{study.name}.h5"
         with folder.gathering():
-            stored = gather_results(study, folder)
-            write_studies(file, [stored])
-        by_name = {case.name: case for case in study.cases}
-        if other := sum(bool(differs(by_name[one.case], one.record)) for one in stored.results):
+            found = list(results_of(study, folder))
+            results = [result for _, result in found]
+            write_studies(file, [StoredStudy(study.name, study.title, study.text, results)])
+        if other := sum(bool(differs(case, result.record)) for case, result in found):
             print(other_code(other, folder.result_folder(study)))
         print(f"results: {file}")
     return outcome

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -44,15 +44,23 @@ class Stage:
     ----------
     deck : the deck
     values : variables that are not left at their defaults, with their values
+    common : values that all cases of the study have where they have none of their own
     """
 
     deck: Deck
     values: Mapping[str, Value]
+    common: Mapping[str, Value] = field(default_factory=dict)
 
     @property
     def variables(self) -> dict[str, Value]:
         """All variables of the deck that are a study's to choose, with their values."""
         return {**self.deck.parameters, **self.values}
+
+    @property
+    def shown(self) -> dict[str, Value]:
+        """The variables that a name shows: not at the default or at the common value."""
+        usual = {**self.deck.parameters, **self.common}
+        return {name: v for name, v in self.variables.items() if v != usual[name]}
 
     @property
     def unused(self) -> frozenset[str]:
@@ -99,7 +107,7 @@ class Case:
     @property
     def _stages_set(self) -> list[dict[str, Any]]:
         return [
-            {"deck": stage.deck.name, "values": stage.values, "variables": stage.variables}
+            {"deck": stage.deck.name, "values": stage.shown, "variables": stage.variables}
             for stage in self.stages
         ]
 
@@ -149,6 +157,23 @@ class Case:
             or (of_any_code and name not in values and name not in stage.values)
             for (before, values), stage in zip(made, self.stages, strict=True)
             for name, value in stage.variables.items()
+        )
+
+    def is_run_of(self, record: Any, of_any_code: bool = False) -> bool:
+        """Say whether a run is of this case, whatever its name is: of its decks and all its values.
+
+        What one of them sets, the other must know. A record does not tell what was in the files
+        that decks read: runs of a case with such files are known by their names alone. The
+        parameters are those of `is_of`.
+        """
+        if self.inputs or not self.is_of(record, of_any_code):
+            return False
+        ours = all(stage.deck.shipped for stage in self.stages)
+        return (ours or record.get("fingerprint") == self.fingerprint) and all(
+            made.get("deck") == stage.deck.name
+            and set(made.get("values", ())) <= stage.variables.keys()
+            and stage.values.keys() <= set(made["variables"])
+            for made, stage in zip(record["stages"], self.stages, strict=True)
         )
 
     def folder_of(self, stage: Stage) -> str:
@@ -201,15 +226,27 @@ class Study:
     warnings: tuple[str, ...] = ()
 
 
-def stage_of(deck: Deck, values: Mapping[str, Value]) -> Stage:
-    """Return a deck with those of the values that it knows and that are not its defaults."""
+def stage_of(
+    deck: Deck, values: Mapping[str, Value], common: Mapping[str, Value] | None = None
+) -> Stage:
+    """Return a deck with those of the values that it knows and that are not its defaults.
+
+    Parameters
+    ----------
+    deck : the deck
+    values : values of the case
+    common : values of the deck that all cases of the study have where `values` has none
+    """
+    common = common or {}
+    given = {**common, **values}
     return Stage(
         deck,
         {
-            name: values[name]
+            name: given[name]
             for name, default in deck.parameters.items()
-            if name in values and values[name] != default
+            if name in given and given[name] != default
         },
+        common,
     )
 
 

@@ -33,8 +33,8 @@ def name_of(stages: Sequence[Mapping[str, Any]], digest: str) -> str:
 
     Parameters
     ----------
-    stages : decks in the order in which they run, each with `deck`, `values` (variables that are
-        not left at their defaults) and `variables` (all of them), as a run's record has them
+    stages : decks in the order in which they run, each with `deck`, `values` (variables that the
+        name shows) and `variables` (all of them)
     digest : hash of all that is set, DIGEST_LENGTH characters
     """
     deck, shown = _words_of(stages)

@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from ..decks import Deck, Value, file_of, find_deck
-from ..errors import WorkflowError, meant
+from ..errors import WorkflowError
 from ..files import is_file, read_regular
 from ..shipped import DECKS
 from .case import Case, Input, is_word, stage_of
 from .case_name import INPUTS
+from .common import Common
 from .file_format import StudyFile
 from .stages import misfit
-from .values import MOST_CASES, values_of
+from .values import MOST_CASES, unknown_variable, values_of
 
 # A larger deck is some other file [bytes].
 LARGEST_DECK = 1_000_000
@@ -42,6 +43,8 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
     seen: dict[str, str] = {}
     files: dict[Path, Input] = {}
     missing = False
+    every, common = _all_decks(file, folder), Common(file.common)
+    common.check(every, folder, mistakes)
     for number, values in enumerate(file.rows or [{}], 1):
         where = f"rows[{number}]" if file.rows else "parameters"
         deck_key = f"{where}.deck" if "deck" in values else "deck"
@@ -51,7 +54,7 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
             mistakes.append(f"{deck_key}: {error}")
             missing = True
             continue
-        row = _row(where, deck_key, decks, values, file.parameters)
+        row = _row(where, deck_key, decks, values, file.parameters, common)
         known |= row.known
         choices = _choices(row, folder, mistakes)
         if mistakes:
@@ -68,14 +71,15 @@ def cases_of(file: StudyFile, folder: Path, mistakes: list[str]) -> Iterator[Cas
     if missing:
         # The variables of a deck that was not found are not known.
         return
+    mistakes += common.unknown(every)
     for name in file.parameters:
         if name not in known:
-            mistakes.append(_unknown(f"parameters.{name}", _all_decks(file, folder)))
+            mistakes.append(unknown_variable(f"parameters.{name}", every))
 
 
 @dataclass(frozen=True)
 class _Row:
-    """A row of a study file, with the parameters that all rows share.
+    """A row of a study file, with the parameters that all rows share, and the common values.
 
     Attributes
     ----------
@@ -83,8 +87,9 @@ class _Row:
     deck_key : key under which its decks stand
     decks : its decks
     wanted : what the file says of each parameter, by its name
-    keys : key under which it says so, by the same names
+    keys : key under which it says so, and under which a common value stands, by its name
     own : names of the parameters that the row itself gives
+    common : values that all cases have where there is none of these
     """
 
     where: str
@@ -93,6 +98,7 @@ class _Row:
     wanted: Mapping[str, Any]
     keys: Mapping[str, str]
     own: Sequence[str]
+    common: Common
 
     @property
     def known(self) -> set[str]:
@@ -106,26 +112,33 @@ def _row(
     decks: Sequence[Deck],
     values: Mapping[str, Any],
     shared: Mapping[str, Any],
+    common: Common,
 ) -> _Row:
-    """Return a row of a study file: what it says itself comes before what all rows share."""
+    """Return a row of a study file: what it says itself comes before what all rows share.
+
+    The values that all cases have in common come last.
+    """
     own = {name: value for name, value in values.items() if name != "deck"}
     others = {name: value for name, value in shared.items() if name not in own}
-    keys = {name: f"parameters.{name}" for name in others}
+    keys = common.keys(decks) | {name: f"parameters.{name}" for name in others}
     keys |= {name: f"{where}.{name}" for name in own}
-    return _Row(where, deck_key, decks, {**others, **own}, keys, list(own))
+    return _Row(where, deck_key, decks, {**others, **own}, keys, list(own), common)
 
 
 def _choices(row: _Row, folder: Path, mistakes: list[str]) -> dict[str, list[Value]]:
     """Return the values of each parameter that the decks of a row have, by its name."""
     mistakes += [
-        _unknown(f"{row.where}.{name}", row.decks) for name in row.own if name not in row.known
+        unknown_variable(f"{row.where}.{name}", row.decks)
+        for name in row.own
+        if name not in row.known
     ]
     choices = {
         name: values_of(row.keys[name], name, value, row.decks, folder, mistakes)
         for name, value in row.wanted.items()
         if name in row.known
     }
-    if "particles" in choices and _starts_from_file(row.decks, choices, folder):
+    usual = {name: [v] for deck in row.decks for name, v in row.common.of(deck).items()}
+    if "particles" in choices | usual and _starts_from_file(row.decks, usual | choices, folder):
         mistakes.append(
             f"{row.keys['particles']}: not allowed where start is a file, which has a number of "
             "particles of its own; give it in rows with another start"
@@ -145,7 +158,7 @@ def _combined(
     """Return the cases of a row, one for each combination of the values of its parameters."""
     for combination in itertools.product(*choices.values()):
         try:
-            case = _case(row.decks, dict(zip(choices, combination, strict=True)), folder, files)
+            case = _case(row, dict(zip(choices, combination, strict=True)), folder, files)
         except WorkflowError as error:
             mistakes.append(f"{row.where}: {error}")
             return
@@ -204,26 +217,33 @@ def _all_decks(file: StudyFile, folder: Path) -> list[Deck]:
     return list(decks.values())
 
 
-def _unknown(key: str, decks: Sequence[Deck]) -> str:
-    """Say that no deck has a variable of the name that a key gives."""
-    if not decks:
-        return f"{key}: no deck knows it"
-    allowed = "; ".join(f"{deck.name}: {', '.join(deck.parameters) or 'none'}" for deck in decks)
-    names = [name for deck in decks for name in deck.parameters]
-    near = meant(key.rpartition(".")[2], names)
-    return f"{key}: no variable of that name{near}; allowed are {allowed}"
-
-
-def _case(
-    decks: Sequence[Deck], values: dict[str, Value], folder: Path, files: dict[Path, Input]
-) -> Case:
+def _case(row: _Row, values: Mapping[str, Value], folder: Path, files: dict[Path, Input]) -> Case:
     """Return a case; `files` holds those that have been read, so that each is read once.
 
     Raises WorkflowError if a file cannot be read, or if two have the same name.
     """
     inputs: dict[str, Input] = {}
-    for name in values:
-        path = file_of(decks, name, values[name], folder)
+    own = _with_inputs(row.decks, values, folder, files, inputs)
+    stages = []
+    for deck in row.decks:
+        common = row.common.of(deck)
+        left = {name: value for name, value in common.items() if name not in own}
+        common |= _with_inputs([deck], left, folder, files, inputs)
+        stages.append(stage_of(deck, own, common))
+    return Case(tuple(stages), inputs)
+
+
+def _with_inputs(
+    decks: Sequence[Deck],
+    values: Mapping[str, Value],
+    folder: Path,
+    files: dict[Path, Input],
+    inputs: dict[str, Input],
+) -> dict[str, Value]:
+    """Return values with the files among them as decks find them; `inputs` gets these files."""
+    found = dict(values)
+    for name, value in values.items():
+        path = file_of(decks, name, value, folder)
         if path is None:
             continue
         if path not in files:
@@ -233,5 +253,5 @@ def _case(
                 raise WorkflowError(f"{path}: {error.strerror}") from None
         if inputs.setdefault(path.name, files[path]) != files[path]:
             raise WorkflowError(f"two files are named {path.name}; rename one of them")
-        values[name] = f"{INPUTS}/{path.name}"
-    return Case(tuple(stage_of(deck, values) for deck in decks), inputs)
+        found[name] = f"{INPUTS}/{path.name}"
+    return found

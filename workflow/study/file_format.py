@@ -126,10 +126,11 @@ class Outputs(_Table):
 
 
 class StudyFile(_Table):
-    """The whole of a study file; parameters and rows are checked against the decks later."""
+    """The whole of a study file; values are checked against the decks later."""
 
     title: str
     deck: str | list[str]
+    common: dict[str, Any] = {}
     parameters: dict[str, Any] = {}
     rows: list[dict[str, Any]] = []
     outputs: Outputs = Outputs()

@@ -3,6 +3,11 @@
     title = "Packing fraction against aspect ratio"
     deck  = "dimers"                     # spheres, dimers, clusters, a file, or several in turn
 
+    [common]                             # optional: a value each for all cases; no name shows it
+    dt = 0.01
+    [common.dimers]                      # the same for one deck
+    dt_resting = 0.03
+
     [parameters]                         # variables of the deck: a value, a list or a range each
     particles    = 2000
     diameter     = 0.085

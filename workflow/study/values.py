@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..decks import Deck, Value, file_of
+from ..errors import meant
 from .case import is_word
 
 # A study of more cases, or a parameter of more values, is a slip of the pen.
@@ -53,6 +54,16 @@ def values_of(
             if not refusing and isinstance(each, int) and abs(each) >= 2**63:
                 mistakes.append(f"{key}: {each} is not allowed: whole numbers must be below 2^63")
     return values
+
+
+def unknown_variable(key: str, decks: Sequence[Deck]) -> str:
+    """Say that no deck has a variable of the name that a key gives."""
+    if not decks:
+        return f"{key}: no deck knows it"
+    allowed = "; ".join(f"{deck.name}: {', '.join(deck.parameters) or 'none'}" for deck in decks)
+    names = [name for deck in decks for name in deck.parameters]
+    near = meant(key.rpartition(".")[2], names)
+    return f"{key}: no variable of that name{near}; allowed are {allowed}"
 
 
 def _range(key: str, value: Mapping[str, Any], mistakes: list[str]) -> list[Value]:

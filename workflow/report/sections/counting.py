@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -119,7 +120,7 @@ def cause(data: Data, solver: str) -> str:
 def counted_at_its_own(data: Data) -> dict[float, list[Result]]:
     """Return the agitated runs of our solver whose contacts are counted at their own tolerance.
 
-    They are those with the time steps of the deck, by tolerance.
+    They are those with the time steps of Table 1, by tolerance.
     """
     runs = {
         result.case: result
@@ -127,14 +128,25 @@ def counted_at_its_own(data: Data) -> dict[float, list[Result]]:
         for result in data.results(study)
         if is_agitated(result) and solver_of(result) == data.our_solver
     }
-    usual = tuple(deck_defaults(SPHERES)[name] for name in STEPS)
+    usual = _usual_steps(data)
     own = [
         r
         for r in runs.values()
-        if r.setting("tolerance_measuring") == r.setting("tolerance")
-        and tuple(map(r.setting, STEPS)) == usual
+        if r.setting("tolerance_measuring") == r.setting("tolerance") and _steps_of(r) == usual
     ]
     return grouped(own, by_value("tolerance"))
+
+
+def _usual_steps(data: Data) -> tuple[float, ...]:
+    """Return the time steps of most runs of Table 1; of today's deck where there are none."""
+    found = Counter(map(_steps_of, data.results("table-1")))
+    if found:
+        return found.most_common(1)[0][0]
+    return tuple(float(deck_defaults(SPHERES)[name]) for name in STEPS)
+
+
+def _steps_of(result: Result) -> tuple[float, ...]:
+    return tuple(map(result.setting, STEPS))
 
 
 def _loosest(data: Data) -> Mapping[str, Any]:
