@@ -3,6 +3,7 @@
 `python -m tests.tables NAME` prints one of them. `contacts` shows the coordination number of
 spheres against time step, tolerance and solver, `loose` the same at a loose tolerance against
 solver and accuracy, `accuracy` the time of a run and the error of each grain against the accuracy,
+`forces` the error of single contact forces against tolerance and accuracy,
 `near` the coordination number of dimers that are almost spheres against the tolerance, `network`
 the floppy modes and states of self-stress of measured contacts, `start` a regular start of dimers
 beside a random one, `inertia` point masses beside solid spheres, `turning` the look at the end of
@@ -26,14 +27,16 @@ import matplotlib
 import numpy as np
 from PIL import Image
 
+from lammps_inelastic import core
 from lammps_inelastic.analysis import ParticleDump, draw_packing, read_run_log
 from lammps_inelastic.analysis.pictures import few_colours
 from lammps_inelastic.analysis.run_log import Run as RunOfLog
+from lammps_inelastic.workflow.tradeoff.states import records_in
 from tests.benchmark.scenes_without import TURNING, build
 from tests.helpers.beds import BEDS, at_rest
 from tests.helpers.convergence import ACCURACIES, STEPS, TOLERANCES
 from tests.helpers.convergence import SCENES as EXACT
-from tests.helpers.grainwise import FEW, compare_folder, largest_but
+from tests.helpers.grainwise import FEW, compare_folder, largest_but, solve
 from tests.helpers.pouring import (
     DeckError,
     Packing,
@@ -149,16 +152,17 @@ def loose(seeds: int) -> Iterator[str]:
     yield "| solver | accuracy | packing fraction % | coordination number |"
     yield "|---|---|---|---|"
     for solver, accuracy in LOOSE:
-        deck = shipped_deck("spheres").replace("shorten yes", f"shorten yes accuracy {accuracy}")
         variables = {
             "solver": solver,
+            "accuracy": accuracy,
+            "accuracy_measuring": accuracy,
             "tolerance": 0.005,
             "tolerance_measuring": 0.005,
             # One time step from start to end
             "dt_resting": 0.01,
             "dt_measuring": 0.01,
         }
-        yield f"| {solver} | {accuracy} | {row(pour(variables, seeds, deck))} |"
+        yield f"| {solver} | {accuracy} | {row(pour(variables, seeds))} |"
 
 
 def accuracy(seeds: int) -> Iterator[str]:
@@ -169,12 +173,13 @@ def accuracy(seeds: int) -> Iterator[str]:
     )
     yield "|---|---|---|---|---|---|---|"
     for value in (0.001, 0.003, 0.01, 0.03, 0.1, 0.3):
-        deck = shipped_deck("spheres").replace("shorten yes", f"shorten yes accuracy {value}")
+        deck = recording(shipped_deck("spheres"), 10)
+        variables = {"accuracy": value, "accuracy_measuring": value, "dump_every": 100000}
         packings, compared = [], []
         for seed in range(1, seeds + 1):
             with tempfile.TemporaryDirectory() as name:
                 folder = Path(name)
-                log = run_deck(folder, recording(deck, 10), {"dump_every": 100000, "seed": seed})
+                log = run_deck(folder, deck, {**variables, "seed": seed})
                 packings.append((summed(projections(log)), measure(folder)))
                 compared += compare_folder(folder)
         iterations = statistics.mean(run.iterations / run.projections for run, _ in packings)
@@ -185,6 +190,69 @@ def accuracy(seeds: int) -> Iterator[str]:
             f"| {value:g} | {iterations:.0f} | {seconds:.1f} | {error:.4f} | {nearly:.2f} | "
             f"{row([packing for _, packing in packings])} |"
         )
+
+
+# Of forces: tolerances of the count [radii], with the deck's accuracy there; and accuracies up to
+# the end of the resting phase, at the deck's tolerance.
+COUNTED_AT = (1e-4, 1e-5, 1e-6, 1e-7)
+RESTED_WITH = (0.001, 0.03, 0.1)
+
+
+def forces(seeds: int) -> Iterator[str]:
+    """Print how exact single contact forces are, at rest and in the count."""
+    yield (
+        "| moment | eps / r | A | sum of errors / sum of forces % | largest error [weights] | "
+        "false contacts % | missed % | seconds |"
+    )
+    yield "|---|---|---|---|---|---|---|---|"
+    deck = recording(shipped_deck("spheres"), 1)
+    for tolerance in COUNTED_AT:
+        variables = {"tolerance_measuring": tolerance}
+        yield forces_row(f"count | {tolerance:g} | 0.001", deck, variables, seeds, counts=True)
+    for value in RESTED_WITH:
+        variables = {"accuracy": value}
+        yield forces_row(f"rest | 0.0005 | {value:g}", deck, variables, seeds, counts=False)
+
+
+def forces_row(
+    title: str, deck: str, variables: Mapping[str, object], seeds: int, *, counts: bool
+) -> str:
+    """Return a row of medians over the seeds: of the last step of the count, or of rest."""
+    found: list[tuple[float, ...]] = []
+    for seed in range(1, seeds + 1):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            log = run_deck(folder, deck, {**variables, "dump_every": 100000, "seed": seed})
+            seconds = sum(run.seconds for run in projections(log)[-3:])
+            records = [core.read_record(path) for path in records_in(folder)]
+            # Rest is before the last phase, whose steps are the longest.
+            longest = max(record.problem.timestep for record in records)
+            record = [one for one in records if counts or one.problem.timestep < longest][-1]
+            found.append((*force_errors(record), seconds))
+    return (
+        f"| {title} | "
+        + " | ".join(f"{statistics.median(one):.2g}" for one in zip(*found, strict=True))
+        + " |"
+    )
+
+
+def force_errors(record: core.Record) -> tuple[float, float, float, float]:
+    """Return the errors of the impulses of a record against the exact ones.
+
+    The sum of their sizes over that of the exact impulses, percent; the largest, weights of a
+    sphere times the step; and contacts that are there in one of both alone, above a thousandth of
+    that, percent of the exact ones.
+    """
+    weight = 4 / 3 * np.pi * RADIUS**3 * GRAVITY * record.problem.timestep
+    exact, ours = solve(record).impulse, record.arrays["impulse"]
+    error = np.abs(ours - exact)
+    pushes, pushed = ours > 1e-3 * weight, exact > 1e-3 * weight
+    return (
+        100 * float(error.sum() / exact.sum()),
+        float(error.max() / weight),
+        100 * float((pushes & ~pushed).sum() / pushed.sum()),
+        100 * float((pushed & ~pushes).sum() / pushed.sum()),
+    )
 
 
 def dimer_row(packings: list[Packing], distance: float) -> str:
@@ -448,6 +516,7 @@ TABLES = {
     "contacts": contacts,
     "loose": loose,
     "accuracy": accuracy,
+    "forces": forces,
     "near": near,
     "network": network,
     "start": start,

@@ -103,8 +103,7 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, S
   Upkeep upkeep(result.iterations);
   ResidualTrend progress;
   Settling settling(sweeps, limits.accuracy > 0.0 && limits.coarseness == 1.0, result.iterations);
-  const long begun = result.iterations;
-  long refined = begun;
+  long begun = result.iterations, refined = begun;
   double first = 0.0, blur = 0.0;
   while (!solve.is_out_of_iterations()) {
     const swept::Swept mine = sweeps.sweep(momentum.next().along, blur, host);
