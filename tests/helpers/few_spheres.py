@@ -13,6 +13,7 @@ diameter = 0.2
 steps_agitated = 20
 steps_settling = 40
 steps_resting = 20
+waiting = 0
 steps_tightening = 10
 steps_measuring = 5
 dump_every = 20

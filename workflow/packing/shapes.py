@@ -104,10 +104,11 @@ class Dimer:
             "aspect_ratio": self.aspect_ratio,
             "inertia": "point",
             "tolerance_measuring": 2e-5,
-            "dt_resting": 0.03,
-            "steps_resting": 250,
-            "steps_tightening": 30,
-            "random_force": 200.0,
+            "steps_agitated": 280,
+            "steps_settling": 80,
+            "steps_resting": 40,
+            "steps_tightening": 12,
+            "random_force": 141.0,
         }
 
     @property
@@ -176,9 +177,11 @@ class Cluster:
             "extent": self.extent,
             "inertia": "solid",
             "tolerance_measuring": 2e-5,
-            "dt_resting": 0.05,
-            "steps_resting": 120,
-            "random_force": 200.0,
+            "steps_agitated": 280,
+            "steps_settling": 80,
+            "steps_resting": 40,
+            "steps_tightening": 12,
+            "random_force": 141.0,
         }
 
     @property
