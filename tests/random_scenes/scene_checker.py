@@ -1383,7 +1383,9 @@ class _Part:
         allowed[pulls] += np.abs(impulse[pulls]) * closes[pulls] / new.h
         allowed += np.maximum(0, impulse * motion) / new.h
         if "law restitution" in self.facts["words"]:
-            turned = np.where(u_before > 0, u_before - np.maximum(0, listed["gap"]) / new.h, 0.0)
+            # A gap within EPS counts as closed where it is (docs/method/tolerances.md).
+            open_by = np.where(listed["gap"] > self.eps, listed["gap"], 0.0)
+            turned = np.where(u_before > 0, u_before - open_by / new.h, 0.0)
             allowed += 0.5 * np.maximum(0, impulse) * np.maximum(0, turned)
             # docs/reference/laws.md: a hundredth of what contacts take and give; else it is halved.
             if "shorten" in self.facts["words"]:
