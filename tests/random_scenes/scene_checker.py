@@ -1313,8 +1313,8 @@ class _Part:
         is the target of a contact, here from above. Contacts that pull close gaps; those of
         restitution add half of lambda (n.u* - D / h) where surfaces were parting, with a gap D
         beyond EPS: what has turned past one another, or is pushed back to a wall, parts faster, u*,
-        than its gap has grown in a step; with `shorten` a cluster of them may add a hundredth of what contacts take and give.
-        What moves by itself works.
+        than its gap has grown in a step; with `shorten` a cluster of them may add a hundredth of
+        what contacts take and give. What moves by itself works.
         """
         if self.facts["warn"]:
             return
