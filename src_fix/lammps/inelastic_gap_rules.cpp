@@ -239,6 +239,14 @@ double GapRules::gap_at_end(std::size_t c, const std::vector<double> &velocity) 
   return contact.gap_now - row.wall_motion + step_.problem.timestep * opening;
 }
 
+void GapRules::stop_following_pulled(std::size_t c)
+{
+  Row &row = step_.rows[c];
+  if (!step_.may_pull(c) || row.as_at_start) return;
+  step_.problem.contacts.gap[c] = effective_gap(step_.contact_of(c)) - row.wall_motion;
+  row.as_at_start = true;
+}
+
 long GapRules::follow(std::size_t c, double exact_gap, bool too_deep)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;

@@ -54,6 +54,11 @@ class GapRules {
   // constraints changed.
   long follow(std::size_t c, double exact_gap, bool too_deep);
 
+  // Sets the gap of constraint c back to that of the start of the step if its contact may pull and
+  // its gap was set by the end of a round (inelastic_pulled_contacts.h): the wall there has since
+  // got another plane, and the gap was that of another motion.
+  void stop_following_pulled(std::size_t c);
+
   // Changes constraints of free spheres whose gaps these velocities leave open, or overlapping, by
   // more than the tolerance, since gaps that count as closed may be open or overlap. Such a
   // constraint then asks for its present gap; where the two overlap, first for an overlap of most

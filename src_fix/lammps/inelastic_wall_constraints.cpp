@@ -234,6 +234,7 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
     step_.excess = std::max(step_.excess, -gap_there);
     return 0;
   }
+  if (known) rules_.stop_following_pulled(existing->second);
   const int place = known ? step_.rows[existing->second].contact
                           : rows_.add_late(unseen, wall_motion, i, n);
   constraint_[key(i, view.piece)] = step_.problem.contacts.size();

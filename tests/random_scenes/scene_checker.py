@@ -175,13 +175,16 @@ def read_energy_told(screen: str) -> dict[int, int]:
 def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
     """Check all parts of a scene that ran in a folder. See `scene_generator` for the facts."""
     report = Report()
-    left = 0.0
+    # The overlaps that steps have left, of the last one and by its number: a restart file may be of
+    # an earlier one.
+    left, left_by = 0.0, dict[int, float]()
     energy_told = read_energy_told(screen)
     for number, (tolerance, thermo) in read_thermo(screen).items():
         particles = read_tables(folder / f"particles.{number:02d}.dump")
         contacts = read_tables(folder / f"contacts.{number:02d}.dump", CONTACTS)
         bodies = read_tables(folder / f"bodies.{number:02d}.dump", BODY_COLUMNS)
-        part = _Part(report, facts, f"part {number}", tolerance, left)
+        begun_with = left_by.get(particles[0].step, left) if particles else left
+        part = _Part(report, facts, f"part {number}", tolerance, begun_with)
         last: _Frame | None = None
         for k, (table, rows) in enumerate(zip(particles, contacts, strict=False)):
             if table.step != rows.step or table.step not in thermo:
@@ -193,11 +196,11 @@ def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
                 break
             final = k + 1 == len(particles)
             last = part.frame(table, rows, thermo[table.step], of_bodies, last, final)
+            left = last.deepest + last.thermo["f_contact[11]"]
+            left_by[last.step] = left
         # Without `shorten` a step may leave more than 2 EPS, which later ones take apart. (The part
         # behind `run every` is empty.)
         part.judge_energy(energy_told.get(number, 0))
-        if last is not None:
-            left = last.deepest + last.thermo["f_contact[11]"]
     return report
 
 
@@ -1308,10 +1311,10 @@ class _Part:
 
         b is the largest speed at which an overlap is given back, at most 2 EPS in a regular step. t
         is the target of a contact, here from above. Contacts that pull close gaps; those of
-        restitution add half of lambda (n.u* - D / h) where surfaces were parting: what has turned
-        past one another, or is pushed back to a wall, parts faster, u*, than its gap D has grown in
-        a step; with `shorten` a cluster of them may add a hundredth of what contacts take and give.
-        What moves by itself works.
+        restitution add half of lambda (n.u* - D / h) where surfaces were parting, with a gap D
+        beyond EPS: what has turned past one another, or is pushed back to a wall, parts faster, u*,
+        than its gap has grown in a step; with `shorten` a cluster of them may add a hundredth of
+        what contacts take and give. What moves by itself works.
         """
         if self.facts["warn"]:
             return
@@ -1380,7 +1383,9 @@ class _Part:
         allowed[pulls] += np.abs(impulse[pulls]) * closes[pulls] / new.h
         allowed += np.maximum(0, impulse * motion) / new.h
         if "law restitution" in self.facts["words"]:
-            turned = np.where(u_before > 0, u_before - np.maximum(0, listed["gap"]) / new.h, 0.0)
+            # A gap within EPS counts as closed where it is (docs/method/tolerances.md).
+            open_by = np.where(listed["gap"] > self.eps, listed["gap"], 0.0)
+            turned = np.where(u_before > 0, u_before - open_by / new.h, 0.0)
             allowed += 0.5 * np.maximum(0, impulse) * np.maximum(0, turned)
             # docs/reference/laws.md: a hundredth of what contacts take and give; else it is halved.
             if "shorten" in self.facts["words"]:
