@@ -42,7 +42,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         )
 
     add_out(tradeoff, "tradeoff", "runs")
-    rules = find_deck(SETTLING, Path()).rules
+    settling = find_deck(SETTLING, Path())
+    rules = settling.rules
     add("--particle", "spheres", "WORD", f"{rules['particle'].allowed} (default: {{default}})")
     add("--particles", "1000", "N", "number of them in a random start (default: {default})")
     add("--diameter", "0.11", "D", "of a sphere; the container is 1 wide (default: {default})")
@@ -61,6 +62,13 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "(default: {default})",
     )
     add("--dts", "0.01", "LIST", "longest time steps of hard contacts (default: {default})")
+    accuracy = f"{settling.parameters['accuracy']}"
+    add(
+        "--accuracies",
+        accuracy,
+        "LIST",
+        "parts of an approach that hard contacts may leave (default: {default})",
+    )
     solvers = ", ".join(rules["solver"].words)
     add("--solvers", "sweeps", "LIST", f"of hard contacts: {solvers} (default: {{default}})")
     add("--ranks", "1", "LIST", "MPI ranks; all is run with each number (default: {default})")

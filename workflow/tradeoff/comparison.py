@@ -166,10 +166,11 @@ def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
 def reference_of(configurations: Iterable[Configuration], ranks: int) -> Configuration | None:
     """Return the tightest hard configuration on so many ranks; None if there is none.
 
-    If there are several, it is the one with the shortest time step, and the first of these.
+    If there are several, it is the one with the smallest accuracy, of these the one with the
+    shortest time step, and the first of these.
     """
     hard = [one for one in configurations if (one.contacts, one.ranks) == ("hard", ranks)]
-    return min(hard, key=lambda one: (one.tolerance, one.dt), default=None)
+    return min(hard, key=lambda one: (one.tolerance, one.accuracy, one.dt), default=None)
 
 
 def _matches(hard: Configuration, soft: Configuration) -> bool:

@@ -27,7 +27,8 @@ ROWS, PAGE, FIGURE = "tradeoff.csv", "tradeoff.md", "tradeoff"
 def notes_of(settled: Settled, comparison: Comparison) -> list[str]:
     """Return the lines below the table: what is left out, what to mind, what to take."""
     doubtful = [*never_at_rest(comparison), *out_of_bed(comparison)]
-    return [*settled.left_out, *doubtful, *recommendations(comparison)]
+    told = [*settled.left_out, *settled.before_accuracy]
+    return [*told, *doubtful, *recommendations(comparison)]
 
 
 def print_solutions(solutions: Solutions) -> None:

@@ -33,6 +33,10 @@ def _number(form: str, name: str) -> Callable[[Row], str]:
     return write
 
 
+def _setting(value: float | None) -> str:
+    return MISSING if value is None else f"{value:g}"
+
+
 def _at_rest(row: Row) -> str:
     return f"{len(row.values('plateau_time'))} of {len(row.runs)}"
 
@@ -42,7 +46,8 @@ COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
     ("contacts", lambda row: row.configuration.contacts),
     ("solver", lambda row: row.configuration.solver or MISSING),
     ("tolerance / r", lambda row: f"{row.configuration.tolerance:g}"),
-    ("dt", lambda row: MISSING if row.configuration.dt is None else f"{row.configuration.dt:g}"),
+    ("dt", lambda row: _setting(row.configuration.dt)),
+    ("accuracy", lambda row: _setting(row.configuration.accuracy)),
     ("ranks", lambda row: str(row.configuration.ranks)),
     ("at rest", _at_rest),
     ("overlap / r", _number(".2g", "overlap_at_rest")),
@@ -57,7 +62,7 @@ COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
     ("soft/hard time", lambda row: ratio_text(row.slower) if len(row.slower) else MISSING),
 )
 # The first so many of them say which configuration a row is of.
-KEYS = 5
+KEYS = 6
 LEGEND = (
     "Medians over the starts. At rest: starts that came to rest within the run; the others have no "
     "time and no errors, nor is anything compared with them. Overlap: largest at rest, and before. "
@@ -74,7 +79,10 @@ def _heading(comparison: Comparison) -> list[str]:
     if reference is None:
         return []
     one = reference.configuration
-    line = f"Reference: hard contacts, {one.solver}, {one.tolerance:g} r, dt {one.dt:g}."
+    line = (
+        f"Reference: hard contacts, {one.solver}, {one.tolerance:g} r, dt {one.dt:g}, accuracy "
+        f"{one.accuracy:g}."
+    )
     scatter = [comparison.scatter(name) for name in ("packing_fraction", "coordination_number")]
     if not math.isnan(scatter[0]):
         line += (
@@ -149,7 +157,7 @@ def as_csv(comparison: Comparison) -> str:
     """Return all numbers as CSV, one row a run."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    own = ("contacts", "solver", "tolerance", "dt", "ranks")
+    own = ("contacts", "solver", "tolerance", "dt", "accuracy", "ranks")
     writer.writerow([*own, "start", "case", *MEASURED, *COMPARED])
     for one in (run for row in comparison.rows for run in row.runs):
         described = [getattr(one.run.configuration, name) for name in own]
