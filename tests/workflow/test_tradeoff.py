@@ -655,7 +655,7 @@ def test_damaged_records_are_named(
 ) -> None:
     """A damaged record costs its own start; the solutions of the other one are kept."""
     arguments, out = finished
-    (one, *_) = out.glob("states/cases/*")
+    (one, *_) = out.glob("states/cases/spheres+*")
     saved = {path: path.read_bytes() for path in [*one.glob("*.npz"), *one.glob("solved-*")]}
     for path, content in saved.items():
         path.write_bytes(content[:100])
@@ -678,7 +678,7 @@ def test_a_cut_off_log_of_a_recorded_run(
 ) -> None:
     """Nobody needs it once all is solved; without it, what is not solved is left out."""
     arguments, out = finished
-    (one, *_) = out.glob("states/cases/*")
+    (one, *_) = out.glob("states/cases/spheres+*")
     saved = {path: path.read_bytes() for path in (one / "log.lammps", one / "solved-rest.json")}
     cut = saved[one / "log.lammps"]
     (one / "log.lammps").write_bytes(cut[: cut.rindex(b"Loop time of")])
