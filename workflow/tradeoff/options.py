@@ -63,6 +63,7 @@ def read_plan(options: argparse.Namespace) -> Plan:
         accuracies,
         solvers,
         ranks,
+        options.step_errors,
     )
 
 

@@ -76,6 +76,7 @@ class Plan:
     accuracies : accuracies of hard contacts, parts of an approach
     solvers : solvers of hard contacts
     ranks : numbers of MPI ranks; everything is run with each of them
+    step_errors : whether errors of velocities and forces of hard contacts are measured, too
     """
 
     particle: str
@@ -87,6 +88,7 @@ class Plan:
     accuracies: Sequence[float]
     solvers: Sequence[str]
     ranks: Sequence[int]
+    step_errors: bool = False
 
     @property
     def configurations(self) -> list[Configuration]:
@@ -193,4 +195,5 @@ def command_line(plan: Plan) -> str:
     words += ["--soft-tolerances", joined(plan.soft_tolerances) or NONE]
     words += ["--dts", joined(plan.dts), "--accuracies", joined(plan.accuracies)]
     words += ["--solvers", joined(plan.solvers), "--ranks", joined(plan.ranks)]
+    words += ["--step-errors"] if plan.step_errors else []
     return shlex.join(words)
