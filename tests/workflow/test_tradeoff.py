@@ -7,6 +7,7 @@ import math
 import subprocess
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -27,18 +28,21 @@ from lammps_inelastic.analysis import (
 )
 from lammps_inelastic.analysis.geometry import FloatArray
 from lammps_inelastic.workflow.cli import tradeoff as tradeoff_command
+from lammps_inelastic.workflow.decks import find_deck
 from lammps_inelastic.workflow.main import main
 from lammps_inelastic.workflow.results.settling import first_at_rest, overlaps_as_contacts
 from lammps_inelastic.workflow.results.store import Result, read_studies
 from lammps_inelastic.workflow.results.thermo import read_thermo
 from lammps_inelastic.workflow.running.locks import held
 from lammps_inelastic.workflow.running.processes import cores
+from lammps_inelastic.workflow.shipped import SETTLING
 from lammps_inelastic.workflow.study import Case
 from lammps_inelastic.workflow.tradeoff import settling_runs
 from lammps_inelastic.workflow.tradeoff.advice import recommendations
 from lammps_inelastic.workflow.tradeoff.comparison import compare, reference_of
-from lammps_inelastic.workflow.tradeoff.figure import plot_errors
-from lammps_inelastic.workflow.tradeoff.plan import Configuration, Plan, Run
+from lammps_inelastic.workflow.tradeoff.figure import plot_cost, plot_errors
+from lammps_inelastic.workflow.tradeoff.plan import Configuration, Plan, Run, command_line, runs_of
+from lammps_inelastic.workflow.tradeoff.settling_runs import Settled
 from lammps_inelastic.workflow.tradeoff.states import (
     EXACT,
     WAYS,
@@ -50,7 +54,7 @@ from lammps_inelastic.workflow.tradeoff.states import (
     read_states,
     write_states,
 )
-from lammps_inelastic.workflow.tradeoff.table import as_csv, out_of_bed
+from lammps_inelastic.workflow.tradeoff.table import as_csv, as_markdown, out_of_bed
 from tests.helpers.contact_problems import Problem, no_bodies
 from tests.helpers.few_spheres import write_data
 from tests.helpers.reference_solver import reference
@@ -199,10 +203,11 @@ def configuration(
     tolerance: float = 0.005,
     dt: float = 0.01,
     ranks: int = 1,
+    accuracy: float = 0.03,
 ) -> Configuration:
-    hard = contacts == "hard"
-    solver = "sweeps" if hard else None
-    return Configuration(contacts, tolerance, solver, dt if hard else None, ranks)
+    if contacts == "soft":
+        return Configuration("soft", tolerance, None, None, None, ranks)
+    return Configuration("hard", tolerance, "sweeps", dt, accuracy, ranks)
 
 
 def made_up(
@@ -326,11 +331,107 @@ def test_no_errors_against_a_reference_that_still_moves() -> None:
     assert medians == [[0.005, pytest.approx(0.005)]]
 
 
-def test_the_reference_is_the_tightest_with_the_shortest_step() -> None:
-    best = configuration(tolerance=1e-6, dt=0.005)
-    others = [configuration(tolerance=1e-6), configuration("soft", 1e-7), configuration()]
+def test_the_reference_is_the_tightest_with_the_smallest_accuracy_and_the_shortest_step() -> None:
+    best = configuration(tolerance=1e-6, dt=0.005, accuracy=0.001)
+    others = [
+        configuration(tolerance=1e-6, accuracy=0.001),
+        configuration(tolerance=1e-6, dt=0.002),
+        configuration("soft", 1e-7),
+        configuration(accuracy=1e-4),
+    ]
     assert reference_of([*others, best, configuration(tolerance=1e-8, ranks=2)], 1) == best
     assert reference_of([configuration("soft")], 1) is None
+
+
+def a_plan(**changed: Any) -> Plan:
+    plan = Plan(
+        "spheres", {"time_settling": 1}, [1], [0.005], [0.005], [0.02], [0.1], ["sweeps"], [1]
+    )
+    return replace(plan, **changed)
+
+
+def test_accuracies_are_a_dimension_of_hard_contacts() -> None:
+    plan = a_plan(accuracies=[0.001, 0.1])
+    runs = runs_of(plan)
+    assert [run.configuration.accuracy for run in runs] == [0.1, 0.001, None]
+    settling = [run.case.stages[1].values for run in runs]
+    assert [values.get("accuracy") for values in settling] == [0.1, 0.001, None]
+    commands = [run.case.commands()[1] for run in runs]
+    assert [command[command.index("accuracy") + 1] for command in commands[:2]] == ["0.1", "0.001"]
+    assert "accuracy" not in commands[2]
+    assert len({run.case.name for run in runs}) == 3
+    assert ["accuracy=0.1" in run.case.name for run in runs] == [True, False, False]
+    assert "--accuracies 0.001,0.1" in command_line(plan)
+
+
+def test_the_default_accuracy_is_that_of_the_deck(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So runs without the option keep their names."""
+    plans: list[Plan] = []
+
+    def keep(plan: Plan, *_: object) -> int:
+        plans.append(plan)
+        return 0
+
+    monkeypatch.setattr(tradeoff_command, "_compare", keep)
+    monkeypatch.setattr(tradeoff_command, "held", lambda *_: nullcontext())
+    assert main(["tradeoff"]) == 0
+    default = find_deck(SETTLING, Path()).parameters["accuracy"]
+    assert plans[0].accuracies == [default]
+    assert all("accuracy" not in run.case.stages[1].values for run in runs_of(plans[0]))
+
+
+def with_accuracies() -> list[tuple[Run, Result]]:
+    """Three starts at one tolerance; the largest accuracy is fastest, and off in contacts alone."""
+    results = []
+    for number, start in enumerate("123"):
+        for accuracy, seconds, off in ((0.1, 1.0, 1.0), (0.01, 2.0, 0.01), (0.001, 4.0, 0.0)):
+            one = configuration(accuracy=accuracy)
+            share, contacts = 0.6 + 0.01 * number, 6.0 + 0.1 * number + off
+            results.append(made_up(one, start, seconds, share, contacts))
+    return results
+
+
+def test_accuracies_in_table_advice_and_figure() -> None:
+    comparison = compare(with_accuracies())
+    share, contacts, _ = recommendations(comparison)
+    assert "a tolerance of 0.005 r, accuracy 0.1 is enough" in share
+    assert "a tolerance of 0.005 r, accuracy 0.01 is enough" in contacts
+    assert "of the tightest, 0.005 r, accuracy 0.001, which takes 4 s" in contacts
+    page = as_markdown(a_plan(), comparison, [])
+    assert "| hard | sweeps | 0.005 | 0.01 | 0.001 | 1 |" in page
+    assert "Reference: hard contacts, sweeps, 0.005 r, dt 0.01, accuracy 0.001." in page
+    rows = csv.DictReader(as_csv(comparison).splitlines())
+    assert [row["accuracy"] for row in rows] == ["0.1"] * 3 + ["0.01"] * 3 + ["0.001"] * 3
+    ax = plot_cost(Figure().subplots(), comparison)
+    assert ax.get_legend_handles_labels()[1] == [
+        f"hard contacts, accuracy {accuracy}" for accuracy in (0.1, 0.01, 0.001)
+    ]
+
+
+def test_soft_contacts_have_no_accuracy_and_one_alone_is_not_in_the_legend() -> None:
+    comparison = compare(made_up_study())
+    assert "| soft | - | 0.005 | - | - | 1 |" in as_markdown(a_plan(), comparison, [])
+    (*_, soft) = csv.DictReader(as_csv(comparison).splitlines())
+    assert soft["accuracy"] == ""
+    ax = plot_cost(Figure().subplots(), comparison)
+    assert ax.get_legend_handles_labels()[1] == ["hard contacts", "soft spheres"]
+
+
+def test_results_of_a_version_without_accuracy_are_told() -> None:
+    hard, soft = configuration(), configuration("soft")
+    known = {"stages": [{"deck": SETTLING, "variables": {"accuracy": 0.03}}]}
+    before = {"stages": [{"deck": SETTLING, "variables": {}}]}
+    results = [
+        (run, replace(result, record=record))
+        for (run, result), record in (
+            (made_up(hard, "1"), known),
+            (made_up(hard, "2"), before),
+            (made_up(soft, "1"), before),
+        )
+    ]
+    (line,) = Settled(results=results).before_accuracy
+    assert line.startswith("accuracy not known: 1 of 2 runs with hard contacts are of a version")
+    assert Settled(results=results[:1]).before_accuracy == []
 
 
 # The command
@@ -351,6 +452,13 @@ def test_the_reference_is_the_tightest_with_the_shortest_step() -> None:
         (["--tolerances", "nan"], "--tolerances: nan is not allowed: it must be a number from 1e"),
         (["--soft-tolerances", "0.05,no"], "--soft-tolerances: no is not allowed: it must be a nu"),
         (["--dts", "-1"], "--dts: -1 is not allowed: it must be a number from 1e-6 t"),
+        (
+            ["--accuracies", "0"],
+            "--accuracies: 0 is not allowed: it must be a number above 0 and up to 1",
+        ),
+        (["--accuracies", "0.1,1.5"], "--accuracies: 1.5 is not allowed: it must be a number abov"),
+        (["--accuracies", "0.1,"], "--accuracies:  is not allowed: it must be a number above 0"),
+        (["--accuracies", "loose"], "--accuracies: loose is not allowed: it must be a number abo"),
         (
             ["--solvers", "sweeps,sor"],
             "--solvers: sor is not allowed: it must be sweeps, apgd or uzawa",
@@ -381,10 +489,10 @@ def test_bad_options(
 
 
 def test_a_line_for_each_bad_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["--tolerances", "0,-1", "--seeds", "x", "--dts", "0"]
+    arguments = ["--tolerances", "0,-1", "--seeds", "x", "--dts", "0", "--accuracies", "2,x"]
     assert main(["tradeoff", "--out", str(tmp_path), *arguments]) == 2
     names = [line.split(":")[1].strip() for line in capsys.readouterr().err.splitlines()]
-    assert names == ["--seeds", "--tolerances", "--tolerances", "--dts"]
+    assert names == ["--seeds", *["--tolerances"] * 2, "--dts", *["--accuracies"] * 2]
 
 
 @pytest.fixture(scope="module")
@@ -455,7 +563,7 @@ def test_numbers_of_a_comparison(finished: tuple[list[str], Path]) -> None:
             assert number["overlap_falling"] <= number["tolerance"] * (1 + 1e-6)
             assert number["iterations"] > 0
         else:
-            assert row["solver"] == row["dt"] == row["iterations"] == ""
+            assert row["solver"] == row["dt"] == row["accuracy"] == row["iterations"] == ""
         if "plateau_time" in number:
             assert 0.25 <= number["plateau_time"] <= 3.05
             assert 0 < number["plateau_seconds"] <= number["settling_seconds"] * 1.05
@@ -547,7 +655,7 @@ def test_damaged_records_are_named(
 ) -> None:
     """A damaged record costs its own start; the solutions of the other one are kept."""
     arguments, out = finished
-    (one, *_) = out.glob("states/cases/*")
+    (one, *_) = out.glob("states/cases/spheres+*")
     saved = {path: path.read_bytes() for path in [*one.glob("*.npz"), *one.glob("solved-*")]}
     for path, content in saved.items():
         path.write_bytes(content[:100])
@@ -570,7 +678,7 @@ def test_a_cut_off_log_of_a_recorded_run(
 ) -> None:
     """Nobody needs it once all is solved; without it, what is not solved is left out."""
     arguments, out = finished
-    (one, *_) = out.glob("states/cases/*")
+    (one, *_) = out.glob("states/cases/spheres+*")
     saved = {path: path.read_bytes() for path in (one / "log.lammps", one / "solved-rest.json")}
     cut = saved[one / "log.lammps"]
     (one / "log.lammps").write_bytes(cut[: cut.rindex(b"Loop time of")])

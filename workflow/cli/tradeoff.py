@@ -12,9 +12,10 @@ from ..running.locks import held
 from ..shipped import SETTLING
 from ..tradeoff.comparison import compare
 from ..tradeoff.options import read_plan
-from ..tradeoff.pages import FIGURE, PAGE, ROWS, notes_of, print_solutions, write_all
+from ..tradeoff.pages import ERRORS_FIGURE, FIGURE, PAGE, ROWS, notes_of, print_solutions, write_all
 from ..tradeoff.plan import Plan
 from ..tradeoff.recorded_states import STATES, Solutions, solve_all
+from ..tradeoff.recorded_steps import MeasuredSteps, measure_all
 from ..tradeoff.settling_runs import STORE, run_all
 from ..tradeoff.table import print_comparison
 from .arguments import add_out, seconds
@@ -42,7 +43,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         )
 
     add_out(tradeoff, "tradeoff", "runs")
-    rules = find_deck(SETTLING, Path()).rules
+    settling = find_deck(SETTLING, Path())
+    rules = settling.rules
     add("--particle", "spheres", "WORD", f"{rules['particle'].allowed} (default: {{default}})")
     add("--particles", "1000", "N", "number of them in a random start (default: {default})")
     add("--diameter", "0.11", "D", "of a sphere; the container is 1 wide (default: {default})")
@@ -61,6 +63,13 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "(default: {default})",
     )
     add("--dts", "0.01", "LIST", "longest time steps of hard contacts (default: {default})")
+    accuracy = f"{settling.parameters['accuracy']}"
+    add(
+        "--accuracies",
+        accuracy,
+        "LIST",
+        "parts of an approach that hard contacts may leave (default: {default})",
+    )
     solvers = ", ".join(rules["solver"].words)
     add("--solvers", "sweeps", "LIST", f"of hard contacts: {solvers} (default: {{default}})")
     add("--ranks", "1", "LIST", "MPI ranks; all is run with each number (default: {default})")
@@ -82,6 +91,12 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     tradeoff.add_argument(
         "--no-states", action="store_true", help="leave out the recorded contact problems"
     )
+    tradeoff.add_argument(
+        "--step-errors",
+        action="store_true",
+        help="make each run with hard contacts once more, record its steps, and compare their "
+        f"velocities and forces with the exact ones ({ERRORS_FIGURE}.png, {ERRORS_FIGURE}.svg)",
+    )
     tradeoff.set_defaults(run=run)
 
 
@@ -101,12 +116,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _compare(plan: Plan, options: argparse.Namespace) -> int:
     settled = run_all(plan, options.out, options.timeout)
-    comparison = compare(settled.results)
-    notes = notes_of(settled, comparison)
+    steps = MeasuredSteps()
+    if plan.step_errors:
+        steps = measure_all(plan, options.out, options.timeout)
+    comparison = compare(settled.results, steps.numbers)
+    notes = notes_of(settled, steps, comparison)
     print_comparison(comparison, notes)
     solutions = Solutions()
     if not options.no_states:
         solutions = solve_all(plan, options.out, options.timeout)
     print_solutions(solutions)
     write_all(options.out, plan, comparison, notes, solutions)
-    return 1 if settled.failed or solutions.lost else 0
+    return 1 if settled.failed or steps.lost or solutions.lost else 0

@@ -40,6 +40,11 @@ MEASURED = (
 )
 # These are computed from them and the reference's.
 COMPARED = ("packing_fraction_error", "coordination_number_error", "network_error", "shared")
+# These are of recorded steps against their exact solutions.
+OF_STEPS = ("velocity_error", "force_error")
+# The errors of the steps of runs, by the number of ranks and the name of the case, in the order of
+# OF_STEPS.
+StepNumbers = Mapping[tuple[int, str], tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class RunNumbers:
     Attributes
     ----------
     run : the run
-    numbers : numbers by the names of MEASURED and COMPARED; NaN where there is none
+    numbers : numbers by the names of MEASURED, COMPARED and OF_STEPS; NaN where there is none
     """
 
     run: Run
@@ -103,6 +108,11 @@ class Comparison:
 
     rows: Sequence[Row]
 
+    @property
+    def has_steps(self) -> bool:
+        """True if recorded steps of some run were measured."""
+        return any(len(row.values(name)) for row in self.rows for name in OF_STEPS)
+
     def reference(self, ranks: int | None = None) -> Row | None:
         """Return the row that those of so many ranks are compared with; None if there is none.
 
@@ -136,10 +146,17 @@ class Comparison:
         )
 
 
-def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
+def compare(
+    results: Sequence[tuple[Run, Result]], of_steps: StepNumbers | None = None
+) -> Comparison:
     """Compare all runs of which there is a result with the reference's from the same start.
 
     The same start on another number of ranks is another one: its spheres have other numbers.
+
+    Parameters
+    ----------
+    results : runs with their results
+    of_steps : errors of their recorded steps, as far as there are any
     """
     configurations = list(dict.fromkeys(run.configuration for run, _ in results))
     references = {
@@ -147,10 +164,13 @@ def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
         for run, result in results
         if run.configuration == reference_of(configurations, run.configuration.ranks)
     }
-    numbers = [
-        RunNumbers(run, _numbers(result, references.get((run.configuration.ranks, run.start))))
-        for run, result in results
-    ]
+    unknown = (math.nan, math.nan)
+    numbers = []
+    for run, result in results:
+        ranks = run.configuration.ranks
+        found = (of_steps or {}).get((ranks, run.case.name), unknown)
+        own = _numbers(result, references.get((ranks, run.start)))
+        numbers.append(RunNumbers(run, own | dict(zip(OF_STEPS, found, strict=True))))
     grouped = {
         configuration: [one for one in numbers if one.run.configuration == configuration]
         for configuration in configurations
@@ -166,10 +186,11 @@ def compare(results: Sequence[tuple[Run, Result]]) -> Comparison:
 def reference_of(configurations: Iterable[Configuration], ranks: int) -> Configuration | None:
     """Return the tightest hard configuration on so many ranks; None if there is none.
 
-    If there are several, it is the one with the shortest time step, and the first of these.
+    If there are several, it is the one with the smallest accuracy, of these the one with the
+    shortest time step, and the first of these.
     """
     hard = [one for one in configurations if (one.contacts, one.ranks) == ("hard", ranks)]
-    return min(hard, key=lambda one: (one.tolerance, one.dt), default=None)
+    return min(hard, key=lambda one: (one.tolerance, one.accuracy, one.dt), default=None)
 
 
 def _matches(hard: Configuration, soft: Configuration) -> bool:

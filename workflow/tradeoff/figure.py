@@ -1,13 +1,14 @@
-"""The figure of a comparison: wall time against overlap, errors against the tolerance."""
+"""The figures of a comparison: wall time against overlap, errors against tolerance and time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
@@ -16,15 +17,16 @@ from lammps_inelastic.analysis.plots import plot_bounds, plot_points, style_of
 
 from ..files import whole
 from ..report.figures import DPI, RC
-from .comparison import Comparison, Row
+from .comparison import MEASURED, Comparison, Row
 from .states import WayMedians
 
 # The figure is about as wide as a page [inches].
 SIZE = (7.4, 4.3)
 STATES_SIZE = (7.4, 3.2)
+ERRORS_SIZE = (7.4, 5.0)
 FORMATS = ("png", "svg")
 SCATTER = "scatter between starts"
-# Below this ratio of largest to smallest y, powers of ten alone would be too few ticks.
+# Below this ratio of largest to smallest, powers of ten alone would be too few ticks.
 FEW = 200
 
 
@@ -48,12 +50,36 @@ def draw_tradeoff(comparison: Comparison, path: Path) -> list[Path]:
         upper.set_xlabel("")
         upper.tick_params(labelbottom=False)
         figure.align_ylabels((upper, lower))
-        known = {
-            label: handle
-            for ax in (cost, upper, lower)
-            for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
-        }
-        figure.legend(known.values(), known, loc="outside lower center", ncols=min(len(known), 3))
+        _legend_below(figure, (cost, upper, lower))
+        return _write(figure, path)
+
+
+def draw_errors(comparison: Comparison, path: Path) -> list[Path]:
+    """Draw the errors against wall time, and write it as PNG and as SVG; return the files.
+
+    Soft contacts have no errors of velocities and forces: these are of steps of hard contacts.
+
+    Parameters
+    ----------
+    comparison : comparison with at least one row
+    path : path of the files, without `.png` and `.svg`
+    """
+    labels = {
+        "packing_fraction": "error of packing fraction",
+        "coordination_number": "error of contacts",
+        "velocity": "error of velocities / g h",
+        "force": "error of forces",
+    }
+    with matplotlib.rc_context(RC):
+        figure = Figure(figsize=ERRORS_SIZE, layout="constrained")
+        axes = list(figure.subplots(2, 2, sharex=True).flat)
+        for ax, (name, label) in zip(axes, labels.items(), strict=True):
+            plot_errors_in_time(ax, comparison, name).set_ylabel(label)
+        for ax in axes[:2]:
+            ax.set_xlabel("")
+            ax.tick_params(labelbottom=False)
+        figure.align_ylabels(axes)
+        _legend_below(figure, axes)
         return _write(figure, path)
 
 
@@ -93,15 +119,28 @@ def draw_states(curves: Sequence[WayMedians], path: Path) -> list[Path]:
 
 def plot_cost(ax: Axes, comparison: Comparison) -> Axes:
     """Plot the wall time to rest against the largest overlap there: a point a run, and medians."""
-    for number, (label, rows) in enumerate(_curves(comparison.rows).items()):
-        names = ("overlap_at_rest", "plateau_seconds")
-        runs = [[one.numbers[name] for name in names] for row in rows for one in row.runs]
-        medians = [[row.median(name) for name in names] for row in rows]
-        _plot(ax, runs, medians, label, number)
+    _plot_numbers(ax, comparison, ("overlap_at_rest", "plateau_seconds"))
     _logarithmic(ax)
+    ax.xaxis.set_inverted(True)
     ax.set_xlabel("largest overlap at rest / radius")
     ax.set_ylabel("wall time until at rest [s]")
     _label_heights(ax)
+    return ax
+
+
+def plot_errors_in_time(ax: Axes, comparison: Comparison, name: str) -> Axes:
+    """Plot the error of a number against the wall time to rest, and the scatter between starts.
+
+    Velocities and forces, whose errors are those of steps, have no scatter.
+    """
+    _plot_numbers(ax, comparison, ("plateau_seconds", f"{name}_error"))
+    _logarithmic(ax)
+    ax.set_xlabel("wall time until at rest [s]")
+    if name in MEASURED:
+        _shade_scatter(ax, comparison, name)
+    _label_heights(ax)
+    if ax.has_data():
+        _write_plain(ax.xaxis)
     return ax
 
 
@@ -115,7 +154,15 @@ def plot_errors(ax: Axes, comparison: Comparison, name: str) -> Axes:
         medians = [[row.configuration.tolerance, row.median(error)] for row in rows]
         _plot(ax, runs, medians, label, number)
     _logarithmic(ax)
+    ax.xaxis.set_inverted(True)
     ax.set_xlabel("tolerance / radius")
+    _shade_scatter(ax, comparison, name)
+    _label_heights(ax)
+    return ax
+
+
+def _shade_scatter(ax: Axes, comparison: Comparison, name: str) -> None:
+    """Draw the scatter of a number between starts as a band of heights, if it is known."""
     scatter = comparison.scatter(name)
     if scatter > 0 and ax.has_data():
         # The band goes down to the axis, which has no 0.
@@ -123,8 +170,16 @@ def plot_errors(ax: Axes, comparison: Comparison, name: str) -> Axes:
         bottom = min(bottom, scatter / 3)
         plot_bounds(ax, bottom / 10, scatter, label=SCATTER)
         ax.set_ylim(bottom, max(top, 1.5 * scatter))
-    _label_heights(ax)
-    return ax
+
+
+def _legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
+    """Write a legend of all curves, each once, below a figure."""
+    known = {
+        label: handle
+        for ax in axes
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(known.values(), known, loc="outside lower center", ncols=min(len(known), 3))
 
 
 def _write(figure: Figure, path: Path) -> list[Path]:
@@ -137,6 +192,14 @@ def _write(figure: Figure, path: Path) -> list[Path]:
         with whole(file) as temporary:
             figure.savefig(temporary, format=form, dpi=DPI, metadata=metadata)
     return files
+
+
+def _plot_numbers(ax: Axes, comparison: Comparison, names: tuple[str, str]) -> None:
+    """Plot a number of each run, and its medians, against another one; names are of x and y."""
+    for number, (label, rows) in enumerate(_curves(comparison.rows).items()):
+        runs = [[one.numbers[name] for name in names] for row in rows for one in row.runs]
+        medians = [[row.median(name) for name in names] for row in rows]
+        _plot(ax, runs, medians, label, number)
 
 
 def _plot(
@@ -178,16 +241,12 @@ def _curves(rows: Sequence[Row]) -> Mapping[str, list[Row]]:
 
 
 def _logarithmic(ax: Axes) -> None:
-    """Make both axes logarithmic, the loosest on the left: accuracy grows to the right.
-
-    Axes without data say so.
-    """
+    """Make both axes logarithmic. Axes without data say so."""
     if not ax.has_data():
         ax.text(0.5, 0.5, "no data", transform=ax.transAxes, ha="center", va="center")
         return
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.xaxis.set_inverted(True)
 
 
 def _label_heights(ax: Axes) -> None:
@@ -195,12 +254,16 @@ def _label_heights(ax: Axes) -> None:
     if not ax.has_data():
         ax.set_yticks([])
         return
-    low, high = ax.get_ylim()
-    plain = StrMethodFormatter("{x:g}")
-    ax.yaxis.set_major_formatter(plain)
-    ax.yaxis.set_minor_formatter(NullFormatter())
+    _write_plain(ax.yaxis)
+
+
+def _write_plain(axis: Axis) -> None:
+    """Write plain numbers at the ticks of an axis, some between powers of ten where few are."""
+    low, high = axis.get_view_interval()
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
     if high < FEW * low:
-        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
 
 
 def _positive(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:

@@ -42,6 +42,7 @@ def read_plan(options: argparse.Namespace) -> Plan:
     tolerances = check.values("--tolerances", options.tolerances, tolerance)
     soft_tolerances = [] if soft == NONE else check.values("--soft-tolerances", soft, tolerance)
     dts = check.values("--dts", options.dts, settling["dt"])
+    accuracies = check.values("--accuracies", options.accuracies, settling["accuracy"])
     solvers = check.values("--solvers", options.solvers, settling["solver"])
     most = read_rule(f"integer >= 1 <= {cores()}")
     ranks = check.values("--ranks", options.ranks, most, why=", the cores there are")
@@ -52,7 +53,18 @@ def read_plan(options: argparse.Namespace) -> Plan:
         # A data file has a number of particles of its own.
         values["particles"] = particles
         seeds = list(range(1, count + 1))
-    return Plan(particle, values, files or seeds, tolerances, soft_tolerances, dts, solvers, ranks)
+    return Plan(
+        particle,
+        values,
+        files or seeds,
+        tolerances,
+        soft_tolerances,
+        dts,
+        accuracies,
+        solvers,
+        ranks,
+        options.step_errors,
+    )
 
 
 class _Check:

@@ -9,6 +9,7 @@ from .advice import recommendations
 from .comparison import Comparison
 from .plan import Plan
 from .recorded_states import STATES, Solutions
+from .recorded_steps import MeasuredSteps
 from .settling_runs import STORE, Settled
 from .states import curves_of
 from .table import (
@@ -21,13 +22,14 @@ from .table import (
     states_as_markdown,
 )
 
-ROWS, PAGE, FIGURE = "tradeoff.csv", "tradeoff.md", "tradeoff"
+ROWS, PAGE, FIGURE, ERRORS_FIGURE = "tradeoff.csv", "tradeoff.md", "tradeoff", "errors"
 
 
-def notes_of(settled: Settled, comparison: Comparison) -> list[str]:
+def notes_of(settled: Settled, steps: MeasuredSteps, comparison: Comparison) -> list[str]:
     """Return the lines below the table: what is left out, what to mind, what to take."""
     doubtful = [*never_at_rest(comparison), *out_of_bed(comparison)]
-    return [*settled.left_out, *doubtful, *recommendations(comparison)]
+    told = [*settled.left_out, *steps.lost, *settled.before_accuracy]
+    return [*told, *doubtful, *recommendations(comparison)]
 
 
 def print_solutions(solutions: Solutions) -> None:
@@ -51,7 +53,7 @@ def write_all(
     solutions : of recorded problems
     """
     # Drawing takes a while to import, for which the other subcommands need not wait.
-    from .figure import draw_states, draw_tradeoff
+    from .figure import draw_errors, draw_states, draw_tradeoff
 
     states, curves = solutions.states, curves_of(solutions.states)
     write_text(out / ROWS, as_csv(comparison))
@@ -60,6 +62,8 @@ def write_all(
     names = [STORE, ROWS, PAGE]
     if comparison.rows:
         names += [path.name for path in draw_tradeoff(comparison, out / FIGURE)]
+    if comparison.has_steps:
+        names += [path.name for path in draw_errors(comparison, out / ERRORS_FIGURE)]
     if curves:
         write_text(out / f"{STATES}.csv", states_as_csv(states))
         names.append(f"{STATES}.csv")

@@ -1,7 +1,7 @@
 """The plan of a comparison of time and accuracy: its configurations, and the runs that show them.
 
-Every configuration (hard or soft contacts, a tolerance, and for hard ones a solver and a time
-step) lets the same starts settle.
+Every configuration (hard or soft contacts, a tolerance, and for hard ones a solver, a time step and
+an accuracy) lets the same starts settle.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ class Configuration:
     tolerance : largest overlap, radii; soft contacts keep it at rest only, and about
     solver : solver of hard contacts; None for soft ones
     dt : longest time step of hard contacts, time; None for soft ones
+    accuracy : part of an approach that hard contacts may leave; None for soft ones
     ranks : number of MPI ranks
     """
 
@@ -46,12 +47,18 @@ class Configuration:
     tolerance: float
     solver: str | None
     dt: float | None
+    accuracy: float | None
     ranks: int
 
     @property
     def choices(self) -> Mapping[str, object]:
         """What tells the configuration from others of its contacts and tolerance, by name."""
-        return {"solver": self.solver, "dt": self.dt, "ranks": self.ranks}
+        return {
+            "solver": self.solver,
+            "dt": self.dt,
+            "accuracy": self.accuracy,
+            "ranks": self.ranks,
+        }
 
 
 @dataclass(frozen=True)
@@ -66,8 +73,10 @@ class Plan:
     tolerances : tolerances of hard contacts, radii
     soft_tolerances : tolerances of soft contacts, radii; an empty list leaves them out
     dts : time steps of hard contacts, time
+    accuracies : accuracies of hard contacts, parts of an approach
     solvers : solvers of hard contacts
     ranks : numbers of MPI ranks; everything is run with each of them
+    step_errors : whether errors of velocities and forces of hard contacts are measured, too
     """
 
     particle: str
@@ -76,21 +85,27 @@ class Plan:
     tolerances: Sequence[float]
     soft_tolerances: Sequence[float]
     dts: Sequence[float]
+    accuracies: Sequence[float]
     solvers: Sequence[str]
     ranks: Sequence[int]
+    step_errors: bool = False
 
     @property
     def configurations(self) -> list[Configuration]:
         """The configurations, hard ones first, from the loosest tolerance to the tightest."""
         tolerances = sorted(self.tolerances, reverse=True)
         hard = [
-            Configuration("hard", tolerance, solver, dt, ranks)
-            for ranks, solver, dt, tolerance in product(
-                self.ranks, self.solvers, self.dts, tolerances
+            Configuration("hard", tolerance, solver, dt, accuracy, ranks)
+            for ranks, solver, dt, accuracy, tolerance in product(
+                self.ranks,
+                self.solvers,
+                self.dts,
+                sorted(self.accuracies, reverse=True),
+                tolerances,
             )
         ]
         soft = [
-            Configuration("soft", tolerance, None, None, ranks)
+            Configuration("soft", tolerance, None, None, None, ranks)
             for ranks, tolerance in product(self.ranks, sorted(self.soft_tolerances, reverse=True))
         ]
         return hard + soft
@@ -115,26 +130,34 @@ class Run:
 def runs_of(plan: Plan) -> list[Run]:
     """Return all runs, start by start: what slows a machine for a while slows all configurations.
 
-    All runs from a start are given the very same one: the tolerance, the time step and the solver
-    are the settling's, and the deck that makes the start keeps its defaults.
+    All runs from a start are given the very same one: the tolerance, the time step, the accuracy
+    and the solver are the settling's, and the deck that makes the start keeps its defaults.
     """
     folder = Path()
     first, second = find_deck(plan.particle, folder), find_deck(SETTLING, folder)
     inputs = {start: input_of(start) for start in plan.starts}
     runs = []
     for start, configuration in product(plan.starts, plan.configurations):
-        settling: dict[str, Value] = {
-            **plan.values,
-            "particle": plan.particle,
-            "contacts": configuration.contacts,
-            "tolerance": configuration.tolerance,
-        }
-        if configuration.solver is not None and configuration.dt is not None:
-            settling |= {"solver": configuration.solver, "dt": configuration.dt}
-        own = start_values(plan, start)
+        own, settling = start_values(plan, start), settling_values(plan, configuration)
         case = Case((stage_of(first, own), stage_of(second, settling)), inputs[start])
         runs.append(Run(configuration, label_of(start), case))
     return runs
+
+
+def settling_values(plan: Plan, configuration: Configuration) -> dict[str, Value]:
+    """Return the variables of the deck that lets a start settle."""
+    chosen: dict[str, Value | None] = {
+        "solver": configuration.solver,
+        "dt": configuration.dt,
+        "accuracy": configuration.accuracy,
+    }
+    return {
+        **plan.values,
+        "particle": plan.particle,
+        "contacts": configuration.contacts,
+        "tolerance": configuration.tolerance,
+        **{name: value for name, value in chosen.items() if value is not None},
+    }
 
 
 def start_values(plan: Plan, start: int | Path) -> dict[str, Value]:
@@ -170,6 +193,7 @@ def command_line(plan: Plan) -> str:
     words += ["--start", *files] if files else ["--seeds", str(len(plan.starts))]
     words += ["--tolerances", joined(plan.tolerances)]
     words += ["--soft-tolerances", joined(plan.soft_tolerances) or NONE]
-    words += ["--dts", joined(plan.dts), "--solvers", joined(plan.solvers)]
-    words += ["--ranks", joined(plan.ranks)]
+    words += ["--dts", joined(plan.dts), "--accuracies", joined(plan.accuracies)]
+    words += ["--solvers", joined(plan.solvers), "--ranks", joined(plan.ranks)]
+    words += ["--step-errors"] if plan.step_errors else []
     return shlex.join(words)

@@ -45,6 +45,19 @@ class Settled:
             *(f"left out: {name}: somebody else runs it" for name in self.elsewhere),
         ]
 
+    @property
+    def before_accuracy(self) -> list[str]:
+        """One line if some results are of a version whose deck did not set the accuracy."""
+        hard = [(run, one) for run, one in self.results if run.configuration.contacts == "hard"]
+        number = sum("accuracy" not in result.variables for _, result in hard)
+        if not number:
+            return []
+        return [
+            f"accuracy not known: {number} of {len(hard)} runs with hard contacts are of a version "
+            "whose settling.in left the accuracy to the fix; another folder (--out) runs them "
+            "with that of the table"
+        ]
+
 
 def run_all(plan: Plan, out: Path, timeout: float | None) -> Settled:
     """Run what has no result yet, one run at a time, and write all results to one file.

@@ -123,6 +123,7 @@ def recording_case(plan: Plan, start: int | Path) -> Case:
         "particle": plan.particle,
         "tolerance": TOLERANCE,
         "dt": plan.dts[0],
+        "accuracy": plan.accuracies[0],
         "record_every": RECORD_EVERY,
     }
     first = stage_of(find_deck(plan.particle, folder), start_values(plan, start))

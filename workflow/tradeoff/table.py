@@ -15,7 +15,7 @@ from rich.text import Text
 
 from ..wide_table import print_wide
 from .advice import described, ratio_text
-from .comparison import COMPARED, MEASURED, Comparison, Row
+from .comparison import COMPARED, MEASURED, OF_STEPS, Comparison, Row
 from .plan import Plan, command_line
 from .states import MEDIANS, Solved, WayMedians, curves_of
 
@@ -33,6 +33,10 @@ def _number(form: str, name: str) -> Callable[[Row], str]:
     return write
 
 
+def _setting(value: float | None) -> str:
+    return MISSING if value is None else f"{value:g}"
+
+
 def _at_rest(row: Row) -> str:
     return f"{len(row.values('plateau_time'))} of {len(row.runs)}"
 
@@ -42,7 +46,8 @@ COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
     ("contacts", lambda row: row.configuration.contacts),
     ("solver", lambda row: row.configuration.solver or MISSING),
     ("tolerance / r", lambda row: f"{row.configuration.tolerance:g}"),
-    ("dt", lambda row: MISSING if row.configuration.dt is None else f"{row.configuration.dt:g}"),
+    ("dt", lambda row: _setting(row.configuration.dt)),
+    ("accuracy", lambda row: _setting(row.configuration.accuracy)),
     ("ranks", lambda row: str(row.configuration.ranks)),
     ("at rest", _at_rest),
     ("overlap / r", _number(".2g", "overlap_at_rest")),
@@ -52,12 +57,16 @@ COLUMNS: Sequence[tuple[str, Callable[[Row], str]]] = (
     ("error of phi", _number(".4f", "packing_fraction_error")),
     ("of z", _number(".3f", "coordination_number_error")),
     ("of network", _number(".2f", "network_error")),
+    ("of velocities / g h", _number(".1e", "velocity_error")),
+    ("of forces", _number(".1e", "force_error")),
     ("complementarity / r", _number(".2g", "complementarity_at_rest")),
     ("drift", _number(".1e", "drift")),
     ("soft/hard time", lambda row: ratio_text(row.slower) if len(row.slower) else MISSING),
 )
+# These are there where steps were recorded.
+STEP_COLUMNS = ("of velocities / g h", "of forces")
 # The first so many of them say which configuration a row is of.
-KEYS = 5
+KEYS = 6
 LEGEND = (
     "Medians over the starts. At rest: starts that came to rest within the run; the others have no "
     "time and no errors, nor is anything compared with them. Overlap: largest at rest, and before. "
@@ -65,6 +74,10 @@ LEGEND = (
     "the same start, of packing fraction (phi), contacts per particle (z) and contact forces (0: "
     "the same network, 2: no contact in common). Complementarity: largest gap under a force. "
     "Drift: of the centre of mass at the end, diameters per time."
+)
+STEP_LEGEND = (
+    "Velocities, forces: of recorded steps of hard contacts, against the exact solutions of these "
+    "steps: root mean square over the spheres, and sum of the differences over that of the forces."
 )
 
 
@@ -74,7 +87,10 @@ def _heading(comparison: Comparison) -> list[str]:
     if reference is None:
         return []
     one = reference.configuration
-    line = f"Reference: hard contacts, {one.solver}, {one.tolerance:g} r, dt {one.dt:g}."
+    line = (
+        f"Reference: hard contacts, {one.solver}, {one.tolerance:g} r, dt {one.dt:g}, accuracy "
+        f"{one.accuracy:g}."
+    )
     scatter = [comparison.scatter(name) for name in ("packing_fraction", "coordination_number")]
     if not math.isnan(scatter[0]):
         line += (
@@ -82,6 +98,16 @@ def _heading(comparison: Comparison) -> list[str]:
             f"z {scatter[1]:.3f}."
         )
     return [line]
+
+
+def _columns(comparison: Comparison) -> list[tuple[str, Callable[[Row], str]]]:
+    """Return the columns for which there is something to tell."""
+    steps = comparison.has_steps
+    return [column for column in COLUMNS if steps or column[0] not in STEP_COLUMNS]
+
+
+def _legend(comparison: Comparison) -> str:
+    return f"{LEGEND} {STEP_LEGEND}" if comparison.has_steps else LEGEND
 
 
 def never_at_rest(comparison: Comparison) -> list[str]:
@@ -119,27 +145,29 @@ def print_comparison(comparison: Comparison, lines: Sequence[str]) -> None:
     console = Console(highlight=False)
     if comparison.rows:
         table = Table(box=None, pad_edge=False)
-        for number, (head, _) in enumerate(COLUMNS):
+        columns = _columns(comparison)
+        for number, (head, _) in enumerate(columns):
             table.add_column(head, justify="left" if number < 2 else "right", no_wrap=True)
         for row in comparison.rows:
-            table.add_row(*(Text(write(row)) for _, write in COLUMNS))
+            table.add_row(*(Text(write(row)) for _, write in columns))
         print_wide(table, keys=KEYS)
-        lines = [*_heading(comparison), LEGEND, *lines]
+        lines = [*_heading(comparison), _legend(comparison), *lines]
     for line in lines:
         console.print(line, markup=False, soft_wrap=not console.is_terminal)
 
 
 def as_markdown(plan: Plan, comparison: Comparison, lines: Sequence[str]) -> str:
     """Return the table and more lines as a page of Markdown."""
-    head = [name for name, _ in COLUMNS]
-    rows = [[write(row) for _, write in COLUMNS] for row in comparison.rows]
+    columns = _columns(comparison)
+    head = [name for name, _ in columns]
+    rows = [[write(row) for _, write in columns] for row in comparison.rows]
     table = [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
     parts = [
         f"# {TITLE}",
         f"`{command_line(plan)}`",
         "\n".join(table),
         *_heading(comparison),
-        LEGEND,
+        _legend(comparison),
         *lines,
     ]
     return "\n\n".join(parts) + "\n"
@@ -149,11 +177,12 @@ def as_csv(comparison: Comparison) -> str:
     """Return all numbers as CSV, one row a run."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    own = ("contacts", "solver", "tolerance", "dt", "ranks")
-    writer.writerow([*own, "start", "case", *MEASURED, *COMPARED])
+    own = ("contacts", "solver", "tolerance", "dt", "accuracy", "ranks")
+    names = (*MEASURED, *COMPARED, *OF_STEPS)
+    writer.writerow([*own, "start", "case", *names])
     for one in (run for row in comparison.rows for run in row.runs):
         described = [getattr(one.run.configuration, name) for name in own]
-        numbers = [one.numbers[name] for name in (*MEASURED, *COMPARED)]
+        numbers = [one.numbers[name] for name in names]
         writer.writerow(
             [
                 *("" if value is None else value for value in described),
