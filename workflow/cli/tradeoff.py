@@ -62,7 +62,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "largest overlaps of soft contacts at rest, about, radii; none: no soft contacts "
         "(default: {default})",
     )
-    add("--dts", "0.01", "LIST", "longest time steps of hard contacts (default: {default})")
+    longest = f"{settling.parameters['dt']}"
+    add("--dts", longest, "LIST", "longest time steps of hard contacts (default: {default})")
     accuracy = f"{settling.parameters['accuracy']}"
     add(
         "--accuracies",
