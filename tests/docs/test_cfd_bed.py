@@ -11,7 +11,7 @@ import pytest
 from tests.helpers.blocks import blocks_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "cfd-bed.md"
-# Beyond the range of four seeds, on another processor: half of its width.
+# Beyond the range of eight seeds, on another processor: half of its width.
 BEYOND = 0.5
 
 
