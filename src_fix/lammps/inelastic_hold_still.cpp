@@ -146,7 +146,12 @@ inelastic::SolverResult HoldStill::project(const Held &held)
     const double ends_within = step_.contact_of(c).gap_now - step_.rows[c].wall_motion +
         step_.eps(in_eps::ALLOWED - ADDED_BESIDE_REST);
     // What the step has left of its residual stays: it is not for this room to solve it once more.
-    const double left = step_.linear_gap_at_end(c, solved_);
+    double opens = 0.0;
+    for (std::size_t d = 0; d < 3; ++d)
+      opens += n[d] *
+          (solved_[3 * static_cast<std::size_t>(i) + d] -
+           solved_[3 * static_cast<std::size_t>(j) + d]);
+    const double left = problem.contacts.gap[c] + problem.timestep * opens;
     const double residual = problem.contacts.is_loaded(c) ? left : std::min(left, 0.0);
     contacts.add_of(problem.contacts, c);
     contacts.gap.back() =

@@ -37,6 +37,7 @@ FEW_STEPS: dict[str, object] = {
     "steps_agitated": 100,
     "steps_settling": 50,
     "steps_resting": 50,
+    "waiting": 0,
     "steps_tightening": 5,
     "steps_measuring": 3,
     "dump_every": 40,
