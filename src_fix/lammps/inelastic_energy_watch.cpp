@@ -81,7 +81,8 @@ void EnergyWatch::add_up(const std::vector<double> &target)
     double *const s = &sums_[SUMS * k];
     s[ADDED] += added;
     s[SIZE] += 0.5 * std::abs(impulse) * (std::abs(after) + std::abs(before));
-    s[TARGETS] += std::abs(impulse) * target[c] / h;
+    const double to_stop = step_.settings.accuracy * h * std::max(0.0, -before);
+    s[RESIDUALS] += std::abs(impulse) * std::min(target[c], to_stop) / h;
     s[TURNS] += std::abs(impulse) * rules_.closed_by_turning(c) / h;
     if (contact.asked.parts || contact.asked.set.may_pull()) s[BY_LAW] += std::max(0.0, added);
     if (impulse > 0.0 && contact.gap_now < 0.0 && after > 0.0) does_[DOES * k + GIVES_BACK] = 1.0;
@@ -110,7 +111,7 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
     const double added = s[ADDED] - s[BY_LAW];
     // What is added where surfaces part is told apart (steps_of_law).
     if (does[PARTS] == 0.0) added_ = std::max(added_, added);
-    const double least = 0.5 * s[MASS] * speed * speed + s[TARGETS] + ROUND_OFF * s[SIZE];
+    const double least = 0.5 * s[MASS] * speed * speed + s[RESIDUALS] + ROUND_OFF * s[SIZE];
     const double most = least + s[TURNS];
     // Where surfaces part others may gain by that, whatever is given back.
     if (does[GIVES_BACK] > 0.0 && does[PARTS] == 0.0 && added > most)

@@ -8,8 +8,11 @@
 //
 //   1/2 M (10 b)^2 + sum over contacts of |lambda| (t + s) / h
 //
-// t is the target of the contact [length] (inelastic_contact_targets.h), s the length by which its
-// gap closes because bodies turn, or walls curve, in the step: velocities open it by as much more.
+// t is the target of the contact [length] (inelastic_contact_targets.h), at most the accuracy's part
+// of the length by which its surfaces approach in the step without contacts; s the length by which
+// its gap closes because bodies turn, or walls curve, in the step: velocities open it by as much
+// more. (Targets grow with the velocities that they are for: without the approach they would allow
+// what throws a grain out of a wedge.)
 
 #ifndef INELASTIC_ENERGY_WATCH_H
 #define INELASTIC_ENERGY_WATCH_H
@@ -74,9 +77,9 @@ class EnergyWatch : protected Pointers {
   const Movers &movers_;
   Clusters clusters_;
   // Per cluster: its mass; what contacts add, those of a law beside others, and the sizes of what
-  // they take and give; and what targets and turning allow [energy]. Whether it gives overlaps
+  // they take and give; and what residuals and turning allow [energy]. Whether it gives overlaps
   // back, and whether the law has surfaces part.
-  enum { MASS, ADDED, BY_LAW, SIZE, TARGETS, TURNS, SUMS };
+  enum { MASS, ADDED, BY_LAW, SIZE, RESIDUALS, TURNS, SUMS };
   enum { GIVES_BACK, PARTS, DOES };
   std::vector<double> sums_, does_;
   double added_ = 0.0, most_ = 0.0, times_too_much_ = 0.0;
