@@ -175,8 +175,8 @@ def read_energy_told(screen: str) -> dict[int, int]:
 def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
     """Check all parts of a scene that ran in a folder. See `scene_generator` for the facts."""
     report = Report()
-    # The overlaps that steps have left, the last one and each by its number: a part goes on from the
-    # last one, or from a restart file of an earlier one.
+    # The overlaps that steps have left, the last one and each by its number: a part goes on from
+    # the last one, or from a restart file of an earlier one.
     left, left_by = 0.0, dict[int, float]()
     energy_told = read_energy_told(screen)
     for number, (tolerance, thermo) in read_thermo(screen).items():
