@@ -8,11 +8,11 @@
 //
 //   1/2 M (10 b)^2 + sum over contacts of |lambda| (t + s) / h
 //
-// t is the target of the contact [length] (inelastic_contact_targets.h), at most the accuracy's part
-// of the length by which its surfaces approach in the step without contacts; s the length by which
-// its gap closes because bodies turn, or walls curve, in the step: velocities open it by as much
-// more. (Targets grow with the velocities that they are for: without the approach they would allow
-// what throws a grain out of a wedge.)
+// t is the target of the contact [length] (inelastic_contact_targets.h), at most the accuracy's
+// part of the length by which its surfaces approach in the step without contacts; s the length by
+// which its gap closes because bodies turn, or walls curve, in the step: velocities open it by as
+// much more. (Targets grow with the velocities that they are for: without the approach they would
+// allow what throws a grain out of a wedge.)
 
 #ifndef INELASTIC_ENERGY_WATCH_H
 #define INELASTIC_ENERGY_WATCH_H

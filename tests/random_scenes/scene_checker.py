@@ -175,15 +175,15 @@ def read_energy_told(screen: str) -> dict[int, int]:
 def check(folder: Path, facts: dict[str, Any], screen: str) -> Report:
     """Check all parts of a scene that ran in a folder. See `scene_generator` for the facts."""
     report = Report()
-    # The overlaps that steps have left, of the last one and by its number: a restart file may be of
-    # an earlier one.
+    # The overlaps that steps have left, the last one and each by its number: a part goes on from
+    # the last one, or from a restart file of an earlier one.
     left, left_by = 0.0, dict[int, float]()
     energy_told = read_energy_told(screen)
     for number, (tolerance, thermo) in read_thermo(screen).items():
         particles = read_tables(folder / f"particles.{number:02d}.dump")
         contacts = read_tables(folder / f"contacts.{number:02d}.dump", CONTACTS)
         bodies = read_tables(folder / f"bodies.{number:02d}.dump", BODY_COLUMNS)
-        begun_with = left_by.get(particles[0].step, left) if particles else left
+        begun_with = max(left, left_by.get(particles[0].step, 0.0)) if particles else left
         part = _Part(report, facts, f"part {number}", tolerance, begun_with)
         last: _Frame | None = None
         for k, (table, rows) in enumerate(zip(particles, contacts, strict=False)):
