@@ -16,7 +16,7 @@ namespace {
 
   // Sweeps of which the largest change is in half of their number no smaller by this factor are of
   // no more use, if there were so many.
-  constexpr long LONG = 1000;
+  constexpr long LONG = 5000;
   constexpr double STUCK = 0.8;
 
   // The residual is looked at in every so many sweeps at least, to see whether it comes down.
