@@ -48,20 +48,12 @@ void ContactTargets::begin(const ContactProblem &problem, const GapOperator &gap
   }
 }
 
-void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits &limits,
-                               const GapOperator &gap_operator)
+// Finds of what round-off is a part.
+void ContactTargets::find_lengths(const ContactProblem &problem)
 {
   const ContactSet &contacts = problem.contacts;
-  const std::size_t count = contacts.size();
-  least_.resize(count);
-  part_.resize(count);
-  if (limits.accuracy == 0.0) {
-    std::fill(least_.begin(), least_.end(), limits.tolerance);
-    std::fill(part_.begin(), part_.end(), 0.0);
-    return;
-  }
   carried_.assign(problem.slots(), 0.0);
-  for (std::size_t c = 0; c < count; ++c) {
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
     const double load = contacts.magnitude(c) * diagonal_[c];
     if (load == 0.0) continue;
     carried_[grain(problem, contacts.first[c])] += load;
@@ -73,17 +65,27 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
   length_.resize(carried_.size());
   for (std::size_t i = 0; i < length_.size(); ++i)
     length_[i] = carried_[grain(problem, static_cast<int>(i))] + problem.timestep * norm(v + 3 * i);
-  for (std::size_t c = 0; c < count; ++c) {
-    const bool of_bodies = problem.is_member(contacts.first[c]) ||
-        problem.is_member(contacts.second[c]);
-    part_[c] = (of_bodies ? OF_BODIES : IN_NETWORKS) * limits.accuracy * limits.coarseness *
-        contacts.refinement[c];
-    const double length = std::abs(gap_operator.free_gap()[c]) + length_[contacts.first[c]] +
-        length_[contacts.second[c]];
-    least_[c] = std::max({ROUND_OFF * length, limits.least_length,
-                          std::numeric_limits<double>::epsilon() * limits.tolerance,
-                          part_[c] * of_guess_[c]});
+}
+
+// Sets what the target of a contact takes of it, whatever the changes of velocity are.
+void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits &limits,
+                               const GapOperator &gap_operator, std::size_t c)
+{
+  const ContactSet &contacts = problem.contacts;
+  if (limits.accuracy == 0.0) {
+    least_[c] = limits.tolerance;
+    part_[c] = 0.0;
+    return;
   }
+  const bool of_bodies = problem.is_member(contacts.first[c]) ||
+      problem.is_member(contacts.second[c]);
+  part_[c] = (of_bodies ? OF_BODIES : IN_NETWORKS) * limits.accuracy * limits.coarseness *
+      contacts.refinement[c];
+  const double length = std::abs(gap_operator.free_gap()[c]) + length_[contacts.first[c]] +
+      length_[contacts.second[c]];
+  least_[c] = std::max({ROUND_OFF * length, limits.least_length,
+                        std::numeric_limits<double>::epsilon() * limits.tolerance,
+                        part_[c] * of_guess_[c]});
 }
 
 double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &limits,
@@ -103,22 +105,24 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
   const ContactSet &contacts = problem.contacts;
   const std::vector<double> &change = gap_operator.change();
   constexpr double NEAR = 5.0;    // tolerances
-  set_least(problem, limits, gap_operator);
+  if (limits.accuracy > 0.0) find_lengths(problem);
   constexpr double NONE = std::numeric_limits<double>::max();
-  std::vector<double> of_slot(problem.slots(), NONE);
-  for (std::size_t i = 0; limits.accuracy > 0.0 && i < of_slot.size(); ++i) {
+  changed_.assign(problem.slots(), NONE);
+  for (std::size_t i = 0; limits.accuracy > 0.0 && i < changed_.size(); ++i) {
     if (!problem.is_mobile(static_cast<int>(i))) continue;
     const double *const now = &change[3 * i], *const before = &change_by_guess_[3 * i];
     const double added[3] = {now[0] - before[0], now[1] - before[1], now[2] - before[2]};
-    of_slot[i] = problem.timestep * std::max(norm(now), norm(added));
+    changed_[i] = problem.timestep * std::max(norm(now), norm(added));
   }
   // The largest part of a target, the largest target, the largest part that is unresolved, and the
   // residual.
   double maxima[5] = {0.0, 0.0, 0.0, 0.0, 0.0};
-  resolved_.resize(contacts.size());
+  for (std::vector<double> *const of_contacts : {&least_, &part_, &resolved_})
+    of_contacts->resize(contacts.size());
   for (std::size_t c = 0; c < contacts.size(); ++c) {
+    set_least(problem, limits, gap_operator, c);
     const double by_velocity =
-        part_[c] * std::min(of_slot[contacts.first[c]], of_slot[contacts.second[c]]);
+        part_[c] * std::min(changed_[contacts.first[c]], changed_[contacts.second[c]]);
     double target;
     find_free_target(by_velocity, least_[c], resolved_[c]);
     bound_target(resolved_[c], limits.tolerance, target);

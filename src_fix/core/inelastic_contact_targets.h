@@ -84,8 +84,9 @@ class ContactTargets {
   double judge(const ContactProblem &problem, const SolverLimits &limits,
                const GapOperator &gap_operator, const std::vector<double> &gap, Counts counts,
                Host &host);
+  void find_lengths(const ContactProblem &problem);
   void set_least(const ContactProblem &problem, const SolverLimits &limits,
-                 const GapOperator &gap_operator);
+                 const GapOperator &gap_operator, std::size_t c);
 
   std::vector<double> diagonal_;
   std::vector<double> of_guess_;    // [length] max(r_c, l_c / 50000)
@@ -93,6 +94,7 @@ class ContactTargets {
   std::vector<double> least_, part_, resolved_;
   // [length] per slot: the impulses on it, and with its own motion, for the round-off
   std::vector<double> carried_, length_;
+  std::vector<double> changed_;    // [length] per slot that can move: max(s_i, n_i)
   Residual residual_;
   double largest_ = 0.0, unresolved_ = 0.0;
 };

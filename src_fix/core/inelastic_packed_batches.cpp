@@ -1,7 +1,6 @@
 #include "inelastic_packed_batches.h"
 
 #include <cstdint>
-#include <utility>
 
 namespace inelastic {
 
@@ -60,6 +59,12 @@ template <typename Batch>
 std::vector<std::size_t> PackedBatches<Batch>::add(const ConstraintColours &colours)
 {
   constexpr int LAST = ConstraintColours::LAST;
+  // Where none were packed so far the room for all is made at once.
+  if (batches.empty()) {
+    const std::size_t most = colours.size() / WIDTH + LAST + colours.count(LAST);
+    batches.reserve(most);
+    details.reserve(most);
+  }
   std::size_t next[ConstraintColours::NUMBER];
   for (int colour = 0; colour <= LAST; ++colour) {
     const std::size_t count = colours.count(colour);
@@ -118,26 +123,27 @@ template <typename Batch> void PackedBatches<Batch>::close_up()
 template <typename Batch>
 void PackedBatches<Batch>::leave_out(const std::vector<std::size_t> &places)
 {
-  PackedBatches kept;
-  kept.clear(nobody_, has_springs_);
   auto next = places.begin();
-  std::size_t begin = 0;
-  std::vector<std::size_t> of_colour;
+  std::size_t begin = 0, to = 0, colours = 0;
   for (const std::size_t end : colour_end_) {
-    of_colour.clear();
+    const std::size_t first = to;
     for (std::size_t place = begin * WIDTH; place < end * WIDTH; ++place) {
       if (next != places.end() && *next == place)
         ++next;
-      else if (!is_empty(place))
-        of_colour.push_back(place);
+      else if (!is_empty(place)) {
+        if (to != place) copy(*this, place, to);
+        ++to;
+      }
     }
     begin = end;
-    if (of_colour.empty()) continue;
-    std::size_t to = kept.lanes();
-    kept.add_colour(of_colour.size());
-    for (const std::size_t place : of_colour) kept.copy(*this, place, to++);
+    if (to == first) continue;
+    // What is left of the colour's last batch has been read.
+    for (; to % WIDTH != 0; ++to) clear_lane(to);
+    colour_end_[colours++] = to / WIDTH;
   }
-  *this = std::move(kept);
+  colour_end_.resize(colours);
+  batches.resize(to / WIDTH);
+  details.resize(to / WIDTH);
 }
 
 template class PackedBatches<swept::ParticleBatch>;

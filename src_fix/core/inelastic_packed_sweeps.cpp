@@ -246,20 +246,16 @@ template <typename Batch> void PackedSweeps<Batch>::look_at_idle(double least_id
   wake_near();
 }
 
-// Returns a gap that was looked at last, as a length in packed units.
-template <typename Batch> float PackedSweeps<Batch>::looked_gap(std::size_t place) const
-{ return looked_[place / WIDTH].gap[place % WIDTH]; }
-
 // Makes the idle constraints working whose gaps are not above idle_gap_. Their lanes are left empty
 // until half of all are: looks are frequent, and wake a few of many.
 template <typename Batch> void PackedSweeps<Batch>::wake_near()
 {
-  looked_.resize(idle_.batches.size());
-  swept::look(idle_.batches, idle_.details.data(), idle_.springs(), states_.data(), looked_.data());
+  look_at(idle_, looked_idle_);
   std::vector<std::size_t> near;
   std::size_t empty = 0;
   for (std::size_t place = 0; place < idle_.lanes(); ++place) {
-    if (looked_gap(place) > idle_gap_) continue;    // that of an empty lane is 0
+    // That of an empty lane is 0.
+    if (looked_idle_[place / WIDTH].gap[place % WIDTH] > idle_gap_) continue;
     if (idle_.is_empty(place))
       ++empty;
     else
@@ -294,22 +290,13 @@ template <typename Batch> void PackedSweeps<Batch>::wake(const std::vector<std::
   }
 }
 
-// Returns the largest residual of working constraints, as a length in packed units, and lists those
-// that have no impulse, with their gaps.
+// Looks at all batches. Returns their largest residual, as a length in packed units.
 template <typename Batch>
-float PackedSweeps<Batch>::look_at(const Packed &packed, std::vector<Unloaded> &unloaded)
+float PackedSweeps<Batch>::look_at(const Packed &packed, Looked &looked) const
 {
-  looked_.resize(packed.batches.size());
-  const float residual = swept::look(packed.batches, packed.details.data(), packed.springs(),
-                                     states_.data(), looked_.data());
-  for (std::size_t g = 0; g < packed.batches.size(); ++g)
-    for (unsigned lanes = looked_[g].unloaded; lanes != 0; lanes &= lanes - 1) {
-      const std::size_t place = g * WIDTH + __builtin_ctz(lanes);
-      if (!packed.is_empty(place) &&
-          !of_impulses_[packed.details[g].source[place % WIDTH]].may_pull())
-        unloaded.push_back({place, looked_gap(place)});
-    }
-  return residual;
+  looked.resize(packed.batches.size());
+  return swept::look(packed.batches, packed.details.data(), packed.springs(), states_.data(),
+                     looked.data());
 }
 
 // Sets the gap above which a constraint without an impulse is idle: by the present residual, or
@@ -317,21 +304,26 @@ float PackedSweeps<Batch>::look_at(const Packed &packed, std::vector<Unloaded> &
 // far from closed.
 template <typename Batch> void PackedSweeps<Batch>::set_idle(double least_idle_gap)
 {
-  std::vector<Unloaded> at_cuts, inside;
-  const float residual = std::max(look_at(at_cuts_, at_cuts), look_at(inside_, inside));
+  const float residual =
+      std::max(look_at(at_cuts_, looked_at_cuts_), look_at(inside_, looked_inside_));
   idle_gap_ = std::max(static_cast<float>(least_idle_gap), static_cast<float>(IDLE_GAP) * residual);
-  make_idle(at_cuts, at_cuts_);
-  make_idle(inside, inside_);
+  make_idle(looked_at_cuts_, at_cuts_);
+  make_idle(looked_inside_, inside_);
 }
 
 // Makes constraints without an impulse idle whose gaps are far from closed, if they are more than a
 // few.
 template <typename Batch>
-void PackedSweeps<Batch>::make_idle(const std::vector<Unloaded> &unloaded, Packed &packed)
+void PackedSweeps<Batch>::make_idle(const Looked &looked, Packed &packed)
 {
   std::vector<std::size_t> far;
-  for (const Unloaded &one : unloaded)
-    if (one.gap > idle_gap_) far.push_back(one.place);
+  for (std::size_t g = 0; g < packed.batches.size(); ++g)
+    for (unsigned lanes = looked[g].unloaded; lanes != 0; lanes &= lanes - 1) {
+      const int lane = __builtin_ctz(lanes);
+      const std::size_t c = packed.details[g].source[lane];
+      if (looked[g].gap[lane] > idle_gap_ && c != swept::NONE && !of_impulses_[c].may_pull())
+        far.push_back(g * WIDTH + static_cast<std::size_t>(lane));
+    }
   if (far.size() <= packed.lanes() / FEW_IDLE) return;
   std::size_t idle = idle_.used();
   idle_.resize_for(idle + far.size());

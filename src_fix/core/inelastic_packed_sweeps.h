@@ -72,11 +72,7 @@ template <typename Batch> class PackedSweeps {
   using Packed = PackedBatches<Batch>;
   static constexpr int WIDTH = swept::WIDTH;
 
-  // A constraint without an impulse, by its place, and its gap.
-  struct Unloaded {
-    std::size_t place;
-    float gap;
-  };
+  using Looked = std::vector<swept::Looked>;    // by batch
 
   double find_unsolved(const Packed &packed, float blur) const
   { return swept::find_unsolved(packed.batches, packed.springs(), states_.data(), blur); }
@@ -87,11 +83,10 @@ template <typename Batch> class PackedSweeps {
   void write_idle(const std::vector<std::size_t> &constraints);
   void wake_near();
   void wake(const std::vector<std::size_t> &near);
-  float look_at(const Packed &packed, std::vector<Unloaded> &unloaded);
+  float look_at(const Packed &packed, Looked &looked) const;
   void set_idle(double least_idle_gap);
-  void make_idle(const std::vector<Unloaded> &unloaded, Packed &packed);
+  void make_idle(const Looked &looked, Packed &packed);
   void set_targets(Packed &packed, std::size_t from) const;
-  float looked_gap(std::size_t place) const;
   const std::vector<Vector> &velocities();
 
   // What `prepare` was given. Until all of it is packed nothing of it changes but the impulses.
@@ -108,7 +103,7 @@ template <typename Batch> class PackedSweeps {
   std::vector<AdmissibleSet<double>>
       of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;
-  std::vector<swept::Looked> looked_;
+  Looked looked_at_cuts_, looked_inside_, looked_idle_;
   float idle_gap_ = 0.0f;    // above it a constraint without an impulse is idle
 };
 

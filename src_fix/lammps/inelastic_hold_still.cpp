@@ -51,7 +51,12 @@ bool HoldStill::run(const Held &held, const Constraints &constraints)
   std::vector<double> &impulse = step_.problem.contacts.impulse;
   solved_ = step_.velocity;
   for (int round = 0; round < MOST_ROUNDS; ++round) {
-    const inelastic::SolverResult result = project(held);
+    // Mostly the moving particles have room as they are: all contacts take part only where those of
+    // held particles ask for a change.
+    inelastic::SolverResult result;
+    if (round == 0) result = project(held, Of::HELD, 0);
+    if (round > 0 || result.status != inelastic::Status::CONVERGED)
+      result = project(held, Of::ALL, std::min(MOST_ITERATIONS, step_.settings.max_iterations));
     iterations_ += result.iterations;
     if (result.status != inelastic::Status::CONVERGED) return false;
     turn_bodies();
@@ -67,11 +72,11 @@ bool HoldStill::run(const Held &held, const Constraints &constraints)
   return false;
 }
 
+bool HoldStill::is_held(const Held &held, int slot) const
+{ return !step_.problem.is_wall(slot) && held.particles[slot]; }
+
 bool HoldStill::is_still(const Held &held, int slot) const
-{
-  const bool particle = !step_.problem.is_wall(slot);
-  return (particle && held.particles[slot]) || !step_.problem.is_mobile(slot);
-}
+{ return is_held(held, slot) || !step_.problem.is_mobile(slot); }
 
 // Tells whether what is held may go on as it is to, beside what cannot give way.
 bool HoldStill::has_room(const Held &held) const
@@ -98,10 +103,7 @@ bool HoldStill::opens_under_force(const Held &held) const
   const double tolerance = step_.settings.tolerance;
   for (std::size_t c = 0; c < impulse.size(); ++c) {
     const int i = step_.problem.contacts.first[c], j = step_.problem.contacts.second[c];
-    const auto is_held = [&](int slot) {
-      return !step_.problem.is_wall(slot) && held.particles[slot];
-    };
-    if (!(impulse[c] > 0.0) || is_held(i) || is_held(j)) continue;
+    if (!(impulse[c] > 0.0) || is_held(held, i) || is_held(held, j)) continue;
     const bool pushed = c < impulse_before_.size() && impulse_before_[c] > 0.0;
     const bool was_open = pushed && step_.linear_gap_at_end(c, velocity_before_) > tolerance;
     if (!was_open && step_.linear_gap_at_end(c, step_.velocity) > tolerance) return true;
@@ -110,7 +112,7 @@ bool HoldStill::opens_under_force(const Held &held) const
 }
 
 // Projects the velocities of the step with the held particles as obstacles.
-inelastic::SolverResult HoldStill::project(const Held &held)
+inelastic::SolverResult HoldStill::project(const Held &held, Of of, long most_iterations)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   moving_.timestep = problem.timestep;
@@ -131,13 +133,14 @@ inelastic::SolverResult HoldStill::project(const Held &held)
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     const double *const n = &problem.contacts.normal[3 * c];
     const int i = problem.contacts.first[c], j = problem.contacts.second[c];
+    if (of == Of::HELD && !is_held(held, i) && !is_held(held, j)) continue;
     if (moving_.mobility_of_pair(i, j, n) == 0.0) continue;
     // An obstacle counts as if it went on as it was solved for: what is not known of its velocity
     // takes no force away from what it touches. But a contact that counts as closed, and overlaps,
     // is to end within the tolerance, the residual included.
     double along = 0.0;
     for (const auto &[slot, sign] : {std::pair{i, 1.0}, std::pair{j, -1.0}}) {
-      if (problem.is_wall(slot) || !held.particles[slot]) continue;
+      if (!is_held(held, slot)) continue;
       for (std::size_t d = 0; d < 3; ++d) {
         const std::size_t k = 3 * static_cast<std::size_t>(slot) + d;
         along += sign * n[d] * (solved_[k] - held.velocity[k]);
@@ -163,7 +166,7 @@ inelastic::SolverResult HoldStill::project(const Held &held)
   }
   inelastic::SolverLimits limits;
   limits.tolerance = step_.eps(ADDED_BESIDE_REST);
-  limits.max_iterations = std::min(MOST_ITERATIONS, step_.settings.max_iterations);
+  limits.max_iterations = most_iterations;
   const inelastic::SolverResult result = solver_->solve(moving_, limits, ranks_);
   if (result.status != inelastic::Status::CONVERGED) return result;
   solver_->gap_operator().velocity_applied(moving_, step_.velocity.data());

@@ -59,9 +59,11 @@ class HoldStill {
   long iterations() const { return iterations_; }    // since begin()
 
  private:
-  inelastic::SolverResult project(const Held &held);
+  enum class Of { HELD, ALL };    // contacts: those of held particles, or all
+  inelastic::SolverResult project(const Held &held, Of of, long most_iterations);
   bool has_room(const Held &held) const;
   bool opens_under_force(const Held &held) const;
+  bool is_held(const Held &held, int slot) const;
   bool is_still(const Held &held, int slot) const;
   void turn_bodies();
 
