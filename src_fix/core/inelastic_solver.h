@@ -137,9 +137,12 @@ struct Network {
   {
     constexpr double FEW = 60.0, CHAIN = 1.5;
     if (contacts < std::max(FEW, CHAIN * particles)) return std::numeric_limits<long>::max();
-    return std::max(LEAST_ON_PLATEAU, enough_iterations());
+    return std::max({LEAST_ON_PLATEAU, enough_iterations(), static_cast<long>(CHEAP / contacts)});
   }
   static constexpr long LEAST_ON_PLATEAU = 150;
+  // Iterations times contacts, some milliseconds, that are worth an exact solution: a few hundred
+  // contacts of grains that are wedged along a curved wall can need ten thousand iterations.
+  static constexpr double CHEAP = 1.0e6;
 };
 
 // Collective.

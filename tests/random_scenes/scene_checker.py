@@ -923,8 +923,8 @@ class _Part:
     def stopped(self, clusters: Clusters, off: Array, v: Array, sizes: Array) -> Array:
         """(spheres,) Which grains move as their cluster does, of those with forces of no contact.
 
-        Stopped grains have one velocity, along which no wall and no frozen sphere holds them: each
-        shares it with another one, or is alone against what holds it.
+        Stopped grains have one velocity, along which no wall and no frozen sphere holds them, as
+        free_directions() has it: each shares it with another one, or is alone against what holds it.
         """
         found = np.zeros(len(off), dtype=bool)
         for spheres, rows in clusters:
@@ -936,7 +936,7 @@ class _Part:
                 others = grains[grains != grain]
                 shared = np.linalg.norm(v[others] - v[grain], axis=1) <= slack
                 own = clusters.normal[rows][clusters.grain[clusters.held[rows]] == grain]
-                moves = np.abs(own @ v[grain]) > slack
+                moves = np.abs(own @ v[grain]) > slack + HOLDS * np.linalg.norm(v[grain])
                 if not moves.any() and (shared.any() or len(own)):
                     found |= clusters.grain == grain
         return found

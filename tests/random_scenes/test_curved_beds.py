@@ -16,8 +16,10 @@ def programs() -> Programs:
 
 
 # A sphere that came to rest on its trial pushed another one, which did not feel it; one that was
-# pressed between six nearly parallel walls passed the error of its velocity on to others.
-FOUND = (1735, 1963)
+# pressed between six nearly parallel walls passed the error of its velocity on to others; a search
+# in a small network gave up where some thousand iterations more had a solution; and two grains that
+# rest, but slide around a cone together, were taken for moving ones by the checker.
+FOUND = (1735, 1963, 1132, 1642)
 
 
 @pytest.mark.parametrize("seed", FOUND)
