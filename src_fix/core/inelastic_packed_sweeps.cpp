@@ -313,8 +313,7 @@ template <typename Batch> void PackedSweeps<Batch>::set_idle(double least_idle_g
 
 // Makes constraints without an impulse idle whose gaps are far from closed, if they are more than a
 // few.
-template <typename Batch>
-void PackedSweeps<Batch>::make_idle(const Looked &looked, Packed &packed)
+template <typename Batch> void PackedSweeps<Batch>::make_idle(const Looked &looked, Packed &packed)
 {
   std::vector<std::size_t> far;
   for (std::size_t g = 0; g < packed.batches.size(); ++g)

@@ -1431,8 +1431,8 @@ void complete(const RigidBodies &bodies, std::vector<Share> &shares)
 }
 
 // What ranks wait for each other for, however many searches a solver is a chain of. An iteration
-// costs one exchange and one reduction, and so does a verdict; a round's first guess costs a verdict
-// and a reduction more, and there is one of what the source of contacts has added. The last
+// costs one exchange and one reduction, and so does a verdict; a round's first guess costs a
+// verdict and a reduction more, and there is one of what the source of contacts has added. The last
 // iteration before a verdict may spare its exchange.
 void check_calls(const Ranks &ranks, const ProjectionResult &result)
 {

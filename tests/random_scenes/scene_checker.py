@@ -923,8 +923,8 @@ class _Part:
     def stopped(self, clusters: Clusters, off: Array, v: Array, sizes: Array) -> Array:
         """(spheres,) Which grains move as their cluster does, of those with forces of no contact.
 
-        Stopped grains have one velocity, along which no wall and no frozen sphere holds them, as
-        free_directions() has it: each shares it with another one, or is alone against what holds it.
+        Stopped grains have one velocity, along which no wall and no frozen sphere holds them (as
+        free_directions() has it): each shares it with another one, or is alone against these.
         """
         found = np.zeros(len(off), dtype=bool)
         for spheres, rows in clusters:
