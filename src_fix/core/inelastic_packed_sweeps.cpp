@@ -250,12 +250,12 @@ template <typename Batch> void PackedSweeps<Batch>::look_at_idle(double least_id
 // until half of all are: looks are frequent, and wake a few of many.
 template <typename Batch> void PackedSweeps<Batch>::wake_near()
 {
-  look_at(idle_, looked_idle_);
+  look_at(idle_, looked_.idle);
   std::vector<std::size_t> near;
   std::size_t empty = 0;
   for (std::size_t place = 0; place < idle_.lanes(); ++place) {
     // That of an empty lane is 0.
-    if (looked_idle_[place / WIDTH].gap[place % WIDTH] > idle_gap_) continue;
+    if (looked_.idle[place / WIDTH].gap[place % WIDTH] > idle_gap_) continue;
     if (idle_.is_empty(place))
       ++empty;
     else
@@ -305,10 +305,10 @@ float PackedSweeps<Batch>::look_at(const Packed &packed, Looked &looked) const
 template <typename Batch> void PackedSweeps<Batch>::set_idle(double least_idle_gap)
 {
   const float residual =
-      std::max(look_at(at_cuts_, looked_at_cuts_), look_at(inside_, looked_inside_));
+      std::max(look_at(at_cuts_, looked_.at_cuts), look_at(inside_, looked_.inside));
   idle_gap_ = std::max(static_cast<float>(least_idle_gap), static_cast<float>(IDLE_GAP) * residual);
-  make_idle(looked_at_cuts_, at_cuts_);
-  make_idle(looked_inside_, inside_);
+  make_idle(looked_.at_cuts, at_cuts_);
+  make_idle(looked_.inside, inside_);
 }
 
 // Makes constraints without an impulse idle whose gaps are far from closed, if they are more than a

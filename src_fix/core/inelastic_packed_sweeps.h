@@ -103,7 +103,9 @@ template <typename Batch> class PackedSweeps {
   std::vector<AdmissibleSet<double>>
       of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;
-  Looked looked_at_cuts_, looked_inside_, looked_idle_;
+  struct {
+    Looked at_cuts, inside, idle;
+  } looked_;
   float idle_gap_ = 0.0f;    // above it a constraint without an impulse is idle
 };
 

@@ -111,8 +111,8 @@ bool HoldStill::opens_under_force(const Held &held) const
   return false;
 }
 
-// Projects the velocities of the step with the held particles as obstacles.
-inelastic::SolverResult HoldStill::project(const Held &held, Of of, long most_iterations)
+// What moves, and obstacles in place of what is held.
+void HoldStill::set_up(const Held &held)
 {
   const inelastic::ContactProblem &problem = step_.problem;
   moving_.timestep = problem.timestep;
@@ -127,6 +127,13 @@ inelastic::SolverResult HoldStill::project(const Held &held, Of of, long most_it
     moving_.bodies.inverse_mass[b] = 0.0;
     std::fill_n(&moving_.bodies.inverse_inertia[6 * b], 6, 0.0);
   }
+}
+
+// Projects the velocities of the step with the held particles as obstacles.
+inelastic::SolverResult HoldStill::project(const Held &held, Of of, long most_iterations)
+{
+  const inelastic::ContactProblem &problem = step_.problem;
+  set_up(held);
   inelastic::ContactSet &contacts = moving_.contacts;
   contacts.clear();
   std::vector<std::size_t> source;

@@ -60,6 +60,7 @@ class HoldStill {
 
  private:
   enum class Of { HELD, ALL };    // contacts: those of held particles, or all
+  void set_up(const Held &held);
   inelastic::SolverResult project(const Held &held, Of of, long most_iterations);
   bool has_room(const Held &held) const;
   bool opens_under_force(const Held &held) const;

@@ -190,10 +190,10 @@ def test_each_size_is_there_as_often_as_asked() -> None:
 @pytest.mark.parametrize("unit", [1e-9, 1e-3, 1e6])
 def test_any_unit_of_length(unit: float) -> None:
     """Forces are those of the units: all weights lie on the floor."""
-    packing = quiet(30, sizes=unit, container=Box(4 * unit), density=2500.0, gravity=1.6)
+    packing = quiet(60, sizes=unit, container=Box(4 * unit), density=2500.0, gravity=1.6)
     assert largest_overlap(packing) <= 1e-5 * 0.5 * unit * (1 + 1e-6)
     floor = packing.contacts.ids[:, 1] == -3
-    weight = 30 * 2500.0 * np.pi / 6 * unit**3 * 1.6
+    weight = 60 * 2500.0 * np.pi / 6 * unit**3 * 1.6
     # What is at rest within the solver's accuracy of a per mille.
     assert packing.forces[floor].sum() == pytest.approx(weight, rel=0.01)
 
