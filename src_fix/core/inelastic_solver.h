@@ -137,12 +137,7 @@ struct Network {
   {
     constexpr double FEW = 60.0, CHAIN = 1.5;
     if (contacts < std::max(FEW, CHAIN * particles)) return std::numeric_limits<long>::max();
-    // A network that holds its grains without more contacts than that takes has a solution. Some
-    // milliseconds are spent on it: a few hundred contacts of grains that are wedged along a curved
-    // wall can need ten thousand iterations.
-    constexpr double ISOSTATIC = 3.0, CHEAP = 1.0e6;    // contacts per particle; visits
-    const double worth_it = contacts <= ISOSTATIC * particles ? CHEAP / contacts : 0.0;
-    return std::max({LEAST_ON_PLATEAU, enough_iterations(), static_cast<long>(worth_it)});
+    return std::max(LEAST_ON_PLATEAU, enough_iterations());
   }
   static constexpr long LEAST_ON_PLATEAU = 150;
 };
