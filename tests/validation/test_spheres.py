@@ -110,6 +110,7 @@ SCENES = {
             shipped_deck("spheres")
             .replace("shorten yes", "shorten no")
             .replace("neighbor        ${skin} bin", "neighbor 0.4 bin")
+            .replace("neighbor        ${skin_shaken} bin", "neighbor 0.4 bin")
             .replace("neighbor        ${skin_bed} bin", "neighbor 0.4 bin"),
             "variable lift equal 0.2*(1-cos(20*time))\n"
             "region walls block 0 1 0 6 0 1 units box move NULL v_lift NULL",
@@ -142,6 +143,7 @@ def test_overlap_of_every_step(name: str, tmp_path: Path) -> None:
     # The overlaps are those of the first two phases. The set-up of the others, which have no steps,
     # projects too: with longer steps a moving floor would throw spheres out of the list there.
     values: dict[str, object] = {
+        "dt": timestep,
         "dump_every": 1,
         "steps_agitated": 250,
         "steps_settling": 100,
