@@ -112,8 +112,9 @@ def shaken_alike(
     }
 
 
-# Phases in which a bed gives way to the end: what decks have by default is shorter.
+# Phases in which a bed gives way to the end: what decks have by default is shorter, and less exact.
 TO_THE_END: dict[str, object] = {
+    "accuracy": 0.001,
     "dt_resting": 0.02,
     "steps_resting": 200,
     "steps_tightening": 20,
