@@ -43,8 +43,7 @@ def test_floppy_modes(name: str, timestep: float, tmp_path: Path) -> None:
     deck, variables, force, most = SCENES[name]
     medians, worst = [], []
     for seed in (1, 2, 3):
-        # With 20 steps before contacts are counted half of the packings of 1.8 keep the bounds: they
-        # give way in each of them.
+        # With 20 steps before contacts are counted half of the packings of 1.8 keep the bounds.
         alike = {**shaken_alike(force, 4, 2, timestep), **TO_THE_END, "steps_tightening": 40}
         folder = tmp_path / str(seed)
         run_deck(
