@@ -62,6 +62,9 @@ PUSHED = 0.05
 NORMAL_AT_WALL = 1e-9
 # Contacts hold a direction if their normals have more than such a part along it.
 HOLDS = 10 * NORMAL_AT_WALL
+# What is at rest may still move along a direction along which they have at most such a part: the
+# root of three times what the fix takes for round-off of their squares.
+SLIDES = 2e-6
 
 
 @dataclass
@@ -936,7 +939,7 @@ class _Part:
                 others = grains[grains != grain]
                 shared = np.linalg.norm(v[others] - v[grain], axis=1) <= slack
                 own = clusters.normal[rows][clusters.grain[clusters.held[rows]] == grain]
-                moves = np.abs(own @ v[grain]) > slack
+                moves = np.abs(own @ v[grain]) > slack + SLIDES * np.linalg.norm(v[grain])
                 if not moves.any() and (shared.any() or len(own)):
                     found |= clusters.grain == grain
         return found
