@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
@@ -81,10 +82,12 @@ void EnergyWatch::add_up(const std::vector<double> &target)
     double *const s = &sums_[SUMS * k];
     s[ADDED] += added;
     s[SIZE] += 0.5 * std::abs(impulse) * (std::abs(after) + std::abs(before));
-    const double to_stop = step_.settings.accuracy * h * std::max(0.0, -before);
-    s[RESIDUALS] += std::abs(impulse) * std::min(target[c], to_stop) / h;
+    s[TARGETS] += std::abs(impulse) * target[c] / h;
+    s[IMPULSES] += std::abs(impulse);
     s[TURNS] += std::abs(impulse) * rules_.closed_by_turning(c) / h;
     if (contact.asked.parts || contact.asked.set.may_pull()) s[BY_LAW] += std::max(0.0, added);
+    double &approach = does_[DOES * k + APPROACH];
+    approach = std::max(approach, -before);
     if (impulse > 0.0 && contact.gap_now < 0.0 && after > 0.0) does_[DOES * k + GIVES_BACK] = 1.0;
     if (contact.asked.parts) does_[DOES * k + PARTS] = 1.0;
   }
@@ -101,8 +104,11 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
   constexpr double TURNING_ADDS = 1.0e-5;
   added_ = times_too_much_ = 0.0;
   law_adds_ = false;
-  const double speed = TIMES_AS_FAST * fastest_given_back();
-  if (speed == 0.0 && !parts_) return false;
+  const double given_back = fastest_given_back();
+  if (given_back == 0.0 && !parts_) return false;
+  // Overlaps are known to the round-off of a length alone.
+  const double least_known = std::numeric_limits<double>::epsilon() * step_.largest_radius;
+  const double speed = TIMES_AS_FAST * std::max(given_back, least_known / step_.problem.timestep);
   add_up(target);
   double law_adds = 0.0;
   for (std::size_t k = 0; k < clusters_.size(); ++k) {
@@ -111,7 +117,9 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
     const double added = s[ADDED] - s[BY_LAW];
     // What is added where surfaces part is told apart (steps_of_law).
     if (does[PARTS] == 0.0) added_ = std::max(added_, added);
-    const double least = 0.5 * s[MASS] * speed * speed + s[RESIDUALS] + ROUND_OFF * s[SIZE];
+    const double residuals =
+        std::min(s[TARGETS], step_.settings.accuracy * does[APPROACH] * s[IMPULSES]);
+    const double least = 0.5 * s[MASS] * speed * speed + residuals + ROUND_OFF * s[SIZE];
     const double most = least + s[TURNS];
     // Where surfaces part others may gain by that, whatever is given back.
     if (does[GIVES_BACK] > 0.0 && does[PARTS] == 0.0 && added > most)

@@ -8,11 +8,11 @@
 //
 //   1/2 M (10 b)^2 + sum over contacts of |lambda| (t + s) / h
 //
-// t is the target of the contact [length] (inelastic_contact_targets.h), at most the accuracy's
-// part of the length by which its surfaces approach in the step without contacts; s the length by
-// which its gap closes because bodies turn, or walls curve, in the step: velocities open it by as
-// much more. (Targets grow with the velocities that they are for: without the approach they would
-// allow what throws a grain out of a wedge.)
+// t is the target of the contact [length] (inelastic_contact_targets.h), s the length by which its
+// gap closes because bodies turn, or walls curve, in the step: velocities open it by as much more.
+// Targets grow with the velocities that they are for, and would allow what throws a grain out of a
+// wedge: where that is less, a cluster has the accuracy's part of the fastest approach of two of
+// its surfaces without contacts in place of t / h.
 
 #ifndef INELASTIC_ENERGY_WATCH_H
 #define INELASTIC_ENERGY_WATCH_H
@@ -77,10 +77,10 @@ class EnergyWatch : protected Pointers {
   const Movers &movers_;
   Clusters clusters_;
   // Per cluster: its mass; what contacts add, those of a law beside others, and the sizes of what
-  // they take and give; and what residuals and turning allow [energy]. Whether it gives overlaps
-  // back, and whether the law has surfaces part.
-  enum { MASS, ADDED, BY_LAW, SIZE, RESIDUALS, TURNS, SUMS };
-  enum { GIVES_BACK, PARTS, DOES };
+  // they take and give; what targets and turning allow [energy]; and the sizes of its impulses.
+  // Whether it gives overlaps back, whether the law has surfaces part, and the fastest approach.
+  enum { MASS, ADDED, BY_LAW, SIZE, TARGETS, TURNS, IMPULSES, SUMS };
+  enum { GIVES_BACK, PARTS, APPROACH, DOES };
   std::vector<double> sums_, does_;
   double added_ = 0.0, most_ = 0.0, times_too_much_ = 0.0;
   bool parts_ = false;    // some surfaces have been asked to part since the fix was defined
