@@ -79,7 +79,7 @@ bool Solve::ends_on_plateau(bool tries)
   const bool accurate = judge();
   if (limits.to_targets) return accurate;
   return accurate ||
-      (result.residual.largest() <= limits.tolerance && result.unresolved <= HARDLY_RESOLVED &&
+      (result.residual.largest() <= limits.tolerance && result.unresolved <= RESOLVED_ON_PLATEAU &&
        result.unresolved > WELL_RESOLVED);
 }
 

@@ -113,6 +113,9 @@ class Plateau {
 // A contact is hardly resolved if more than this part is left of what contacts change: forces then
 // say little.
 constexpr double HARDLY_RESOLVED = 0.1;
+// On a plateau a search ends only where no more is left: a grain that more of it pushes aside ends
+// far from where it should, and a few thousand iterations can be enough for it.
+constexpr double RESOLVED_ON_PLATEAU = 0.03;
 // Where no more is left contacts are resolved as well as the default accuracy asks for: a search
 // that comes so far is no lost one, and goes on to whatever its targets are.
 constexpr double WELL_RESOLVED = 1.0e-4;
