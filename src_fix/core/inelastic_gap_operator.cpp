@@ -104,8 +104,13 @@ double largest_eigenvalue(const ContactProblem &problem, Host &host)
 
   const std::size_t count = linear.contacts.size();
   std::vector<double> direction(count), image(count);
-  // The start is uneven, so that no eigenvector of a symmetric arrangement is orthogonal to it.
-  for (std::size_t c = 0; c < count; ++c) direction[c] = 1.0 + 0.5 * std::sin(1.0 + 7.0 * c);
+  // The start is uneven, so that no eigenvector of a symmetric arrangement is orthogonal to it: by
+  // the normal, too, since each rank counts its own constraints from 0.
+  for (std::size_t c = 0; c < count; ++c) {
+    const double *const n = &linear.contacts.normal[3 * c];
+    const double of_normal = 2.0 * n[0] + 3.0 * n[1] + 5.0 * n[2];
+    direction[c] = 1.0 + 0.5 * std::sin(1.0 + 7.0 * static_cast<double>(c) + of_normal);
+  }
 
   double estimate = 0.0;
   for (int k = 0; k < MAX_ITERATIONS; ++k) {

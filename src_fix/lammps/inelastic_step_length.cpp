@@ -250,10 +250,11 @@ bool StepLength::may_shorten_unsolved(bool law_parts) const
 
 void StepLength::shorten(double factor, const std::string &named)
 {
-  const double timestep = factor * update->dt;
-  if (timestep < SHORTEST_STEP * step_.regular_timestep)
+  const double timestep = factor * update->dt, shortest = SHORTEST_STEP * step_.regular_timestep;
+  // Where motions are no finite numbers the factor is none, either.
+  if (!(timestep >= shortest))
     error->all(FLERR, "Fix inelastic: step {}: no time step above {:.3g} keeps the spheres apart{}",
-               update->ntimestep, timestep,
+               update->ntimestep, std::isfinite(timestep) ? timestep : shortest,
                named.empty() ? " and within reach of the neighbour list: lower the timestep"
                              : ": " + named);
   if (update->dt == step_.regular_timestep) ++shortened_steps_;

@@ -315,3 +315,29 @@ def test_a_rank_without_bodies(tmp_path: Path, lmp: Runner) -> None:
         ends.append(read_dump(tmp_path / "particles.dump")[-1].positions)
     # They agree within some tolerances: forces are resolved to the accuracy.
     assert ends[0] == pytest.approx(ends[1], abs=0.05 * RADIUS)
+
+
+def test_uzawa_with_a_contact_on_each_rank(tmp_path: Path, lmp: Runner) -> None:
+    """Its step is short enough where two ranks count the same contacts: three spheres in a row.
+
+    Without newton a contact is on the rank of the lower ID: each rank has one of the third one.
+    """
+    deck = scene(
+        [[0.39, 0.5, 0.5], [0.61, 0.5, 0.5], [0.499, 0.5, 0.5]],
+        0.05,
+        tmp_path,
+        tolerance=1e-5,
+        box=((0, 1),) * 3,
+        timestep=0.1,
+        gravity=False,
+        velocities=[[1, 0, 0], [-1, 0, 0], [0, 0, 0]],
+        setup="newton off\nprocessors 2 1 1",
+        options="region container solver uzawa",
+    )
+    result = lmp(deck + DUMP_PARTICLES + "run 2\n", ranks=2)
+    assert result.thermo["f_contact[5]"][0] == 2
+    last = read_dump(tmp_path / "particles.dump")[-1]
+    # What is allowed, and the round-off of positions.
+    assert deepest_pair(last.positions, last["radius"], [0, 0, 0]) <= 1e-5 * SLACK
+    # The eigenvalue of the row is three times that of both contacts alike.
+    assert result.thermo["f_contact[1]"].max() < 100
