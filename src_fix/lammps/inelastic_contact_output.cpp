@@ -12,8 +12,7 @@ using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
 
 ContactOutput::ContactOutput(LAMMPS *lmp, const Step &step, GhostExchange &ranks) :
-    Pointers(lmp), step_(step), ranks_(ranks),
-    remembered_(step.settings.law ? step.settings.law->remembers() : 0)
+    Pointers(lmp), step_(step), ranks_(ranks)
 {
 }
 
@@ -22,6 +21,10 @@ ContactOutput::~ContactOutput()
   memory->destroy(per_atom_);
   memory->destroy(local_);
 }
+
+// Values that the contact law remembers of each contact.
+int ContactOutput::remembered() const
+{ return step_.settings.law ? step_.settings.law->remembers() : 0; }
 
 void ContactOutput::take(const inelastic::ProjectionResult &result, long shortened_steps,
                          const VirialTarget &virial)
@@ -38,6 +41,8 @@ void ContactOutput::take(const inelastic::ProjectionResult &result, long shorten
   }
   for (std::size_t c = 0; c < contacts.size(); ++c)
     if (is_contact(c)) add_contact(c, contacts.impulse[c] * force_per_impulse, virial);
+  for (int row = 0; row < local_rows_; ++row)
+    if (local_[row][FORCE] > 0.0) counts_.pressed += 1.0;
   share(virial);
 
   enum { PAIRS, WALLS, PRESSED, HELD, ROWS, SUMS };
@@ -78,8 +83,22 @@ void ContactOutput::clear_sums(bool virial_per_atom)
   if (virial_per_atom) { virial_.assign(2 * size, 0.0); }
   wall_forces_.clear();
   local_rows_ = 0;
+  last_row_.assign(step_.contacts.size(), NONE);
+  row_before_.clear();
   counts_ = Counts{};
   largest_change_ = 0.0;
+}
+
+// Returns the row of the local list that has this contact with the same normal, or NONE: a plane
+// that the end of a step has left, and come back to, is in the problem twice.
+int ContactOutput::listed_before(std::size_t c) const
+{
+  constexpr double SAME = 1.0e-12;    // of 1 - cos of the angle between two unit vectors
+  const double *const n = &step_.problem.contacts.normal[3 * c];
+  int row = last_row_[step_.rows[c].contact];
+  while (row != NONE && inelastic::dot(&local_[row][NORMAL], n) <= 1.0 - SAME)
+    row = row_before_[row];
+  return row;
 }
 
 // `strength` is the force of the contact.
@@ -91,26 +110,37 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   const double *const n = &problem.contacts.normal[3 * c];
   const Contact &contact = step_.contact_of(c);
   const bool is_wall = contact.is_with_wall();
-  (is_wall ? counts_.walls : counts_.pairs) += 1.0;
-  if (strength > 0.0) counts_.pressed += 1.0;
-  const LawState *const law = step_.law_state_of(c);
-  if (law && law->kept) counts_.kept += 1.0;
+  const double to_point = atom->radius[i] + (is_wall ? contact.gap_now : 0.5 * contact.gap_now);
+  const int before = listed_before(c);
+  if (before == NONE) {
+    count_contact(c);
+    list_contact(c, strength, to_point);
+  } else {
+    local_[before][FORCE] += strength;
+  }
   largest_change_ = std::max(largest_change_,
                              std::abs(problem.contacts.impulse[c]) *
                                  (problem.inverse_mass[i] + problem.inverse_mass[j]));
-  contact_count_[2 * i + is_wall] += 1.0;
   for (int d = 0; d < 3; ++d) {
     contact_force_[3 * i + d] += strength * n[d];
     contact_force_[3 * j + d] -= strength * n[d];
     if (is_wall) wall_forces_.of(contact.wall() - 1)[d] -= strength * n[d];
   }
-  if (!is_wall) contact_count_[2 * j] += 1.0;
-  const double to_point = atom->radius[i] + (is_wall ? contact.gap_now : 0.5 * contact.gap_now);
-  list_contact(c, strength, to_point);
   if (virial.global || virial.per_atom) {
     const double arm = is_wall ? to_point : contact.size + contact.gap_now;
     add_virial(c, arm * strength, virial);
   }
+}
+
+void ContactOutput::count_contact(std::size_t c)
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const bool is_wall = step_.contact_of(c).is_with_wall();
+  (is_wall ? counts_.walls : counts_.pairs) += 1.0;
+  const LawState *const law = step_.law_state_of(c);
+  if (law && law->kept) counts_.kept += 1.0;
+  contact_count_[2 * contacts.first[c] + is_wall] += 1.0;
+  if (!is_wall) contact_count_[2 * contacts.second[c]] += 1.0;
 }
 
 void ContactOutput::list_contact(std::size_t c, double strength, double to_point)
@@ -119,17 +149,20 @@ void ContactOutput::list_contact(std::size_t c, double strength, double to_point
   const int i = contacts.first[c];
   const double *const n = &contacts.normal[3 * c];
   const Contact &contact = step_.contact_of(c);
-  double *const out = local_[local_rows_++];
+  int &last = last_row_[step_.rows[c].contact];
+  row_before_.push_back(last);
+  last = local_rows_++;
+  double *const out = local_[last];
   out[0] = static_cast<double>(atom->tag[i]);
   out[1] = static_cast<double>(contact.partner);
   for (int d = 0; d < 3; ++d) {
     out[2 + d] = atom->x[i][d] - to_point * n[d];
-    out[5 + d] = n[d];
+    out[NORMAL + d] = n[d];
   }
   out[8] = contact.gap_now;
-  out[9] = strength;
-  if (remembered_ > 0)
-    std::copy_n(step_.law_state_of(c)->remembered.begin(), remembered_, out + LOCAL_COLUMNS);
+  out[FORCE] = strength;
+  if (remembered() > 0)
+    std::copy_n(step_.law_state_of(c)->remembered.begin(), remembered(), out + LOCAL_COLUMNS);
 }
 
 // `weight` is the distance over which the force acts, times the force. Half goes to each side; a

@@ -28,7 +28,7 @@ class ContactOutput : protected Pointers {
   static constexpr int PER_ATOM_COLUMNS = 5;
   // One more follows for each value that the contact law remembers.
   static constexpr int LOCAL_COLUMNS = 10;
-  int local_columns() const { return LOCAL_COLUMNS + remembered_; }
+  int local_columns() const { return LOCAL_COLUMNS + remembered(); }
   enum Vector {
     ITERATIONS,
     FEASIBILITY,
@@ -93,21 +93,29 @@ class ContactOutput : protected Pointers {
     double pairs = 0.0, walls = 0.0, pressed = 0.0, kept = 0.0;
   };
 
+  enum { NORMAL = 5, FORCE = 9 };    // columns of the local list
+  static constexpr int NONE = -1;
+
+  int remembered() const;
   bool is_contact(std::size_t c) const;
   void clear_sums(bool virial_per_atom);
+  int listed_before(std::size_t c) const;
   void add_contact(std::size_t c, double strength, const VirialTarget &virial);
+  void count_contact(std::size_t c);
   void list_contact(std::size_t c, double strength, double to_point);
   void add_virial(std::size_t c, double weight, const VirialTarget &virial);
   void share(const VirialTarget &virial);
 
   const Step &step_;
   GhostExchange &ranks_;
-  const int remembered_;    // values of each contact
   double vector_[VECTOR_SIZE] = {};
   double **per_atom_ = nullptr;
   double **local_ = nullptr;
   int local_rows_ = 0;
   int local_room_ = 0;
+  // Rows of the local list: the last one of each contact (of Step::contacts), and by row the one
+  // of the same contact before it
+  std::vector<int> last_row_, row_before_;
   Counts counts_;
   // 3 per slot (inelastic_unknowns.h), and 2: contacts with particles, and with walls
   std::vector<double> contact_force_, contact_count_;

@@ -1389,7 +1389,12 @@ class _Part:
             # A gap within EPS counts as closed where it is (docs/method/tolerances.md).
             open_by = np.where(listed["gap"] > self.eps, listed["gap"], 0.0)
             turned = np.where(u_before > 0, u_before - open_by / new.h, 0.0)
-            allowed += 0.5 * np.maximum(0, impulse) * np.maximum(0, turned)
+            # Where a curved wall is met in several places it is left in all of them as asked for.
+            met = np.column_stack([i, listed["wall"]])
+            _, which, places = np.unique(met, axis=0, return_inverse=True, return_counts=True)
+            several = ~pair & (places[which.ravel()] > 1)
+            left = np.where(several, np.maximum(0, u) + np.maximum(0, u_before), 0.0)
+            allowed += 0.5 * np.maximum(0, impulse) * np.maximum(np.maximum(0, turned), left)
             # docs/reference/laws.md: a hundredth of what contacts take and give; else it is halved.
             if "shorten" in self.facts["words"]:
                 allowed += 0.01 * 0.5 * np.abs(impulse) * (np.abs(u) + np.abs(u_before))
