@@ -5,6 +5,7 @@
 #define INELASTIC_CONTACT_H
 
 #include "inelastic_contact_law.h"
+#include "inelastic_vector3.h"
 
 #include "lmptype.h"
 
@@ -34,6 +35,13 @@ struct Contact {
   bool is_with_wall() const { return partner < 0; }
   int wall() const { return static_cast<int>(-partner); }
 };
+
+// Tells whether two unit vectors are the same normal of a wall, to round-off.
+inline bool is_same_normal(const double *a, const double *b)
+{
+  constexpr double SAME = 1.0e-12;    // of 1 - cos of the angle between them
+  return inelastic::dot(a, b) > 1.0 - SAME;
+}
 
 // What stands beside a row of the problem.
 struct Row {

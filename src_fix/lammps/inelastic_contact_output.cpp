@@ -93,11 +93,9 @@ void ContactOutput::clear_sums(bool virial_per_atom)
 // that the end of a step has left, and come back to, is in the problem twice.
 int ContactOutput::listed_before(std::size_t c) const
 {
-  constexpr double SAME = 1.0e-12;    // of 1 - cos of the angle between two unit vectors
   const double *const n = &step_.problem.contacts.normal[3 * c];
   int row = last_row_[step_.rows[c].contact];
-  while (row != NONE && inelastic::dot(&local_[row][NORMAL], n) <= 1.0 - SAME)
-    row = row_before_[row];
+  while (row != NONE && !is_same_normal(&local_[row][NORMAL], n)) row = row_before_[row];
   return row;
 }
 

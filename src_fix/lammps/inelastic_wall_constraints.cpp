@@ -190,10 +190,7 @@ long WallConstraints::add_violated()
 }
 
 bool WallConstraints::is_same_plane(std::size_t c, const double *normal) const
-{
-  constexpr double SAME = 1.0e-12;    // of 1 - cos of the angle between two unit vectors
-  return dot(&step_.problem.contacts.normal[3 * c], normal) > 1.0 - SAME;
-}
+{ return is_same_normal(&step_.problem.contacts.normal[3 * c], normal); }
 
 long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, bool too_deep)
 {
