@@ -121,8 +121,15 @@ double GapRules::effective_gap(const Contact &contact) const
     const double parted = -step_.problem.timestep * contact.asked.parting_speed;
     return contact.asked.parts ? std::min(closed, parted) : closed;
   }
-  const double limit = PUSH_LIMIT * contact.size * step_.problem.timestep / step_.regular_timestep;
-  return std::max(gap, -std::max(limit, step_.eps(REGULAR)));
+  return std::max(gap, -most_pushed(contact));
+}
+
+// Returns the most by which a step pushes an overlap apart [length]: at a speed that does not grow
+// where the step becomes shorter, or no step could be short enough for the neighbour list.
+double GapRules::most_pushed(const Contact &contact) const
+{
+  const double most = std::max(PUSH_LIMIT * contact.size, step_.eps(REGULAR));
+  return most * step_.problem.timestep / step_.regular_timestep;
 }
 
 double GapRules::wanted_gap(const Contact &contact) const

@@ -39,6 +39,8 @@ class GapRules {
   // overlap need not be given back in one step, and but for bad starts by at most half a tolerance.
   double wanted_gap(const Contact &contact) const;
 
+  double most_pushed(const Contact &contact) const;
+
   // Notes by how much a contact ends the step deeper than it may (the excess of StepState). The
   // constraint of a bad overlap asks for less than there is; one that stays as deep as it began has
   // no excess nevertheless, since a shorter step would not open it either.

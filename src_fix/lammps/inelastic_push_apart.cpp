@@ -108,8 +108,9 @@ bool PushApart::look_at_opening(bool solved)
     const double *const one = &step_.velocity[3 * static_cast<std::size_t>(i)];
     const double *const other = &step_.velocity[3 * static_cast<std::size_t>(j)];
     const double opens = h * (dot(n, one) - dot(n, other)) - step_.rows[c].wall_motion;
-    const double most = PUSH_LIMIT * contact.size * h / step_.regular_timestep;
-    if (-contact.gap_now - opens > step_.largest_overlap + most) maxima[0] = 1.0;
+    if (-contact.gap_now - opens >
+        step_.largest_overlap + constraints_.rules().most_pushed(contact))
+      maxima[0] = 1.0;
     if (!constraints_.overlaps().is_bad(contact.gap_now)) continue;
     const double asked = -contacts.gap[c] - step_.rows[c].wall_motion;
     sums[OPENED] += asked * std::min(opens, asked);

@@ -188,6 +188,7 @@ bool RegionWalls::see(const Obstacle &obstacle, const double *where, double reac
     if (!(contact.r > 0.0)) return false;
     WallView view = make_view(contact, obstacle.first_wall);
     view.convex = obstacle.convex;
+    view.moves = obstacle.moving;
     // Looks of different reach, at the end of a step and at the start of the next, see the same.
     for (int d = 0; d < 3; ++d) view.distance -= view.normal[d] * (x[d] - where[d]);
     view.distance_now = view.distance;

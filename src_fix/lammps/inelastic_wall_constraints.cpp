@@ -213,7 +213,7 @@ long WallConstraints::add_plane(const Viewpoint &from, const WallView &view, boo
   // overlaps with such walls are known from note_overlaps_with_moving_walls().
   const double to_plane = gap_here + wall_motion;
   const bool is_beyond =
-      to_plane < 0.0 && (view.convex || (walls_.any_moves() && rules_.overlaps().is_bad(to_plane)));
+      to_plane < 0.0 && (view.convex || (view.moves && rules_.overlaps().is_bad(to_plane)));
   Contact unseen = contact_with(i, view.surface, is_beyond ? 0.0 : to_plane);
   const Contact &contact = known ? step_.contact_of(existing->second) : unseen;
   rules_.overlaps().note(contact.gap_now, i, -view.surface);

@@ -34,6 +34,7 @@ struct WallView {
   // [length] to the wall as it stands now; the difference is the wall's own motion
   double distance_now;
   bool convex;    // the side of an obstacle that curves, or has edges, away from the sphere
+  bool moves;     // in a way that is prescribed
 };
 
 class Walls {
