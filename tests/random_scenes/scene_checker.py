@@ -1202,8 +1202,9 @@ class _Part:
         # Walls that curve or turn, and bodies: the constraint was set for the end of the step.
         plain = (new.molecule[i] == 0) & (~pair | (new.molecule[j] == 0))
         new.listed, new.ends = listed, end
-        for row in np.flatnonzero(~pair & plain).tolist():
-            plain[row] = self.is_exact(listed["wall"][row])
+        with_wall = ~pair & plain
+        exact = [n for n in np.unique(listed["wall"][with_wall]).tolist() if self.is_exact(n)]
+        plain[with_wall] = np.isin(listed["wall"][with_wall], exact)
         new.plain = plain
         borderline = np.abs(listed["gap"] + REGULAR * self.eps) < 1e-3 * self.eps
         checked = plain & ~borderline & (listed["force"] > 0)
