@@ -53,6 +53,28 @@ def one_case(folder: Path, seed: int = 1) -> Path:
     return path
 
 
+def test_studies_run_together(undisturbed: Path, tmp_path: Path) -> None:
+    """No case waits for the last one of another study; a run that two share is made once."""
+    long, few = tmp_path / "long.toml", tmp_path / "few.toml"
+    longer = re.sub(r"steps_settling = \d+", "steps_settling = 20000", TINY)
+    assert longer != TINY
+    long.write_text(longer.replace("{seeds}", "1"))
+    few.write_text(TINY.replace("{seeds}", "[1, 2]"))
+    again = tmp_path / "again.toml"
+    again.write_text(TINY.replace("{seeds}", "2"))
+    out = tmp_path / "out"
+    done = inelastic("run", long, few, again, "--out", out, "--at-once", 2)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    said = ["few: 2 done", "again: 1 done", "long: 1 done"]
+    assert [line for line in lines if line in said] == said
+    assert sum(" running " in line for line in lines) == 3
+    assert [line.split(": ")[0][-12:] for line in lines if " study " in line] == [
+        f"study {number} of 3" for number in (1, 2, 3)
+    ]
+    assert same(numbers_of(out / "few.h5"), numbers_of(undisturbed / "out" / "few.h5"))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--mpi"]])
 def test_what_cannot_be_measured_is_said(options: list[str], tmp_path: Path) -> None:

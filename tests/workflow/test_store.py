@@ -219,7 +219,7 @@ def test_results_are_gathered_by_one_at_a_time(
         assert main(["collect", "table-1", "--out", str(tmp_path)]) == 0
     elif module == "running.run_and_gather":
         study = read_study(shipped_studies()["table-1"])
-        run_and_gather(study, [], folder, Options())
+        run_and_gather([(study, [])], folder, Options())
     else:
         page = "lammps_inelastic.workflow.report.report_files"
         monkeypatch.setattr(f"{page}.write_report", lambda *_: None)

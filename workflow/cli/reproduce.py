@@ -70,14 +70,13 @@ def run(options: argparse.Namespace) -> int:
     folder = Folder(options.out)
     running = running_options(options)
     studies = [read_study(where / f"{name}.toml") for name in STUDIES]
-    failed = 0
-    for number, study in enumerate(studies, 1):
-        print(f"study {number} of {len(studies)}: {study.name}, {study.title}")
-        if stored is not None:
+    if stored is not None:
+        for study in studies:
             count = adopt_results(study, folder, stored, of_any_code=options.stored_only)
             print(f"{study.name}: {count} stored results of {len(study.cases)} taken")
-        if not options.stored_only:
-            failed += len(run_and_gather(study, study.cases, folder, running).failed)
+    outcomes = []
+    if not options.stored_only:
+        outcomes = run_and_gather([(study, study.cases) for study in studies], folder, running)
     store = folder.root / STORE
     with folder.gathering():
         write_studies(
@@ -89,4 +88,4 @@ def run(options: argparse.Namespace) -> int:
 
     root = folder.root
     write_report([store], root / REPORT, root / FIGURES, root / TABLES)
-    return 1 if failed else 0
+    return 1 if any(outcome.failed for outcome in outcomes) else 0

@@ -53,11 +53,8 @@ def run(options: argparse.Namespace) -> int:
             _print_commands(study, cases, folder, options.ranks)
         return 0
     running = running_options(options, in_job=options.mpi)
-    failed = 0
-    for study, cases in choices:
-        outcome = run_and_gather(study, cases, folder, running, in_job=options.mpi)
-        failed += len(outcome.failed)
-    return 1 if failed else 0
+    outcomes = run_and_gather(choices, folder, running, in_job=options.mpi)
+    return 1 if any(outcome.failed for outcome in outcomes) else 0
 
 
 def _print_commands(study: Study, cases: Sequence[Case], folder: Folder, ranks: int) -> None:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import StudyError
@@ -26,39 +27,116 @@ READ_EVERY = 1.0
 def run_study(
     study: Study, cases: Sequence[Case], folder: Folder, options: Options, display: Display
 ) -> Outcome:
-    """Run and measure those of the cases that have no result yet.
+    """Run and measure those of the cases that have no result yet, as `run_together` does."""
+    one = Together(Batch(study, folder, options, display), cases)
+    run_together([one])
+    return one.batch.outcome
 
-    An interrupt (also SIGTERM and SIGHUP) kills what runs, and is raised as KeyboardInterrupt.
-    Raises StudyError if anything stands where a file or a folder of the study should be.
+
+@dataclass(frozen=True)
+class Together:
+    """Some cases of a study, to be run together with those of others.
+
+    Attributes
+    ----------
+    batch : their study, and how they run; it takes what becomes of them
+    cases : the cases
+    begins : called before the first of them
+    ends : called when nothing is left to do of them
     """
-    if obstacles := folder.obstacles(study, cases):
-        raise StudyError(obstacles)
-    batch = Batch(study, folder, options, display)
-    waiting = list(cases)
-    jobs: list[_Job] = []
+
+    batch: Batch
+    cases: Sequence[Case]
+    begins: Callable[[], None] = lambda: None
+    ends: Callable[[], None] = lambda: None
+
+
+def run_together(studies: Sequence[Together]) -> None:
+    """Run and measure those of the cases that have no result yet, as many at a time as may be.
+
+    A case of a later study begins before the last one of an earlier study has ended. Where two
+    studies share a run, the second one waits for it. An interrupt (also SIGTERM and SIGHUP) kills
+    what runs, and is raised as KeyboardInterrupt. Raises StudyError if anything stands where a file
+    or a folder of a study should be.
+    """
+    for one in studies:
+        if obstacles := one.batch.folder.obstacles(one.batch.study, one.cases):
+            raise StudyError(obstacles)
     with interrupts() as interrupted:
+        pool = _Pool(studies)
         try:
-            while waiting or jobs:
-                while waiting and len(jobs) < options.at_once and not interrupted:
-                    # A job is in the list before it starts anything that must be stopped.
-                    jobs.append(_Job(OneCase(waiting.pop(0), batch), display))
-                    if not jobs[-1].begin():
-                        jobs.pop()
+            while pool.has_any():
+                pool.fill(interrupted)
                 if interrupted:
                     raise KeyboardInterrupt
-                jobs = [job for job in jobs if job.goes_on()]
+                pool.look()
                 time.sleep(POLL)
         finally:
-            for job in jobs:
-                job.stop()
-    return batch.outcome
+            pool.stop()
+
+
+class _Pool:
+    """The cases of some studies: those that wait for their turn, and the jobs that run."""
+
+    def __init__(self, studies: Sequence[Together]) -> None:
+        self._jobs: list[_Job] = []
+        self._left = {id(one): len(one.cases) for one in studies}
+        self._waiting = [(one, case) for one in studies for case in one.cases]
+        self._begun: set[int] = set()
+        for one in studies:
+            if not one.cases:
+                one.ends()
+
+    def has_any(self) -> bool:
+        """Say whether anything is left to do."""
+        return bool(self._waiting or self._jobs)
+
+    def fill(self, interrupted: Sequence[int]) -> None:
+        """Start as many cases as may run beside those that do."""
+        while not interrupted and (turn := self._next()) is not None:
+            study, case = self._waiting.pop(turn)
+            if id(study) not in self._begun:
+                self._begun.add(id(study))
+                study.begins()
+            # A job is in the list before it starts anything that must be stopped.
+            self._jobs.append(_Job(study, case))
+            if not self._jobs[-1].begin():
+                self._end(self._jobs.pop())
+
+    def look(self) -> None:
+        """Let jobs go on whose processes have ended, and take out what is over."""
+        going_on, over = [], []
+        for job in self._jobs:
+            (going_on if job.goes_on() else over).append(job)
+        self._jobs = going_on
+        for job in over:
+            self._end(job)
+
+    def stop(self) -> None:
+        """Kill what runs."""
+        for job in self._jobs:
+            job.stop()
+
+    def _next(self) -> int | None:
+        """Return the place of the next case; None if none may start now."""
+        if not self._waiting or len(self._jobs) >= self._waiting[0][0].batch.options.at_once:
+            return None
+        running = {job.case.name for job in self._jobs}
+        names = [case.name for _, case in self._waiting]
+        return next((turn for turn, name in enumerate(names) if name not in running), None)
+
+    def _end(self, job: _Job) -> None:
+        self._left[id(job.study)] -= 1
+        if self._left[id(job.study)] == 0:
+            job.study.ends()
 
 
 class _Job:
     """The processes of one case, one after the other; it holds the case's lock."""
 
-    def __init__(self, one: OneCase, display: Display) -> None:
-        self._one, self._display = one, display
+    def __init__(self, study: Together, case: Case) -> None:
+        self.study, self.case = study, case
+        self._one, self._display = OneCase(case, study.batch), study.batch.display
         self._stage = 0
         self._process: subprocess.Popen[bytes] | None = None
         self._last_read = 0.0
