@@ -85,7 +85,10 @@ void EnergyWatch::add_up(const std::vector<double> &target)
     s[TARGETS] += std::abs(impulse) * target[c] / h;
     s[IMPULSES] += std::abs(impulse);
     s[TURNS] += std::abs(impulse) * rules_.closed_by_turning(c) / h;
-    if (contact.asked.parts || contact.asked.set.may_pull()) s[BY_LAW] += std::max(0.0, added);
+    // A projection adds less than the sum of lambda n.u over contacts: of one that is pulled closed
+    // this is what the law adds, be it to the motion of others.
+    const bool pulled = contact.asked.set.may_pull();
+    if (contact.asked.parts || pulled) s[BY_LAW] += std::max(0.0, pulled ? impulse * after : added);
     double &approach = does_[DOES * k + APPROACH];
     approach = std::max(approach, -before);
     if (impulse > 0.0 && contact.gap_now < 0.0 && after > 0.0) does_[DOES * k + GIVES_BACK] = 1.0;

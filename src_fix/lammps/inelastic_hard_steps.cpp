@@ -1,5 +1,6 @@
 #include "inelastic_hard_steps.h"
 
+#include "inelastic_constraints.h"
 #include "inelastic_ghost_exchange.h"
 
 #include "atom.h"
@@ -23,8 +24,9 @@ constexpr long MOST_IN_A_ROW = 3;
 
 }    // namespace
 
-HardSteps::HardSteps(LAMMPS *lmp, const Step &step, GhostExchange &ranks) :
-    Pointers(lmp), step_(step), ranks_(ranks)
+HardSteps::HardSteps(LAMMPS *lmp, const Step &step, const Constraints &constraints,
+                     GhostExchange &ranks) :
+    Pointers(lmp), step_(step), constraints_(constraints), ranks_(ranks)
 {
 }
 
@@ -79,11 +81,25 @@ std::string HardSteps::cause() const
   for (int i = 0; i < atom->nlocal; ++i)
     if (step_.is_mobile(atom, i)) sums[1] += 1.0;
   ranks_.reduce(sums, 2, nullptr, 0);
-  if (!masses.empty()) return masses;
+  const char *const or_no_room = obstacles_move()
+      ? "The scene leaves no room for the spheres: walls or frozen spheres close in. Or: "
+      : "";
+  if (!masses.empty()) return or_no_room + masses;
   return fmt::format(
-      "{:.0f} contacts with a force are too many, or too alike, for {:.0f} particles: "
+      "{}{:.0f} contacts with a force are too many, or too alike, for {:.0f} particles: "
       "raise maxiter ({}), the tolerance or the accuracy, or lower the timestep",
-      sums[0], sums[1], step_.settings.max_iterations);
+      or_no_room, sums[0], sums[1], step_.settings.max_iterations);
+}
+
+bool HardSteps::obstacles_move() const
+{
+  double any = constraints_.walls_move() ? 1.0 : 0.0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (step_.in_group(atom, i) && !step_.is_mobile(atom, i) &&
+        inelastic::norm(&step_.problem.predicted_velocity[3 * static_cast<std::size_t>(i)]) > 0.0)
+      any = 1.0;
+  ranks_.reduce(nullptr, 0, &any, 1);
+  return any > 0.0;
 }
 
 void HardSteps::end_step(const inelastic::ProjectionResult &result)

@@ -13,6 +13,7 @@
 
 namespace LAMMPS_NS::Inelastic_NS {
 
+class Constraints;
 class GhostExchange;
 
 class HardSteps : protected Pointers {
@@ -24,7 +25,8 @@ class HardSteps : protected Pointers {
     long at_maxiter = 0;    // that ended at maxiter before it was reached
   };
 
-  HardSteps(class LAMMPS *lmp, const Step &step, GhostExchange &ranks);
+  HardSteps(class LAMMPS *lmp, const Step &step, const Constraints &constraints,
+            GhostExchange &ranks);
 
   void begin_run() { counts_ = Counts{}; }
   void begin_step() { shortened_ = false; }
@@ -38,11 +40,15 @@ class HardSteps : protected Pointers {
   void note_shortened() { shortened_ = true; }
   bool has_shortened() const { return shortened_; }
 
-  // What masses, or which network, the contacts of the step are of. Collective.
+  // What masses, or which network, the contacts of the step are of, or that obstacles may leave no
+  // room. Collective.
   std::string cause() const;
   // The same where masses in contacts with a force differ by so large a ratio; empty otherwise.
   // Collective.
   std::string of_masses(double ratio) const;
+
+  // Tells whether walls or frozen spheres move. Collective.
+  bool obstacles_move() const;
 
   // Notes how a step ends. Errors, with `maxiter ... warn` a warning: too many in a row could
   // hardly be solved, or ended at maxiter. Collective.
@@ -52,6 +58,7 @@ class HardSteps : protected Pointers {
   bool judges_accuracy() const;
 
   const Step &step_;
+  const Constraints &constraints_;
   GhostExchange &ranks_;
   Counts counts_;
   bool shortened_ = false;          // this step

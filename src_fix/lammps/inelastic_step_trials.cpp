@@ -27,7 +27,7 @@ StepTrials::StepTrials(LAMMPS *lmp, Step &step, Constraints &constraints, StepLe
     Pointers(lmp), step_(step), constraints_(constraints), length_(length),
     predict_(std::move(predict)), ranks_(ranks), summary_(summary), clock_(clock),
     solver_(inelastic::make_solver(step.settings.solver)),
-    push_apart_(lmp, step, constraints, ranks, movers), hard_(lmp, step, ranks),
+    push_apart_(lmp, step, constraints, ranks, movers), hard_(lmp, step, constraints, ranks),
     energy_(lmp, step, constraints.rules(), ranks, movers),
     unsolved_(lmp, step, constraints, hard_, ranks, movers), squeezed_(lmp, step, ranks),
     record_(lmp, step, ranks)

@@ -60,18 +60,6 @@ double UnsolvedStep::largest_angle() const
   return angle;
 }
 
-// Tells whether walls or frozen spheres move. Collective.
-bool UnsolvedStep::obstacles_move() const
-{
-  double any = constraints_.walls_move() ? 1.0 : 0.0;
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (step_.in_group(atom, i) && !step_.is_mobile(atom, i) &&
-        inelastic::norm(&step_.problem.predicted_velocity[3 * static_cast<std::size_t>(i)]) > 0.0)
-      any = 1.0;
-  ranks_.reduce(nullptr, 0, &any, 1);
-  return any > 0.0;
-}
-
 bool UnsolvedStep::law_parts() const
 {
   double any = 0.0;
@@ -91,13 +79,9 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
     error->all(
         FLERR,
         "Fix inelastic: step {}: no time step down to {:.3g} is solved: even there {:.2g} of "
-        "what contacts change is left{}. {}{}",
+        "what contacts change is left{}. {}",
         update->ntimestep, update->dt, result.unresolved,
-        longer.empty() ? "" : ", and in a longer one " + longer,
-        obstacles_move()
-            ? "The scene leaves no room for the spheres: walls or frozen spheres close in. Or: "
-            : "",
-        cause);
+        longer.empty() ? "" : ", and in a longer one " + longer, cause);
   }
   const std::string message = no_room_ ? no_room(result, cause) : out_of_iterations(result, cause);
   // Gaps that follow spheres on long arcs may contradict one another where there is room enough.
@@ -115,7 +99,7 @@ void UnsolvedStep::report(const inelastic::ProjectionResult &result)
         "The contact law asks more surfaces to part than may have room to do so "
         "in one step: lower the timestep{}{}",
         or_shorter,
-        obstacles_move() ? ". Or walls or frozen spheres close in, and leave no room" : "");
+        hard_.obstacles_move() ? ". Or walls or frozen spheres close in, and leave no room" : "");
   if (!step_.settings.warn_only) error->all(FLERR, "Fix inelastic: {}. {}", message, cause);
   if (comm->me == 0) error->warning(FLERR, "Fix inelastic: {}", message);
 }

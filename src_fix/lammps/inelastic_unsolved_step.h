@@ -62,7 +62,6 @@ class UnsolvedStep : protected Pointers {
   std::string out_of_iterations(const inelastic::ProjectionResult &result,
                                 std::string &cause) const;
   double largest_angle() const;
-  bool obstacles_move() const;
   // The names of the worst constraint of the trial, or of the last one that had one.
   const std::string &named_or_last() const { return named_.empty() ? named_last_ : named_; }
 

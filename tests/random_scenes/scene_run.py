@@ -122,6 +122,11 @@ REFUSALS: tuple[tuple[str, Callable[[Facts], bool]], ...] = (
         lambda facts: facts["closing"] or facts["bad_start"],
     ),
     (r"no time step above .* keeps the spheres apart", lambda facts: facts["closing"]),
+    # The forces with which grains are squeezed hide those of others.
+    (
+        r"what contacts change is left.* walls or frozen spheres close in",
+        lambda facts: facts["closing"],
+    ),
     # Such a start is drawn without a look at whether there is room.
     (r"do not open any more where all give way", lambda facts: facts["bad_start"]),
     (

@@ -105,10 +105,8 @@ class _Pool:
 
     def look(self) -> None:
         """Let jobs go on whose processes have ended, and take out what is over."""
-        going_on, over = [], []
-        for job in self._jobs:
-            (going_on if job.goes_on() else over).append(job)
-        self._jobs = going_on
+        over = [job for job in self._jobs if not job.goes_on()]
+        self._jobs = [job for job in self._jobs if job not in over]
         for job in over:
             self._end(job)
 
