@@ -19,6 +19,7 @@ from tests.benchmark import (
     page,
     ranks,
     recorded,
+    rooms,
     scenes_without,
     settling,
 )
@@ -61,7 +62,7 @@ def main() -> int:
     parser.add_argument(
         "parts",
         nargs="*",
-        help="of: machine settling recorded growth ranks parts million earlier page",
+        help="of: machine settling recorded growth ranks rooms parts million earlier page",
     )
     parser.add_argument(
         "--commit",
@@ -82,6 +83,7 @@ def main() -> int:
         "recorded": lambda: recorded.measure(size.particles, size.diameter),
         "growth": lambda: settling.grow(out / "growth", size.growing),
         "ranks": lambda: ranks.measure(size.ranks),
+        "rooms": lambda: rooms.measure(size.particles, size.diameter),
         "parts": lambda: scenes_without.measure(each=not options.quick),
         "million": lambda: million.measure(out / "million"),
         "earlier": lambda: earlier.measure(
