@@ -1,4 +1,4 @@
-"""The benchmark of the parts of a step reads all phases of a log, and shares out all of the time."""
+"""The benchmark of the parts of a step reads all phases of a log, and shares out all its time."""
 
 from __future__ import annotations
 
