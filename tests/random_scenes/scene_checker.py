@@ -1315,10 +1315,10 @@ class _Part:
 
         b is the largest speed at which an overlap is given back, at most 2 EPS in a regular step. t
         is the target of a contact, here from above. Contacts that pull close gaps; those of
-        restitution add half of lambda (n.u* - D / h) where surfaces were parting, with a gap D
-        beyond EPS: what has turned past one another, or is pushed back to a wall, parts faster, u*,
-        than its gap has grown in a step; with `shorten` a cluster of them may add a hundredth of
-        what contacts take and give. What moves by itself works.
+        restitution add half of lambda (n.u* - D / h) where surfaces were parting, with a gap of EPS
+        + D: what has turned past one another, or is pushed back to a wall, parts faster, u*, than
+        its gap has grown in a step; with `shorten` a cluster of them may add a hundredth of what
+        contacts take and give. What moves by itself works.
         """
         if self.facts["warn"]:
             return
@@ -1387,8 +1387,9 @@ class _Part:
         allowed[pulls] += np.abs(impulse[pulls]) * closes[pulls] / new.h
         allowed += np.maximum(0, impulse * motion) / new.h
         if "law restitution" in self.facts["words"]:
-            # A gap within EPS counts as closed where it is (docs/method/tolerances.md).
-            open_by = np.where(listed["gap"] > self.eps, listed["gap"], 0.0)
+            # A gap within EPS counts as closed where it is, and stays so until the surfaces have
+            # parted by EPS more (docs/method/tolerances.md).
+            open_by = np.maximum(0, listed["gap"] - self.eps)
             turned = np.where(u_before > 0, u_before - open_by / new.h, 0.0)
             # Where a curved wall is met in several places it is left in all of them as asked for.
             met = np.column_stack([i, listed["wall"]])
