@@ -90,7 +90,8 @@ class Solve {
   // Tells whether a search ends on a plateau: with `tries` slow modes are tried first. Otherwise
   // the impulses, which are judged here, will do if their residual has not come down for long and
   // is within the tolerance, and little is left of what contacts change, but more than the default
-  // accuracy leaves: the targets are not to be had. Collective.
+  // accuracy leaves: if conjugate gradients do not solve them either, the targets are not to be
+  // had. Collective.
   bool ends_on_plateau(bool tries);
 
  private:

@@ -114,7 +114,7 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
     count_contact(c);
     list_contact(c, strength, to_point);
   } else {
-    local_[before][FORCE] += strength;
+    join(local_[before], strength, n, i, to_point);
   }
   largest_change_ = std::max(largest_change_,
                              std::abs(problem.contacts.impulse[c]) *
@@ -127,6 +127,22 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   if (virial.global || virial.per_atom) {
     const double arm = is_wall ? to_point : contact.size + contact.gap_now;
     add_virial(c, arm * strength, virial);
+  }
+}
+
+// Adds a force to that of a row of the list, whose normal is the same but for a part of the sixth
+// digit: the sum of both keeps its direction.
+void ContactOutput::join(double *row, double strength, const double *normal, int i,
+                         double to_point) const
+{
+  double sum[3];
+  for (int d = 0; d < 3; ++d) sum[d] = row[FORCE] * row[NORMAL + d] + strength * normal[d];
+  const double size = inelastic::norm(sum);
+  if (!(size > 0.0)) return;
+  row[FORCE] = std::copysign(size, row[FORCE] + strength);
+  for (int d = 0; d < 3; ++d) {
+    row[NORMAL + d] = sum[d] / row[FORCE];
+    row[POINT + d] = atom->x[i][d] - to_point * row[NORMAL + d];
   }
 }
 
@@ -154,7 +170,7 @@ void ContactOutput::list_contact(std::size_t c, double strength, double to_point
   out[0] = static_cast<double>(atom->tag[i]);
   out[1] = static_cast<double>(contact.partner);
   for (int d = 0; d < 3; ++d) {
-    out[2 + d] = atom->x[i][d] - to_point * n[d];
+    out[POINT + d] = atom->x[i][d] - to_point * n[d];
     out[NORMAL + d] = n[d];
   }
   out[8] = contact.gap_now;

@@ -93,13 +93,14 @@ class ContactOutput : protected Pointers {
     double pairs = 0.0, walls = 0.0, pressed = 0.0, kept = 0.0;
   };
 
-  enum { NORMAL = 5, FORCE = 9 };    // columns of the local list
+  enum { POINT = 2, NORMAL = 5, FORCE = 9 };    // columns of the local list
   static constexpr int NONE = -1;
 
   int remembered() const;
   bool is_contact(std::size_t c) const;
   void clear_sums(bool virial_per_atom);
   int listed_before(std::size_t c) const;
+  void join(double *row, double strength, const double *normal, int i, double to_point) const;
   void add_contact(std::size_t c, double strength, const VirialTarget &virial);
   void count_contact(std::size_t c);
   void list_contact(std::size_t c, double strength, double to_point);
