@@ -18,8 +18,8 @@ def programs() -> Programs:
 # A sphere that came to rest on its trial pushed another one, which did not feel it; one that was
 # pressed between six nearly parallel walls passed the error of its velocity on to others; a search
 # ended on a plateau, a grain far off, where some thousand iterations more had a solution; and the
-# checker took two grains for moving ones that rest, and slide around a cone together; a list had the
-# forces of two planes of a wall along the normal of one; and what a plateau left of planes that
+# checker took two grains for moving ones that rest, and slide around a cone together; a list had
+# the forces of two planes of a wall along the normal of one; and what a plateau left of planes that
 # face nearly the same way left a grain far off.
 FOUND = (1735, 1963, 1132, 1642, 11, 687)
 
