@@ -67,9 +67,9 @@ def test_ten_thousand_spheres_start(lmp: Runner) -> None:
     ("variables", "named"),
     [
         # 1,000 spheres of this size fill the container more than completely.
-        ({"diameter": 0.22}, "no room: particles of this diameter would fill 1.11"),
+        ({"diameter": 0.22}, "no room: particles of this diameter would fill 1.12"),
         # More than there is memory for.
-        ({"particles": 2147483647}, "no room: particles of this diameter would fill 299"),
+        ({"particles": 2147483647}, "no room: particles of this diameter would fill 2.99e+05"),
         ({"drag": 50}, "drag times dt must be below 1, not 1"),
         ({"drag": 30}, "drag times dt_resting must be below 1, not 1.5"),
     ],
