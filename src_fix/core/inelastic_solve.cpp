@@ -80,12 +80,12 @@ bool Solve::ends_on_plateau(bool tries)
   if (judge()) return true;
   const bool will_do = result.residual.largest() <= limits.tolerance &&
       result.unresolved <= RESOLVED_ON_PLATEAU && result.unresolved > WELL_RESOLVED;
-  if (!will_do) return false;
+  if (!will_do || limits.to_targets) return false;
   // A few planes of a curved wall that face nearly the same way are enough for a plateau, and
   // little that is left there moves a grain far.
   if (!tried && solve_slow_modes()) return true;
   judge();    // what these have tried is no solution
-  return !limits.to_targets;
+  return true;
 }
 
 bool Solve::solve_slow_modes()

@@ -36,7 +36,8 @@ struct Contact {
   int wall() const { return static_cast<int>(-partner); }
 };
 
-// Tells whether two unit vectors are the same normal of a wall, to round-off.
+// Tells whether two unit vectors are the same normal of a wall, to about a millionth: planes of one
+// that a step has left and come back to differ by as much.
 inline bool is_same_normal(const double *a, const double *b)
 {
   constexpr double SAME = 1.0e-12;    // of 1 - cos of the angle between them

@@ -130,8 +130,8 @@ void ContactOutput::add_contact(std::size_t c, double strength, const VirialTarg
   }
 }
 
-// Adds a force to that of a row of the list, whose normal is the same but for a part of the sixth
-// digit: the sum of both keeps its direction.
+// Adds a force to that of a row of the list, whose normal is the same but for the sixth digit, and
+// gives the row the direction of the sum: what is listed adds up to the forces on the spheres.
 void ContactOutput::join(double *row, double strength, const double *normal, int i,
                          double to_point) const
 {
