@@ -44,6 +44,12 @@ void solve_symmetric(const double *a, double size, const double *b, double *x)
 
 }    // namespace
 
+void Directions::add(const double *n, double *matrix)
+{
+  const int row[SUMS] = {0, 1, 2, 0, 0, 1}, column[SUMS] = {0, 1, 2, 1, 2, 2};
+  for (std::size_t k = 0; k < SUMS; ++k) matrix[k] += n[row[k]] * n[column[k]];
+}
+
 // The column of the largest entry on the diagonal lies in the range; what is left across it has the
 // range without it.
 void Directions::span_range(const double *matrix)
@@ -221,9 +227,7 @@ void ClusterMotions::add_outer_contact(std::size_t c, double *s, double *m) cons
   if (step_.rows[c].wall_motion != 0.0 || frozen_moves) m[DRIVEN] = 1.0;
   if (contacts.impulse[c] == 0.0) return;
   m[SUPPORTED] = 1.0;
-  const double *const n = &contacts.normal[3 * c];
-  const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
-  for (int k = 0; k < 6; ++k) s[NORMALS + k] += n[row[k]] * n[column[k]];
+  Directions::add(&contacts.normal[3 * c], s + NORMALS);
 }
 
 // Adds an owned particle to the sums of its cluster.

@@ -24,7 +24,10 @@ class GhostExchange;
 // Directions that span a part of space: orthonormal vectors.
 class Directions {
  public:
-  // Takes the range of a symmetric matrix >= 0, given as xx yy zz xy xz yz.
+  static constexpr std::size_t SUMS = 6;
+  // Adds n n^T of a normal to a symmetric matrix, given as xx yy zz xy xz yz.
+  static void add(const double *normal, double *matrix);
+  // Takes the range of such a sum.
   void span_range(const double *matrix);
 
   bool span_space() const { return number_ == 3; }
@@ -113,7 +116,7 @@ class ClusterMotions : protected Pointers {
     STEPS = PREDICTED + 3,
     NUMBER,
     NORMALS,    // n n^T of its contacts with what does not belong to it
-    SUMS = NORMALS + 6
+    SUMS = NORMALS + Directions::SUMS
   };
   enum { SUPPORTED, DRIVEN, MAXIMA };
   void measure_clusters();

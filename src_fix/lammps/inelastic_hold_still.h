@@ -53,6 +53,8 @@ class HoldStill {
   // Gives the step again what was kept of it.
   void go_back();
 
+  // The impulses of the step when begin() kept them, by constraint.
+  const std::vector<double> &impulse_before() const { return impulse_before_; }
   // The velocities of the step when run() began, 3 per slot [length / time].
   const std::vector<double> &solved() const { return solved_; }
 

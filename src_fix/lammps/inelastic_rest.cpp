@@ -36,7 +36,7 @@ constexpr long MOST_ITERATIONS = 250, MORE_ITERATIONS = 4;
 
 Rest::Rest(LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state, Movers &movers) :
     Pointers(lmp), step_(step), ranks_(ranks), state_(state), rules_(step),
-    motions_(lmp, step, ranks, state), trial_(step, ranks, movers),
+    motions_(lmp, step, ranks, state), pieces_(lmp, step, ranks), trial_(step, ranks, movers),
     hold_still_(step, ranks, movers, inelastic::make_solver("apgd"))
 {
 }
@@ -186,7 +186,8 @@ RestTrial::Begun Rest::begin_trial() const
   begun.particles.assign(held_.size(), 0);
   for (std::size_t i = 0; i < held_.size(); ++i)
     begun.particles[i] = held_[i] && is_tried(static_cast<int>(i));
-  begun.common = common_velocities(trial_.velocity_before(), begun.particles);
+  begun.common = common_velocities(trial_.velocity_before(), begun.particles, clusters,
+                                   held_directions());
   for (std::size_t c = 0; c < contacts.size(); ++c)
     begun.constraints.push_back(is_tried(contacts.first[c]) || is_tried(contacts.second[c]));
   return begun;
@@ -326,7 +327,8 @@ HoldStill::Held Rest::held_now() const
   held.particles.assign(held_.size(), 0);
   for (std::size_t i = 0; i < held_.size(); ++i)
     if (is_stopped(static_cast<int>(i))) held.particles[i] = held_[i];
-  held.velocity = common_velocities(step_.velocity, held.particles);
+  held.velocity =
+      common_velocities(step_.velocity, held.particles, motions_.clusters(), held_directions());
   return held;
 }
 
@@ -346,12 +348,38 @@ void Rest::take_trial()
    whether forces balance
 ------------------------------------------------------------------------- */
 
-// Returns for each marked particle the mean of these velocities (3 per particle) over those of its
-// cluster, by mass, along directions in which nothing outside holds the cluster. Collective.
-std::vector<double> Rest::common_velocities(const std::vector<double> &velocity,
-                                            const std::vector<char> &marked) const
+// Returns by cluster along which directions something outside holds it.
+std::vector<Directions> Rest::held_directions() const
 {
-  const Clusters &clusters = motions_.clusters();
+  std::vector<Directions> held(motions_.size());
+  // Contacts of the step may have no force any more in the trial, and then hold nothing.
+  for (std::size_t k = 0; k < held.size(); ++k)
+    held[k] = fates_[k] == Fate::PASSES ? held_in_trial_[k] : motions_[k].held;
+  return held;
+}
+
+// Tells whether a contact that connects a cluster which is stopped has no force any more, which it
+// had in the step: it passes no momentum on. Collective.
+bool Rest::any_fell_apart() const
+{
+  const inelastic::ContactSet &contacts = step_.problem.contacts;
+  const std::vector<double> &of_step = hold_still_.impulse_before();
+  double any = 0.0;
+  for (std::size_t c = 0; c < of_step.size(); ++c) {
+    const bool lost = of_step[c] != 0.0 && contacts.impulse[c] == 0.0;
+    if (lost && (is_stopped(contacts.first[c]) || is_stopped(contacts.second[c]))) any = 1.0;
+  }
+  ranks_.reduce(nullptr, 0, &any, 1);
+  return any > 0.0;
+}
+
+// Returns for each marked particle the mean of these velocities (3 per particle) over those of its
+// cluster, by mass, across the directions in which something outside holds the cluster. Collective.
+std::vector<double> Rest::common_velocities(const std::vector<double> &velocity,
+                                            const std::vector<char> &marked,
+                                            const Clusters &clusters,
+                                            const std::vector<Directions> &held) const
+{
   enum { MASS, MOMENTUM, SUMS = MOMENTUM + 3 };
   std::vector<double> sums(SUMS * clusters.size(), 0.0), none(clusters.size(), 0.0);
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -370,9 +398,7 @@ std::vector<double> Rest::common_velocities(const std::vector<double> &velocity,
     const double *const s = &sums[SUMS * k];
     const std::array<double, 3> mean = {s[MOMENTUM] / s[MASS], s[MOMENTUM + 1] / s[MASS],
                                         s[MOMENTUM + 2] / s[MASS]};
-    // Contacts of the step may have no force any more in the trial, and then hold nothing.
-    const Directions &held = fates_[k] == Fate::PASSES ? held_in_trial_[k] : motions_[k].held;
-    const std::array<double, 3> of_cluster = held.without(mean);
+    const std::array<double, 3> of_cluster = held[k].without(mean);
     std::copy_n(of_cluster.begin(), 3, &common[3 * i]);
   }
   return common;
@@ -422,9 +448,15 @@ std::vector<std::size_t> Rest::ends_wrong(const HoldStill::Held &held) const
 // are such clusters. Collective.
 bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held)
 {
-  // With it the forces of all contacts leave the momentum of a cluster what it is.
-  held.velocity = common_velocities(by_contacts, held.particles);
+  // With it the forces of all contacts leave the momentum of a cluster what it is, and of each of
+  // its pieces.
   const Clusters &clusters = motions_.clusters();
+  if (any_fell_apart()) {
+    pieces_.find();
+    held.velocity =
+        common_velocities(by_contacts, held.particles, pieces_.clusters(), pieces_.held());
+  } else
+    held.velocity = common_velocities(by_contacts, held.particles, clusters, held_directions());
   // What begins its rest in this step loses what it had beyond the common velocity, too.
   std::vector<double> balanced = held.velocity;
   for (std::size_t i = 0; i < held.particles.size(); ++i) {

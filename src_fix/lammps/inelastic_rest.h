@@ -30,8 +30,9 @@
 // In a cluster at rest the held particles are stopped, in every step. Moving particles beside them
 // are projected once more, with these as obstacles (inelastic_hold_still.h). Where that changes the
 // forces on a held particle so that they no longer balance, the step stays as it was solved, and
-// the cluster is tried anew in the next one. So what moves loses no momentum, and what is stopped
-// no more than errors of the solver are.
+// the cluster is tried anew in the next one. Contacts that have lost their force by then pass on no
+// momentum: what they have connected keeps its own. So what moves loses no momentum, and what is
+// stopped no more than errors of the solver are.
 //
 // A cluster at rest in which something would move is solved more accurately before it is let go.
 // Where the loads of a cluster at rest all change by one factor, its contact forces do.
@@ -40,6 +41,7 @@
 #define INELASTIC_REST_H
 
 #include "inelastic_cluster_motions.h"
+#include "inelastic_cluster_pieces.h"
 #include "inelastic_hold_still.h"
 #include "inelastic_projection.h"
 #include "inelastic_rest_rules.h"
@@ -103,8 +105,11 @@ class Rest : protected Pointers {
   bool let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::Held &held);
   std::vector<char> touched_particles() const;
   std::vector<std::size_t> ends_wrong(const HoldStill::Held &held) const;
+  std::vector<Directions> held_directions() const;
+  bool any_fell_apart() const;
   std::vector<double> common_velocities(const std::vector<double> &velocity,
-                                        const std::vector<char> &marked) const;
+                                        const std::vector<char> &marked, const Clusters &clusters,
+                                        const std::vector<Directions> &held) const;
   void end_step(const HoldStill::Held &held);
 
   Step &step_;
@@ -112,6 +117,7 @@ class Rest : protected Pointers {
   AtomState &state_;
   const RestRules rules_;
   ClusterMotions motions_;
+  ClusterPieces pieces_;
   RestTrial trial_;
   RestTrial::Begun begun_;    // of the trial
   HoldStill hold_still_;
