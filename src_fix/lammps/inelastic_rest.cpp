@@ -186,8 +186,8 @@ RestTrial::Begun Rest::begin_trial() const
   begun.particles.assign(held_.size(), 0);
   for (std::size_t i = 0; i < held_.size(); ++i)
     begun.particles[i] = held_[i] && is_tried(static_cast<int>(i));
-  begun.common = common_velocities(trial_.velocity_before(), begun.particles, clusters,
-                                   held_directions());
+  begun.common =
+      common_velocities(trial_.velocity_before(), begun.particles, clusters, held_directions());
   for (std::size_t c = 0; c < contacts.size(); ++c)
     begun.constraints.push_back(is_tried(contacts.first[c]) || is_tried(contacts.second[c]));
   return begun;
