@@ -8,7 +8,9 @@
 #ifndef INELASTIC_CLUSTER_MOTIONS_H
 #define INELASTIC_CLUSTER_MOTIONS_H
 
+#include "inelastic_cluster_pieces.h"
 #include "inelastic_clusters.h"
+#include "inelastic_directions.h"
 #include "inelastic_step.h"
 
 #include "pointers.h"
@@ -20,24 +22,6 @@ namespace LAMMPS_NS::Inelastic_NS {
 
 class AtomState;
 class GhostExchange;
-
-// Directions that span a part of space: orthonormal vectors.
-class Directions {
- public:
-  static constexpr std::size_t SUMS = 6;
-  // Adds n n^T of a normal to a symmetric matrix, given as xx yy zz xy xz yz.
-  static void add(const double *normal, double *matrix);
-  // Takes the range of such a sum.
-  void span_range(const double *matrix);
-
-  bool span_space() const { return number_ == 3; }
-  // Returns a vector without its part along these directions.
-  std::array<double, 3> without(const std::array<double, 3> &vector) const;
-
- private:
-  std::array<double, 3> unit_[3] = {};
-  int number_ = 0;
-};
 
 // Of a particle, or of the body that it belongs to.
 struct Motion {
@@ -76,6 +60,8 @@ class ClusterMotions : protected Pointers {
 
   // Finds the clusters of the step. Collective.
   void find() { clusters_.find(); }
+  // Finds the pieces of clusters, by the impulses that the step has now. Collective.
+  const ClusterPieces &find_pieces();
   // Measures the motions in the step as it is now. The slip is that of clusters with so many quiet
   // steps. Collective.
   void measure(double quiet_steps);
@@ -133,6 +119,7 @@ class ClusterMotions : protected Pointers {
   GhostExchange &ranks_;
   AtomState &state_;
   Clusters clusters_;
+  ClusterPieces pieces_;
   // 3 per particle: the sum of lambda (n . v)^2, the number of gaps to close, and of contacts with
   // a force
   std::vector<double> resistance_;

@@ -5,8 +5,8 @@
 #ifndef INELASTIC_CLUSTER_PIECES_H
 #define INELASTIC_CLUSTER_PIECES_H
 
-#include "inelastic_cluster_motions.h"
 #include "inelastic_clusters.h"
+#include "inelastic_directions.h"
 #include "inelastic_step.h"
 
 #include <vector>
@@ -31,6 +31,13 @@ class ClusterPieces {
   Clusters clusters_;
   std::vector<Directions> held_;
 };
+
+// Returns for each marked particle the mean of these velocities (3 per particle) over those of its
+// cluster, by mass, across the directions in which something outside holds the cluster. Collective.
+std::vector<double> common_velocities(const Atom *atom, const Clusters &clusters,
+                                      const std::vector<Directions> &held,
+                                      const std::vector<double> &velocity,
+                                      const std::vector<char> &marked);
 
 }    // namespace LAMMPS_NS::Inelastic_NS
 

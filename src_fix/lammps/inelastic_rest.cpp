@@ -13,7 +13,6 @@
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
-using inelastic::dot;
 using inelastic::norm;
 
 namespace {
@@ -36,7 +35,7 @@ constexpr long MOST_ITERATIONS = 250, MORE_ITERATIONS = 4;
 
 Rest::Rest(LAMMPS *lmp, Step &step, GhostExchange &ranks, AtomState &state, Movers &movers) :
     Pointers(lmp), step_(step), ranks_(ranks), state_(state), rules_(step),
-    motions_(lmp, step, ranks, state), pieces_(lmp, step, ranks), trial_(step, ranks, movers),
+    motions_(lmp, step, ranks, state), trial_(step, ranks, movers),
     hold_still_(step, ranks, movers, inelastic::make_solver("apgd"))
 {
 }
@@ -186,8 +185,8 @@ RestTrial::Begun Rest::begin_trial() const
   begun.particles.assign(held_.size(), 0);
   for (std::size_t i = 0; i < held_.size(); ++i)
     begun.particles[i] = held_[i] && is_tried(static_cast<int>(i));
-  begun.common =
-      common_velocities(trial_.velocity_before(), begun.particles, clusters, held_directions());
+  begun.common = common_velocities(atom, clusters, held_directions(), trial_.velocity_before(),
+                                   begun.particles);
   for (std::size_t c = 0; c < contacts.size(); ++c)
     begun.constraints.push_back(is_tried(contacts.first[c]) || is_tried(contacts.second[c]));
   return begun;
@@ -327,8 +326,8 @@ HoldStill::Held Rest::held_now() const
   held.particles.assign(held_.size(), 0);
   for (std::size_t i = 0; i < held_.size(); ++i)
     if (is_stopped(static_cast<int>(i))) held.particles[i] = held_[i];
-  held.velocity =
-      common_velocities(step_.velocity, held.particles, motions_.clusters(), held_directions());
+  held.velocity = common_velocities(atom, motions_.clusters(), held_directions(), step_.velocity,
+                                    held.particles);
   return held;
 }
 
@@ -371,37 +370,6 @@ bool Rest::any_fell_apart() const
   }
   ranks_.reduce(nullptr, 0, &any, 1);
   return any > 0.0;
-}
-
-// Returns for each marked particle the mean of these velocities (3 per particle) over those of its
-// cluster, by mass, across the directions in which something outside holds the cluster. Collective.
-std::vector<double> Rest::common_velocities(const std::vector<double> &velocity,
-                                            const std::vector<char> &marked,
-                                            const Clusters &clusters,
-                                            const std::vector<Directions> &held) const
-{
-  enum { MASS, MOMENTUM, SUMS = MOMENTUM + 3 };
-  std::vector<double> sums(SUMS * clusters.size(), 0.0), none(clusters.size(), 0.0);
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!marked[i]) continue;
-    double *const s = &sums[SUMS * static_cast<std::size_t>(clusters.of(i))];
-    const double mass = mass_of(atom, i);
-    s[MASS] += mass;
-    for (int d = 0; d < 3; ++d)
-      s[MOMENTUM + d] += mass * velocity[3 * static_cast<std::size_t>(i) + d];
-  }
-  clusters.over_ranks(SUMS, sums, 1, none);
-  std::vector<double> common(3 * marked.size(), 0.0);
-  for (std::size_t i = 0; i < marked.size(); ++i) {
-    if (!marked[i]) continue;
-    const auto k = static_cast<std::size_t>(clusters.of(static_cast<int>(i)));
-    const double *const s = &sums[SUMS * k];
-    const std::array<double, 3> mean = {s[MOMENTUM] / s[MASS], s[MOMENTUM + 1] / s[MASS],
-                                        s[MOMENTUM + 2] / s[MASS]};
-    const std::array<double, 3> of_cluster = held[k].without(mean);
-    std::copy_n(of_cluster.begin(), 3, &common[3 * i]);
-  }
-  return common;
 }
 
 // Marks what contacts with a force touch, or touch its body, owned or not. Collective.
@@ -452,11 +420,12 @@ bool Rest::let_go_unbalanced(const std::vector<double> &by_contacts, HoldStill::
   // its pieces.
   const Clusters &clusters = motions_.clusters();
   if (any_fell_apart()) {
-    pieces_.find();
+    const ClusterPieces &pieces = motions_.find_pieces();
     held.velocity =
-        common_velocities(by_contacts, held.particles, pieces_.clusters(), pieces_.held());
+        common_velocities(atom, pieces.clusters(), pieces.held(), by_contacts, held.particles);
   } else
-    held.velocity = common_velocities(by_contacts, held.particles, clusters, held_directions());
+    held.velocity =
+        common_velocities(atom, clusters, held_directions(), by_contacts, held.particles);
   // What begins its rest in this step loses what it had beyond the common velocity, too.
   std::vector<double> balanced = held.velocity;
   for (std::size_t i = 0; i < held.particles.size(); ++i) {

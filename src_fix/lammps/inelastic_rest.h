@@ -41,7 +41,6 @@
 #define INELASTIC_REST_H
 
 #include "inelastic_cluster_motions.h"
-#include "inelastic_cluster_pieces.h"
 #include "inelastic_hold_still.h"
 #include "inelastic_projection.h"
 #include "inelastic_rest_rules.h"
@@ -107,9 +106,6 @@ class Rest : protected Pointers {
   std::vector<std::size_t> ends_wrong(const HoldStill::Held &held) const;
   std::vector<Directions> held_directions() const;
   bool any_fell_apart() const;
-  std::vector<double> common_velocities(const std::vector<double> &velocity,
-                                        const std::vector<char> &marked, const Clusters &clusters,
-                                        const std::vector<Directions> &held) const;
   void end_step(const HoldStill::Held &held);
 
   Step &step_;
@@ -117,7 +113,6 @@ class Rest : protected Pointers {
   AtomState &state_;
   const RestRules rules_;
   ClusterMotions motions_;
-  ClusterPieces pieces_;
   RestTrial trial_;
   RestTrial::Begun begun_;    // of the trial
   HoldStill hold_still_;
