@@ -59,7 +59,7 @@ class Upkeep {
   static constexpr long REFRESH_EVERY = 50;
   // Idle constraints are looked at later than LOOK_EVERY sweeps on, when this part of all was made
   // since.
-  static constexpr long LOOK_PART = 8;
+  static constexpr long LOOK_PART = 3;
 
   long begun_, next_refresh_, next_look_;
 };

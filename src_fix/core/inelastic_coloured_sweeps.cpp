@@ -95,7 +95,6 @@ template <typename Batch>
 End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, Solve &solve)
 {
   const SolverLimits &limits = solve.limits;
-  const Scales &scales = solve.scales();
   Host &host = solve.host;
   SolverResult &result = solve.result;
   Momentum momentum;
@@ -104,6 +103,7 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, S
   ResidualTrend progress;
   Settling settling(sweeps, limits.accuracy > 0.0 && limits.coarseness == 1.0, result.iterations);
   long begun = result.iterations, refined = begun;
+  const double idle_gap = IDLE_GAP * limits.tolerance / solve.scales().length;
   double first = 0.0, blur = 0.0;
   while (!solve.is_out_of_iterations()) {
     const swept::Swept mine = sweeps.sweep(momentum.next().along, blur, host);
@@ -114,9 +114,8 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, S
     if (first == 0.0) first = change;
     if (!std::isfinite(uphill) || !(change <= DIVERGED * first)) return End::GO_ON;
     progress.see(result.iterations - refined, of_target);
-    result.trend.see(result.iterations, scales.length * change);
+    result.trend.see(result.iterations, solve.scales().length * change);
     blur = SINGLE_ROUND_OFF * maxima[2];
-
     if (checkpoints.is_due(result.iterations, of_target)) {
       double unsolved = find_unsolved(sweeps, blur, host);
       checkpoints.note(result.iterations, of_target, unsolved);
@@ -125,8 +124,9 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, S
       if (settled) unsolved = find_unsolved(sweeps, blur, host);    // the targets are new
       const bool solved = settled && unsolved <= 1.0;
       if (solved || (near && find_unsolved(sweeps, 0.0, host) > 1.0)) {
-        sweeps.impulses(scales, solve.impulse());
-        if (solve.judge() && solved) return End::SOLVED;
+        sweeps.impulses(solve.scales(), solve.impulse());
+        can_go_on_ = solve.judge() && solved;
+        if (can_go_on_) return End::SOLVED;
         if (!refinement.goes_on()) return End::ROUND_OFF;
         sweeps.recentre(solve.idle_gap(), host);
         blur = 0.0;
@@ -140,13 +140,13 @@ End ColouredSweeps::sweep(PackedSweeps<Batch> &sweeps, Refinement &refinement, S
     if ((result.iterations - begun) % PLATEAU_EVERY == 0)
       if (const auto end = leave_plateau(sweeps, blur, solve)) return *end;
     if ((result.iterations - begun) % CHECK_EVERY == 0) {
-      sweeps.impulses(scales, solve.impulse());
+      sweeps.impulses(solve.scales(), solve.impulse());
       if (is_infeasible(solve.problem, solve.gap_operator(), limits, host)) return End::INFEASIBLE;
       if (result.iterations - refined >= LONG && progress.least() >= STUCK * progress.earlier())
         return End::GO_ON;
     }
     momentum.see(uphill);
-    upkeep.run(result.iterations, sweeps, IDLE_GAP * limits.tolerance / scales.length, host);
+    upkeep.run(result.iterations, sweeps, idle_gap, host);
     settling.see(result.iterations);
   }
   return End::GO_ON;
@@ -157,6 +157,12 @@ template <typename Batch> End ColouredSweeps::search(PackedSweeps<Batch> &sweeps
   double refused = sweeps.prepare(solve.start(), solve.idle_gap(), solve.host) ? 0.0 : 1.0;
   solve.host.reduce(nullptr, 0, &refused, 1);
   if (refused > 0.0) return End::GO_ON;
+  return search_on(sweeps, solve);
+}
+
+// Searches from what is packed.
+template <typename Batch> End ColouredSweeps::search_on(PackedSweeps<Batch> &sweeps, Solve &solve)
+{
   const std::vector<double> guess = solve.impulse();
   Refinement refinement(solve);
   const End end = sweep(sweeps, refinement, solve);
@@ -177,11 +183,19 @@ template <typename Batch> End ColouredSweeps::search(PackedSweeps<Batch> &sweeps
 
 End ColouredSweeps::run(Solve &solve)
 {
+  can_go_on_ = false;
   if (solve.problem.any_wall_moves()) return End::GO_ON;
   // Whether there are bodies is a matter of the scene: some ranks may have none.
   double bodies = solve.problem.bodies.empty() ? 0.0 : 1.0;
   solve.host.reduce(nullptr, 0, &bodies, 1);
   return bodies > 0.0 ? search(of_bodies_, solve) : search(of_particles_, solve);
+}
+
+End ColouredSweeps::go_on(Solve &solve, const Refined &refined)
+{
+  can_go_on_ = false;
+  of_particles_.go_on(solve.start(), refined);
+  return search_on(of_particles_, solve);
 }
 
 }    // namespace inelastic

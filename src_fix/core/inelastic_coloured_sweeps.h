@@ -30,12 +30,15 @@ namespace inelastic {
 class ColouredSweeps final : public Search {
  public:
   End run(Solve &solve) override;
+  bool can_go_on() const override { return can_go_on_; }
+  End go_on(Solve &solve, const Refined &refined) override;
   bool is_single() const override { return true; }
 
  private:
   class Refinement;
 
   template <typename Batch> End search(PackedSweeps<Batch> &sweeps, Solve &solve);
+  template <typename Batch> End search_on(PackedSweeps<Batch> &sweeps, Solve &solve);
 
   // Sweeps until the impulses are a solution, or sweeps are of no more use.
   template <typename Batch>
@@ -43,6 +46,7 @@ class ColouredSweeps final : public Search {
 
   PackedSweeps<swept::ParticleBatch> of_particles_;
   PackedSweeps<swept::BodyBatch> of_bodies_;
+  bool can_go_on_ = false;
 };
 
 }    // namespace inelastic

@@ -93,13 +93,17 @@ double ContactSet::diagonal(std::size_t c, const Unknowns &unknowns, double time
       compliance[c];
 }
 
+double ContactSet::free_gap(std::size_t c, double timestep, const double *velocity) const
+{
+  return gap[c] +
+      timestep *
+      opening_speed(&normal[3 * c], velocity + 3 * static_cast<std::size_t>(first[c]),
+                    velocity + 3 * static_cast<std::size_t>(second[c]));
+}
+
 void ContactSet::free_gaps(double timestep, const double *velocity, double *gap_at_end) const
 {
-  for (std::size_t c = 0; c < size(); ++c)
-    gap_at_end[c] = gap[c] +
-        timestep *
-            opening_speed(&normal[3 * c], velocity + 3 * static_cast<std::size_t>(first[c]),
-                          velocity + 3 * static_cast<std::size_t>(second[c]));
+  for (std::size_t c = 0; c < size(); ++c) gap_at_end[c] = free_gap(c, timestep, velocity);
 }
 
 INELASTIC_CLONES void ContactSet::gaps_at_end(const double *free_gap, double timestep,

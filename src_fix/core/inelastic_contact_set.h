@@ -90,6 +90,9 @@ struct ContactSet {
   // what a unit impulse of the constraint adds to its own gap at the end of the step.
   double diagonal(std::size_t c, const Unknowns &unknowns, double timestep) const;
 
+  // Returns gap + h G velocity of a constraint [length]; `velocity` has 3 per slot.
+  double free_gap(std::size_t c, double timestep, const double *velocity) const;
+
   // Writes gap + h G velocity [length], one number per constraint; `velocity` has 3 per slot.
   void free_gaps(double timestep, const double *velocity, double *gap_at_end) const;
 

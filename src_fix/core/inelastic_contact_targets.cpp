@@ -40,12 +40,41 @@ void ContactTargets::begin(const ContactProblem &problem, const GapOperator &gap
   diagonal_ = diagonal;
   change_by_guess_ = gap_operator.change();
   of_guess_.resize(contacts.size());
-  for (std::size_t c = 0; c < contacts.size(); ++c) {
-    const double lighter = std::max(problem.inverse_mass_of(contacts.first[c]),
-                                    problem.inverse_mass_of(contacts.second[c]));
-    const double load = contacts.magnitude(c) * diagonal[c] * (least_inverse_mass / lighter);
-    of_guess_[c] = std::max(contacts.residual(c, gap.data()).largest(), PART_OF_LOAD * load);
-  }
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    of_guess_[c] = of_guess(problem, gap, c, least_inverse_mass);
+}
+
+double ContactTargets::of_guess(const ContactProblem &problem, const std::vector<double> &gap,
+                                std::size_t c, double least_inverse_mass) const
+{
+  const ContactSet &contacts = problem.contacts;
+  const double lighter = std::max(problem.inverse_mass_of(contacts.first[c]),
+                                  problem.inverse_mass_of(contacts.second[c]));
+  const double load = contacts.magnitude(c) * diagonal_[c] * (least_inverse_mass / lighter);
+  return std::max(contacts.residual(c, gap.data()).largest(), PART_OF_LOAD * load);
+}
+
+Residual ContactTargets::go_on(const ContactProblem &problem, const Refined &refined,
+                               const SolverLimits &limits, const GapOperator &gap_operator,
+                               const std::vector<double> &gap, const std::vector<double> &diagonal,
+                               double least_inverse_mass)
+{
+  const std::size_t known = of_guess_.size();
+  diagonal_.insert(diagonal_.end(), diagonal.begin() + static_cast<std::ptrdiff_t>(known),
+                   diagonal.end());
+  for (std::vector<double> *const of_contacts : {&of_guess_, &least_, &part_, &resolved_})
+    of_contacts->resize(gap.size(), 0.0);
+  Residual worst = residual_;
+  const auto look = [&](std::size_t c) {
+    of_guess_[c] = std::max(of_guess_[c], of_guess(problem, gap, c, least_inverse_mass));
+    set_least(problem, limits, gap_operator, c);
+    const Residual here = problem.contacts.residual(c, gap.data());
+    worst.feasibility = std::max(worst.feasibility, here.feasibility);
+    worst.complementarity = std::max(worst.complementarity, here.complementarity);
+  };
+  for (const ChangedGap &changed : refined.gaps) look(changed.constraint);
+  for (std::size_t c = known; c < gap.size(); ++c) look(c);
+  return worst;
 }
 
 // Finds of what round-off is a part.
@@ -77,8 +106,8 @@ void ContactTargets::set_least(const ContactProblem &problem, const SolverLimits
     part_[c] = 0.0;
     return;
   }
-  const bool of_bodies = problem.is_member(contacts.first[c]) ||
-      problem.is_member(contacts.second[c]);
+  const bool of_bodies = !problem.bodies.empty() &&
+      (problem.is_member(contacts.first[c]) || problem.is_member(contacts.second[c]));
   part_[c] = (of_bodies ? OF_BODIES : IN_NETWORKS) * limits.accuracy * limits.coarseness *
       contacts.refinement[c];
   const double length = std::abs(gap_operator.free_gap()[c]) + length_[contacts.first[c]] +
@@ -128,8 +157,11 @@ double ContactTargets::judge(const ContactProblem &problem, const SolverLimits &
     bound_target(resolved_[c], limits.tolerance, target);
     const Residual residual = contacts.residual(c, gap.data());
     const double left = counts == Counts::ALL ? residual.largest() : residual.feasibility;
-    maxima[0] = std::max(maxima[0], left / target);
-    maxima[2] = std::max(maxima[2], part_[c] * left / resolved_[c]);
+    // Most constraints are met as they are.
+    if (left != 0.0) {
+      maxima[0] = std::max(maxima[0], left / target);
+      maxima[2] = std::max(maxima[2], part_[c] * left / resolved_[c]);
+    }
     maxima[3] = std::max(maxima[3], residual.feasibility);
     maxima[4] = std::max(maxima[4], residual.complementarity);
     if (contacts.is_loaded(c) || gap[c] < NEAR * limits.tolerance)

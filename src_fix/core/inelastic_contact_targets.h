@@ -19,7 +19,7 @@
 // Of contact c
 //
 // - r_c is the residual of the first guess: for two spheres that meet, by how much they would
-//   overlap;
+//   overlap; of a constraint that was added since the residual when it was;
 // - l_c is the length by which the contact's own impulse of the first guess would open its gap if
 //   its sides were as heavy as the heaviest of the scene. Where forces balance they change no
 //   velocity, v_c is near zero, and l_c alone says what is small. (The sides' own masses would say
@@ -33,6 +33,7 @@
 #include "inelastic_contact_problem.h"
 #include "inelastic_gap_operator.h"
 #include "inelastic_host.h"
+#include "inelastic_refined.h"
 
 #include <vector>
 
@@ -48,6 +49,13 @@ class ContactTargets {
   void begin(const ContactProblem &problem, const GapOperator &gap_operator,
              const std::vector<double> &gap, const std::vector<double> &diagonal,
              double least_inverse_mass);
+
+  // Takes a problem that was judged last when it was solved, and was then refined: its new
+  // constraints, and those whose gap has changed, have these gaps now, where the search goes on.
+  // Sets least() and part() of these. Returns the residual of this rank.
+  Residual go_on(const ContactProblem &problem, const Refined &refined, const SolverLimits &limits,
+                 const GapOperator &gap_operator, const std::vector<double> &gap,
+                 const std::vector<double> &diagonal, double least_inverse_mass);
 
   // Sets the targets for the present impulses, to which the operator was last applied. Returns the
   // largest residual as a part of its target, over all ranks; infinity if a number is not finite.
@@ -84,6 +92,8 @@ class ContactTargets {
   double judge(const ContactProblem &problem, const SolverLimits &limits,
                const GapOperator &gap_operator, const std::vector<double> &gap, Counts counts,
                Host &host);
+  double of_guess(const ContactProblem &problem, const std::vector<double> &gap, std::size_t c,
+                  double least_inverse_mass) const;
   void find_lengths(const ContactProblem &problem);
   void set_least(const ContactProblem &problem, const SolverLimits &limits,
                  const GapOperator &gap_operator, std::size_t c);

@@ -66,6 +66,24 @@ void GapOperator::apply(const ContactProblem &problem, const double *impulse, do
                                gap_at_end);
 }
 
+void GapOperator::refine(const ContactProblem &problem, const Refined &refined,
+                         std::vector<double> &gap_at_end)
+{
+  const ContactSet &contacts = problem.contacts;
+  const auto free_gap = [&](std::size_t c) {
+    return contacts.free_gap(c, problem.timestep, problem.predicted_velocity.data());
+  };
+  for (const ChangedGap &gap : refined.gaps) {
+    free_gap_[gap.constraint] += gap.by;
+    gap_at_end[gap.constraint] += gap.by;
+  }
+  for (std::size_t c = free_gap_.size(); c < contacts.size(); ++c) {
+    free_gap_.push_back(free_gap(c));
+    const double opened = contacts.free_gap(c, problem.timestep, change_.data()) - contacts.gap[c];
+    gap_at_end.push_back(free_gap_[c] + opened);
+  }
+}
+
 void GapOperator::product(const ContactProblem &problem, const double *impulse, double *opened,
                           Host &host)
 {

@@ -10,6 +10,7 @@
 
 #include "inelastic_contact_problem.h"
 #include "inelastic_host.h"
+#include "inelastic_refined.h"
 
 #include <vector>
 
@@ -37,7 +38,14 @@ class GapOperator {
   // velocity of each slot; 3 numbers per slot [length / time].
   const std::vector<double> &change() const { return change_; }
 
-  // Writes the same for the impulses of the last call of apply(), without communication.
+  // Does the same as prepare() for a problem that was refined, and not anew. Sets `gap_at_end` of
+  // what is new in it, for the impulses of the last call of apply(); those of new constraints are
+  // 0.
+  void refine(const ContactProblem &problem, const Refined &refined,
+              std::vector<double> &gap_at_end);
+
+  // Writes the same as velocity() for the impulses of the last call of apply(), without
+  // communication.
   void velocity_applied(const ContactProblem &problem, double *velocity) const;
 
   struct ImpulseNorm {

@@ -1,5 +1,6 @@
 #include "inelastic_packed_batches.h"
 
+#include <algorithm>
 #include <cstdint>
 
 namespace inelastic {
@@ -25,7 +26,8 @@ template <typename Batch> void PackedBatches<Batch>::resize_for(std::size_t lane
   const std::size_t from = lanes();
   batches.resize((lanes_needed + WIDTH - 1) / WIDTH);
   details.resize(batches.size());
-  for (std::size_t place = from; place < lanes(); ++place) clear_lane(place);
+  for (std::size_t place = std::max(from, lanes_needed); place < lanes(); ++place)
+    clear_lane(place);
 }
 
 template <typename Batch> void PackedBatches<Batch>::clear_lane(std::size_t place)

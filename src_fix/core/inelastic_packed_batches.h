@@ -39,7 +39,8 @@ template <typename Batch> class PackedBatches {
   // Adds batches for constraints with these colours, in which those of the last colour have one
   // each. Returns the place of each constraint.
   std::vector<std::size_t> add(const ConstraintColours &colours);
-  // Makes the number of lanes the least that is enough for so many; more ones are empty.
+  // Makes the number of lanes the least that is enough for so many; more ones are empty. New ones
+  // up to there have no value yet, and must be written.
   void resize_for(std::size_t lanes);
   void clear_lane(std::size_t place);
   // Copies the lane at a place of other batches to one of these.

@@ -75,6 +75,51 @@ ConstraintColours PackedSweeps<Batch>::colour(const std::vector<int> &first,
   return {one, other, grains_.moves()};
 }
 
+template <typename Batch>
+void PackedSweeps<Batch>::go_on(const Start &start, const Refined &refined)
+{
+  const ContactSet &contacts = start.problem.contacts;
+  const std::size_t known = start_.size();
+  // By how much gaps have changed, as a length in packed units.
+  if (!refined.gaps.empty()) {
+    std::vector<float> by(known, 0.0f);
+    for (const ChangedGap &gap : refined.gaps)
+      by[gap.constraint] = static_cast<float>(gap.by / start.scales.length);
+    for (Packed *const some : {&at_cuts_, &inside_, &idle_}) open(*some, by);
+  }
+  given_.emplace(start);
+  of_impulses_ = contacts.set;
+  start_.resize(contacts.size(), 0.0);
+  // Idle constraints have the gaps of the centre. Those that are packed now are known with what the
+  // impulses have changed since.
+  std::vector<std::size_t> more = std::move(far_);
+  far_.clear();
+  for (std::size_t c = known; c < contacts.size(); ++c) more.push_back(c);
+  const std::size_t from = idle_.used();
+  idle_.resize_for(from + more.size());
+  for (std::size_t k = 0; k < more.size(); ++k) write(more[k], idle_, from + k);
+  look_at(idle_, looked_.idle);
+  for (std::size_t place = from; place < from + more.size(); ++place) {
+    const std::size_t g = place / WIDTH, lane = place % WIDTH;
+    float &gap = idle_.batch(place).gap[lane];
+    gap -= looked_.idle[g].gap[lane] / idle_.details[g].root[lane] - gap;
+  }
+  set_targets();
+  wake_near();
+}
+
+// Adds lengths to the gaps of packed constraints, by the constraint.
+template <typename Batch>
+void PackedSweeps<Batch>::open(Packed &packed, const std::vector<float> &by) const
+{
+  for (std::size_t place = 0; place < packed.lanes(); ++place) {
+    if (packed.is_empty(place)) continue;
+    const swept::Details &details = packed.details_of(place);
+    const auto lane = place % WIDTH;
+    packed.batch(place).gap[lane] += by[details.source[lane]] / details.root[lane];
+  }
+}
+
 template <typename Batch> void PackedSweeps<Batch>::recentre(double idle_gap, Host &host)
 {
   const std::vector<Vector> moved = velocities();
@@ -134,7 +179,7 @@ void PackedSweeps<Batch>::write_start(Packed &packed, std::size_t place) const
   batch.gap[lane] = static_cast<float>(given_->gap[c] * per_length / root);
   batch.idle[lane] =
       static_cast<float>(of_impulses_[c].changes_of(start_[c]).idle() / scales.impulse * root);
-  batch.now[lane] = batch.before[lane] = 0.0f;
+  batch.now[lane] = batch.before[lane] = batch.inverse_target[lane] = 0.0f;
   details.least_target[lane] = static_cast<float>(given_->targets.least()[c] * per_length);
   details.part[lane] = static_cast<float>(given_->targets.part()[c]);
 }
@@ -190,8 +235,8 @@ template <typename Batch> bool PackedSweeps<Batch>::sets_targets(long sweep)
   if (sweep < 2) return false;
   int below = 0;    // 2^below is the largest power of two that is not more
   while ((sweep >> (below + 1)) > 0) ++below;
-  const long quarter = below > 2 ? 1L << (below - 2) : 2;
-  return sweep % quarter == 0;
+  const long half = below > 3 ? 1L << (below - 1) : 2;
+  return sweep % half == 0;
 }
 
 template <typename Batch> void PackedSweeps<Batch>::set_targets()

@@ -12,6 +12,7 @@
 
 #include "inelastic_packed_batches.h"
 #include "inelastic_packed_targets.h"
+#include "inelastic_refined.h"
 #include "inelastic_shared_grains.h"
 #include "inelastic_start.h"
 #include "inelastic_swept_grains.h"
@@ -29,6 +30,10 @@ template <typename Batch> class PackedSweeps {
   // above `idle_gap` [length] are idle. Returns false where so many constraints have one grain in
   // common that batches would be mostly empty. Collective; what is returned is this rank's answer.
   bool prepare(const Start &start, double idle_gap, Host &host);
+
+  // Takes a problem that was refined, and not anew, since the present impulses have solved it: what
+  // it had is packed, and `start` is to refer to what `prepare` was given. Without ghosts.
+  void go_on(const Start &start, const Refined &refined);
 
   // Makes the present impulses the centre of what follows. They are those of the problem now, and
   // double precision has judged them: what `prepare` was given refers to what is new. Colours,
@@ -81,6 +86,7 @@ template <typename Batch> class PackedSweeps {
   void write(std::size_t c, Packed &packed, std::size_t place) const;
   void write_start(Packed &packed, std::size_t place) const;
   void write_idle(const std::vector<std::size_t> &constraints);
+  void open(Packed &packed, const std::vector<float> &by) const;
   void wake_near();
   void wake(const std::vector<std::size_t> &near);
   float look_at(const Packed &packed, Looked &looked) const;
@@ -99,7 +105,7 @@ template <typename Batch> class PackedSweeps {
   std::vector<std::size_t> far_;    // in the problem: idle constraints that are not packed yet
   std::vector<State> states_, before_;
   std::vector<Vector> velocity_;    // per slot
-  std::vector<double> start_;       // impulses, in the order of the problem
+  std::vector<double> start_;       // impulses of the centre, in the order of the problem
   std::vector<AdmissibleSet<double>>
       of_impulses_;    // which impulses are admissible, in that order
   PackedTargets<float> targets_;

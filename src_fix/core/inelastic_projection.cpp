@@ -51,11 +51,14 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
   GapOperator &gap_operator = solver.gap_operator();
   velocity.resize(problem.predicted_velocity.size());
   bool coarse = limits.coarseness > 1.0;
+  Refined refined;
+  bool goes_on = false;    // whether the last solve, which converged, was of the same targets
   while (true) {
     SolverLimits remaining = limits;
     remaining.max_iterations -= result.iterations;
     if (!coarse) remaining.coarseness = 1.0;
-    const SolverResult solved = solver.solve(problem, remaining, host);
+    const SolverResult solved = goes_on ? solver.go_on(problem, refined, remaining, host)
+                                        : solver.solve(problem, remaining, host);
     ++result.rounds;
     result.status = solved.status;
     result.iterations += solved.iterations;
@@ -71,13 +74,15 @@ ProjectionResult project(ContactProblem &problem, ConstraintSource &source, Solv
       gap_operator.velocity_applied(problem, velocity.data());
     else
       gap_operator.velocity(problem, problem.contacts.impulse.data(), velocity.data(), host);
-    double changed = static_cast<double>(source.refine(velocity, problem));
+    refined = source.refine(velocity, problem);
+    double changed = static_cast<double>(refined.number);
     host.reduce(&changed, 1, nullptr, 0);
     if (converged && changed == 0.0) {
       if (!coarse) return result;
-      coarse = false;
+      coarse = goes_on = false;
       continue;
     }
+    goes_on = converged;
     if (converged && result.rounds < max_rounds) continue;
     if (converged) result.status = Status::OUT_OF_ROUNDS;
     judge_failure(problem, gap_operator, solved_for, limits.tolerance, host, result);

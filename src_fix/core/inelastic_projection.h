@@ -11,6 +11,7 @@
 #pragma once
 
 #include "inelastic_contact_problem.h"
+#include "inelastic_refined.h"
 #include "inelastic_solver.h"
 
 #include <algorithm>
@@ -22,8 +23,8 @@ class ConstraintSource {
  public:
   // Takes the velocities (3 per slot) that solve the problem as it stands, adds the constraints
   // that they violate by more than the tolerance, and linearises constraints again where needed.
-  // Returns the number of constraints that this rank added or changed.
-  virtual long refine(const std::vector<double> &velocity, ContactProblem &problem) = 0;
+  // Tells what this rank added or changed.
+  virtual Refined refine(const std::vector<double> &velocity, ContactProblem &problem) = 0;
 
  protected:
   ~ConstraintSource() = default;    // not virtual: sources are never owned through this interface

@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include "inelastic_refined.h"
+
 namespace inelastic {
 
 class Solve;
@@ -26,6 +28,10 @@ class Search {
   // Searches from the impulses of the problem, and leaves there what it has come to, judged, unless
   // a number is not finite. Collective.
   virtual End run(Solve &solve) = 0;
+  // Whether the last run has solved its problem, and what it has packed of it is the solution.
+  virtual bool can_go_on() const { return false; }
+  // Goes on from there: the problem, which has no bodies, was refined, and not anew. Else as run().
+  virtual End go_on(Solve &solve, const Refined &) { return run(solve); }
   // Whether it works in single precision.
   virtual bool is_single() const = 0;
   // How often it runs, each time from the impulses of the time before, as long as it is to go on.

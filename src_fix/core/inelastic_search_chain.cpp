@@ -6,9 +6,9 @@
 
 namespace inelastic {
 
-// Runs the searches, of those in single precision none unless these are of use. Returns how the
-// last one has ended.
-Status SearchChain::run(Solve &solve, bool single_precision)
+// Runs the searches, of those in single precision none unless these are of use. With `refined` the
+// first one goes on. Returns how the last one has ended.
+Status SearchChain::run(Solve &solve, bool single_precision, const Refined *refined)
 {
   End end = End::GO_ON;
   const auto has_ended = [&] {
@@ -17,7 +17,8 @@ Status SearchChain::run(Solve &solve, bool single_precision)
   for (const std::unique_ptr<Search> &search : searches_) {
     for (int k = 0; k < search->most_runs() && !has_ended(); ++k) {
       if (search->is_single() && !single_precision) break;
-      end = search->run(solve);
+      end = refined ? search->go_on(solve, *refined) : search->run(solve);
+      refined = nullptr;
       if (end == End::ROUND_OFF && search->is_single()) {
         single_precision = false;
         end = End::GO_ON;
@@ -43,21 +44,39 @@ Status SearchChain::run(Solve &solve, bool single_precision)
 
 SolverResult SearchChain::solve(ContactProblem &problem, const SolverLimits &limits, Host &host)
 {
-  // A first guess with a residual above so many of its targets is left to double precision.
-  constexpr double WITHIN_SINGLE = 1.0e12;
   gap_operator_.prepare(problem);
-  const Guess guess = judge_first_guess(problem, host);
+  guess_ = judge_first_guess(problem, host);
+  return search(problem, limits, nullptr, host);
+}
+
+SolverResult SearchChain::go_on(ContactProblem &problem, const Refined &refined,
+                                const SolverLimits &limits, Host &host)
+{
+  if (refined.anew || !problem.bodies.empty() || host.has_ghosts() ||
+      !searches_.front()->can_go_on())
+    return solve(problem, limits, host);
+  judge_refined(problem, refined, limits, guess_);
+  return search(problem, limits, &refined, host);
+}
+
+// Searches from the first guess, or goes on after the last search.
+SolverResult SearchChain::search(ContactProblem &problem, const SolverLimits &limits,
+                                 const Refined *refined, Host &host)
+{
+  // A first guess with a residual above so many of its targets is left to double precision.
+  constexpr double WITHIN_SINGLE = 1.0e12, UNSOLVED_IN_SINGLE = 0.5 * WITHIN_SINGLE;
   Solve solve(problem, limits, {gap_operator_, targets_, gap_, diagonal_, conjugate_gradients_},
-              guess, host);
+              guess_, host);
   SolverResult &result = solve.result;
-  const double unsolved = solve.set_targets();
+  // What was refined is not solved any more.
+  const double unsolved = refined ? UNSOLVED_IN_SINGLE : solve.set_targets();
   if (unsolved <= 1.0)
     result.status = Status::CONVERGED;
   else if (!std::isfinite(result.residual.feasibility))
     result.status = Status::NOT_FINITE;
   else if (limits.max_iterations > 0) {
     for (const std::unique_ptr<Search> &search : searches_) search->begin();
-    result.status = run(solve, unsolved < WITHIN_SINGLE);
+    result.status = run(solve, unsolved < WITHIN_SINGLE, refined);
   }
   settle_for_tolerance(limits, result.residual.largest(), result);
   return result;

@@ -21,12 +21,20 @@ class SearchChain final : public Solver {
   explicit SearchChain(Searches searches) : searches_(std::move(searches)) {}
 
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
+  // Where the first search has solved the problem it goes on with what it has packed. The solve
+  // begins anew with ghosts, since what ranks share may have changed, and with bodies, whose rounds
+  // follow their turns and are more without that.
+  SolverResult go_on(ContactProblem &problem, const Refined &refined, const SolverLimits &limits,
+                     Host &host) override;
 
  private:
-  Status run(Solve &solve, bool single_precision);
+  SolverResult search(ContactProblem &problem, const SolverLimits &limits, const Refined *refined,
+                      Host &host);
+  Status run(Solve &solve, bool single_precision, const Refined *refined);
 
   Searches searches_;
   ConjugateGradients conjugate_gradients_;
+  Guess guess_;
 };
 
 }    // namespace inelastic

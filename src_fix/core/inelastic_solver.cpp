@@ -89,6 +89,18 @@ Guess Solver::judge_first_guess(ContactProblem &problem, Host &host)
   return guess;
 }
 
+void Solver::judge_refined(ContactProblem &problem, const Refined &refined,
+                           const SolverLimits &limits, Guess &guess)
+{
+  ContactSet &contacts = problem.contacts;
+  const std::size_t known = gap_.size();
+  contacts.forget_impulses(known);
+  gap_operator_.refine(problem, refined, gap_);
+  for (std::size_t c = known; c < contacts.size(); ++c) diagonal_.push_back(problem.diagonal(c));
+  guess.residual = targets_.go_on(problem, refined, limits, gap_operator_, gap_, diagonal_,
+                                  guess.least_inverse_mass);
+}
+
 void settle_for_tolerance(const SolverLimits &limits, double reached, SolverResult &result)
 {
   const bool stopped_short = result.status == Status::OUT_OF_ITERATIONS ||

@@ -18,6 +18,7 @@
 #include "inelastic_contact_targets.h"
 #include "inelastic_gap_operator.h"
 #include "inelastic_host.h"
+#include "inelastic_refined.h"
 #include "inelastic_solver_limits.h"
 
 #include <algorithm>
@@ -180,6 +181,12 @@ class Solver {
   // Solves the problem for problem.contacts.impulse. Collective.
   virtual SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) = 0;
 
+  // Does the same for a problem that it has just solved to these limits, after which the problem
+  // was refined. Collective.
+  virtual SolverResult go_on(ContactProblem &problem, const Refined &, const SolverLimits &limits,
+                             Host &host)
+  { return solve(problem, limits, host); }
+
   // Returns the operator, prepared for the problem of the last solve. If that solve has converged,
   // the operator was last applied to its result.
   GapOperator &gap_operator() { return gap_operator_; }
@@ -193,6 +200,11 @@ class Solver {
 
   GapOperator gap_operator_;
   ContactTargets targets_;
+  // Judges what is new in a problem that was solved, and then refined; the impulses of its new
+  // constraints become 0. Of the guess the residual changes. Without ghosts.
+  void judge_refined(ContactProblem &problem, const Refined &refined, const SolverLimits &limits,
+                     Guess &guess);
+
   std::vector<double> gap_;         // [length] at the end of the step, one per constraint
   std::vector<double> diagonal_;    // of A [time / mass]
 };

@@ -77,8 +77,10 @@ void SweptGrains<Batch>::write_rows(const ContactProblem &problem, std::size_t c
   batch.first[lane] = static_cast<std::uint32_t>(of(contacts.first[c]) * sizeof(State));
   batch.second[lane] = static_cast<std::uint32_t>(of(contacts.second[c]) * sizeof(State));
   if constexpr (!HAS_BODIES<Batch>) {
-    for (int d = 0; d < 3; ++d)
-      batch.row[lane % 4][4 * (lane / 4) + d] = static_cast<float>(n[d] / root);
+    swept::Eight &row = batch.row[lane % 4];
+    const int from = 4 * (lane / 4);
+    for (int d = 0; d < 3; ++d) row[from + d] = static_cast<float>(n[d] / root);
+    row[from + 3] = 0.0f;
   } else {
     for (const bool is_first : {true, false}) {
       const int slot = is_first ? contacts.first[c] : contacts.second[c];

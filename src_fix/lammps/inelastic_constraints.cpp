@@ -47,23 +47,38 @@ void Constraints::collect()
 }
 
 // The velocities are those of the step, `problem` is its problem.
-long Constraints::refine(const std::vector<double> &velocity, inelastic::ContactProblem &problem)
+inelastic::Refined Constraints::refine(const std::vector<double> &velocity,
+                                       inelastic::ContactProblem &problem)
 {
   const PhaseClock::Within within(clock_, PhaseClock::COLLECT);
   step_.problem_found.clear();
   solved_relinearised_ = relinearised_;
   movers_.turn(problem, velocity, step_.motion_of_bodies);
+  const inelastic::ContactSet &contacts = problem.contacts;
+  const std::size_t known = contacts.size();
   const long added = pairs_.add_violated() + wall_constraints_.add_violated();
-  const long changed = step_.phase == Phase::CONTACT ? rules_.keep_within_tolerance(velocity) : 0;
+  inelastic::Refined refined;
+  if (step_.phase == Phase::CONTACT) rules_.keep_within_tolerance(velocity, refined);
   if (need_relinearising()) ++step_.relinearisations;
   const long relinearised = relinearise();
   double sums[3] = {static_cast<double>(added), static_cast<double>(relinearised),
-                    static_cast<double>(changed)};
+                    static_cast<double>(refined.number)};
   ranks_.reduce(sums, 3, &step_.excess, 1);
   came_back_ = came_back_ || sums[0] > 0.0;
   relinearised_ = relinearised_ || sums[1] > 0.0;
   ranks_.fail_together(step_.problem_found);
-  return added + changed + relinearised;
+  refined.number += added + relinearised;
+  refined.anew = refined.anew || relinearised > 0;
+  // Where a law may pull the first guess of a new constraint is no idle impulse.
+  for (std::size_t c = known; c < contacts.size(); ++c)
+    refined.anew = refined.anew || contacts.set[c].may_pull();
+  // New constraints come as they are now.
+  const auto is_new = [known](const inelastic::ChangedGap &gap) {
+    return gap.constraint >= known;
+  };
+  refined.gaps.erase(std::remove_if(refined.gaps.begin(), refined.gaps.end(), is_new),
+                     refined.gaps.end());
+  return refined;
 }
 
 bool Constraints::need_relinearising() const

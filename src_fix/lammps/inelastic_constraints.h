@@ -41,9 +41,9 @@ class Constraints final : public inelastic::ConstraintSource, protected Pointers
   void collect();
 
   // Adds what the velocities of the step violate, and follows the end of the step where bodies turn
-  // or walls curve. Returns how many constraints this rank added or changed. Collective, same
-  // errors.
-  long refine(const std::vector<double> &velocity, inelastic::ContactProblem &problem) override;
+  // or walls curve. Collective, same errors.
+  inelastic::Refined refine(const std::vector<double> &velocity,
+                            inelastic::ContactProblem &problem) override;
 
   // Adds what the velocities of the step violate. Returns how many constraints all ranks added.
   // Collective, same errors.

@@ -32,8 +32,10 @@ void ContactRows::add(Contact contact, double wall_motion, int i, int j, const d
     laws_.ask(contact, wall_motion, i, j, normal, rules_.overlaps().is_bad(contact.gap_now));
   const FirstGuess *const last = guesses_.find(i, contact.partner, normal);
   rules_.begin(contact, last ? *last : FirstGuess{}, wall_motion, i, j, normal);
-  const Row row = {static_cast<int>(step_.contacts.size()), wall_motion};
-  step_.problem.contacts.add(i, j, normal, rules_.effective_gap(contact) - wall_motion,
+  const double gap = rules_.effective_gap(contact);
+  Row row = {static_cast<int>(step_.contacts.size()), wall_motion};
+  row.asks_for_gap = gap == contact.gap_now;
+  step_.problem.contacts.add(i, j, normal, gap - wall_motion,
                              step_.impulse_per_force * contact.force, 0.0, contact.asked.set,
                              contact.refinement());
   step_.contacts.push_back(contact);

@@ -52,8 +52,10 @@ double EnergyWatch::fastest_given_back()
   for (std::size_t c = 0; c < contacts.size(); ++c)
     if (contacts.impulse[c] > 0.0 && step_.contact_of(c).gap_now < 0.0)
       maxima[0] = std::max(maxima[0], along(c, step_.velocity));
-  for (const Contact &contact : step_.contacts)
-    if (contact.asked.parts) maxima[1] = 1.0;
+  // Without a law none does.
+  if (!step_.law_states.empty())
+    for (const Contact &contact : step_.contacts)
+      if (contact.asked.parts) maxima[1] = 1.0;
   ranks_.reduce(nullptr, 0, maxima, 2);
   parts_ = parts_ || maxima[1] > 0.0;
   return std::min(maxima[0], step_.eps(in_eps::REGULAR) / step_.regular_timestep);

@@ -180,15 +180,16 @@ double GapRules::deepest(const Contact &contact, double allowed) const
   return std::max(allowed, -contact.gap_now);
 }
 
-long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
+void GapRules::keep_within_tolerance(const std::vector<double> &velocity,
+                                     inelastic::Refined &refined)
 {
   inelastic::ContactSet &contacts = step_.problem.contacts;
   // Once a constraint has to change, later ones that are near the tolerance change with it: in a
   // chain each would otherwise need a round of its own.
   double allowed = step_.eps(ALLOWED);
-  long changed = 0;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     Row &row = step_.rows[c];
+    if (row.as_at_start && row.asks_for_gap) continue;
     const Contact &contact = step_.contact_of(c);
     const double linear_gap = contact.gap_now - row.wall_motion;
     const double lessened = linear_gap + step_.eps(LEFT);
@@ -205,13 +206,15 @@ long GapRules::keep_within_tolerance(const std::vector<double> &velocity)
     // Surfaces that part are asked for no less than that.
     if (contact.asked.parts && contacts.gap[c] <= linear_gap) continue;
     allowed = step_.eps(LEFT);
+    refined.anew = refined.anew || (contacts.impulse[c] > 0.0 && contacts.set[c].may_pull());
     if (contacts.impulse[c] > 0.0) contacts.set[c] = {};
     const bool first_time = row.as_at_start && at_end < 0.0 && lessened < contacts.gap[c];
+    const double before = contacts.gap[c];
     contacts.gap[c] = first_time ? lessened : linear_gap;
     row.as_at_start = false;
-    ++changed;
+    refined.gaps.push_back({c, contacts.gap[c] - before});
+    ++refined.number;
   }
-  return changed;
 }
 
 // Changes the gap of constraint c towards `wanted`, for which the present velocity asks. A body may

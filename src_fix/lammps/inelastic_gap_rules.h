@@ -7,6 +7,7 @@
 #include "inelastic_first_guess.h"
 #include "inelastic_overlap_watch.h"
 #include "inelastic_pulled_contacts.h"
+#include "inelastic_refined.h"
 #include "inelastic_step.h"
 
 #include <array>
@@ -64,9 +65,9 @@ class GapRules {
   // Changes constraints of free spheres whose gaps these velocities leave open, or overlapping, by
   // more than the tolerance, since gaps that count as closed may be open or overlap. Such a
   // constraint then asks for its present gap; where the two overlap, first for an overlap of most
-  // of the tolerance at the end. Returns how many changed. Overlaps that are kept do not count: in
-  // a dense start spheres jam for a moment, and cannot all be taken apart at once.
-  long keep_within_tolerance(const std::vector<double> &velocity);
+  // of the tolerance at the end. Overlaps that are kept do not count: in a dense start spheres jam
+  // for a moment, and cannot all be taken apart at once.
+  void keep_within_tolerance(const std::vector<double> &velocity, inelastic::Refined &refined);
 
   // What constraint c asks for beyond its gap at the start of the step [length], because bodies
   // turn or walls curve.

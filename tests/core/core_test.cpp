@@ -308,10 +308,10 @@ std::vector<double> gaps_of(const ContactProblem &problem, const std::vector<dou
 // Adds nothing.
 class AllContactsKnown final : public ConstraintSource {
  public:
-  long refine(const std::vector<double> &, ContactProblem &) override
+  Refined refine(const std::vector<double> &, ContactProblem &) override
   {
     ++looks;
-    return 0;
+    return {};
   }
   int looks = 0;
 };
@@ -831,7 +831,7 @@ class HiddenContacts final : public ConstraintSource {
   {
   }
 
-  long refine(const std::vector<double> &velocity, ContactProblem &problem) override
+  Refined refine(const std::vector<double> &velocity, ContactProblem &problem) override
   {
     CHECK_EQUAL(velocity.size(), 3 * static_cast<std::size_t>(problem.slots()));
     const std::vector<double> gaps = gaps_of(all_, velocity);
@@ -844,7 +844,7 @@ class HiddenContacts final : public ConstraintSource {
       known_[c] = true;
       ++added;
     }
-    return added;
+    return {added, {}, false};
   }
 
  private:
@@ -898,6 +898,61 @@ void test_same_answer_as_with_all_contacts()
   CHECK_ALL_NEAR(in_rounds, at_once, 100.0 * TOLERANCE / TIMESTEP);
 }
 
+// Hands out hidden contacts; once all are known the gaps of some are others, too. It may say that
+// the problem is to be solved anew.
+class LaterGaps final : public ConstraintSource {
+ public:
+  LaterGaps(const ContactProblem &all, bool anew) : hidden_(all), anew_(anew) {}
+
+  Refined refine(const std::vector<double> &velocity, ContactProblem &problem) override
+  {
+    Refined refined = hidden_.refine(velocity, problem);
+    if (refined.number == 0 && !changed_) {
+      changed_ = true;
+      for (std::size_t c = 0; c < problem.contacts.size(); c += 7) {
+        const double by = (c % 2 == 0 ? 1.0 : -1.0) * CHANGE;
+        problem.contacts.gap[c] += by;
+        refined.gaps.push_back({c, by});
+        ++refined.number;
+      }
+    }
+    refined.anew = anew_;
+    return refined;
+  }
+
+  static constexpr double CHANGE = 0.01;
+
+ private:
+  HiddenContacts hidden_;
+  bool anew_, changed_ = false;
+};
+
+// A solve that goes on from the last one, with new constraints and other gaps, ends where one does
+// that begins anew.
+void test_rounds_go_on()
+{
+  SerialHost host;
+  SolverLimits limits = {TOLERANCE, 100000};
+  limits.accuracy = 1.0e-6;
+  const ContactProblem all = make_crystal(4);
+  std::vector<double> velocity[2];
+  for (const bool anew : {false, true}) {
+    const auto solver = make_solver("sweeps");
+    ContactProblem growing = all;
+    growing.contacts.clear();
+    LaterGaps source(all, anew);
+    const ProjectionResult result =
+        project(growing, source, *solver, limits, 100, host, velocity[anew]);
+    CHECK(result.status == Status::CONVERGED);
+    CHECK(result.accurate);
+    CHECK_ALL_NEAR(velocity[anew], velocity_of(growing), ROUNDING);
+    CHECK_ABOVE(result.rounds, 3);
+  }
+  CHECK(velocity[0] != velocity[1]);    // the last bits tell that they went two ways
+  // As in test_crystal.
+  CHECK_ALL_NEAR(velocity[0], velocity[1], 100.0 * TOLERANCE / TIMESTEP);
+}
+
 void test_round_limit()
 {
   SerialHost host;
@@ -939,18 +994,18 @@ class Pipe final : public ConstraintSource {
  public:
   Pipe(double x, double y) : x_(x), y_(y) {}
 
-  long refine(const std::vector<double> &velocity, ContactProblem &problem) override
+  Refined refine(const std::vector<double> &velocity, ContactProblem &problem) override
   {
     const double x = x_ + TIMESTEP * velocity[0], y = y_ + TIMESTEP * velocity[1];
     const double from_axis = std::hypot(x, y);
     overlap = from_axis - 1.0;
-    if (overlap <= TOLERANCE) return 0;
+    if (overlap <= TOLERANCE) return {};
     const double normal[3] = {-x / from_axis, -y / from_axis, 0.0};
     // So that gap + h n . V is the true gap for this velocity.
     const double gap = -overlap - TIMESTEP * (normal[0] * velocity[0] + normal[1] * velocity[1]);
     problem.contacts.clear();
     problem.contacts.add(0, problem.particles, normal, gap, 0.0);
-    return 1;
+    return {1, {}, true};
   }
 
   double overlap = 0.0;
@@ -1703,6 +1758,7 @@ int main()
   test_names_of_solvers();
   test_contacts_are_found_in_rounds();
   test_same_answer_as_with_all_contacts();
+  test_rounds_go_on();
   test_round_limit();
   test_iterations_of_all_rounds_are_limited();
   test_concave_wall_is_linearised_again();
