@@ -209,6 +209,7 @@ class _Dump:
     every: int | None
     time: float | None = None
     first: bool = False
+    delay: int = 0
     last: int | None = None
 
 
@@ -420,6 +421,8 @@ class _Reader:
                 dump.first = value == "yes"
             elif word in ("region", "thresh"):
                 file.group = None
+            elif word == "delay" and (step := _integer(value)) is not None:
+                dump.delay = step
             elif word in ("append", "delay", "skip") and value != "no":
                 file.known = False
 
@@ -444,7 +447,7 @@ class _Reader:
         steps = [*found]
         if dump.first and dump.last is None and steps[:1] != [run.first]:
             steps.insert(0, run.first)
-        steps = [step for step in steps if step != dump.last]
+        steps = [step for step in steps if step != dump.last and step >= dump.delay]
         if steps:
             dump.last = steps[-1]
             file.steps += steps

@@ -66,7 +66,8 @@ def written(path: Path, text: str) -> list[int] | None:
         # Of these it does not tell all.
         (DUMP.format(3) + "dump_modify all every v_when\n" + run(0, 7), None),
         (DUMP.format(3) + "dump_modify all append yes\n" + run(0, 7), None),
-        (DUMP.format(3) + "dump_modify all delay 5\n" + run(0, 7), None),
+        (DUMP.format(3) + "dump_modify all delay 5\n" + run(0, 7), [6]),
+        (DUMP.format(3) + "dump_modify all delay v_when\n" + run(0, 7), None),
         (DUMP.format(3) + "dump_modify all skip v_dull\n" + run(0, 7), None),
         (DUMP.format(1) + "dump_modify all every/time 0.15\n" + run(0, 7), None),
         # Runs of more than ten million steps.

@@ -15,7 +15,11 @@ EVERY = 10  # steps between records
 NO_DUMP: dict[str, object] = {"dump_every": 100000}
 
 # The accuracy of which the promise is; decks ask for less while beds move.
-PROMISED: dict[str, object] = {"accuracy": 0.001}
+PROMISED: dict[str, object] = {
+    "accuracy": 0.001,
+    "accuracy_agitated": 0.001,
+    "tolerance_agitated": 0.0005,
+}
 
 # Gravity 9.81 and diameters of 0.1, as in the shipped decks. 2,000 spheres make two to three
 # layers; after 20 time units they lie. (Where the box is ten diameters wide their rows fit it, and
