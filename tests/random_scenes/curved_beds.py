@@ -43,6 +43,8 @@ SETTLING_STEPS, SETTLING_TIMES = 250, 40
 AT_REST = 0.05
 # In so many steps forces are added up: where EPS is much of g h^2 grains still jitter in a step.
 WEIGHED_STEPS = 20
+# [s] A bed that never comes to rest takes 10,500 steps, of up to 30 ms each.
+LONGEST = 400.0
 GRAVITY = 1.0
 # At the start grains fill this part of the container, and are so many at most.
 FILLED, MOST_GRAINS = 0.33, 120
@@ -296,7 +298,7 @@ def main() -> int:
         rows = [json.loads(line) for line in given.out.read_text().splitlines()]
         done = {row["seed"]: row for row in rows}
     folder = Path(tempfile.mkdtemp(prefix="curved_beds."))
-    programs = installed()
+    programs = replace(installed(), timeout=LONGEST)
     for seed in range(given.seed, given.seed + given.beds):
         if seed in done:
             continue

@@ -105,10 +105,14 @@ class Table:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """The vector product; np.cross() takes ten times as long for a few vectors."""
+    """The vector product; np.cross() takes twenty times as long for a few vectors."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[..., 0] = ay * bz - az * by
+    product[..., 1] = az * bx - ax * bz
+    product[..., 2] = ax * by - ay * bx
+    return product
 
 
 def read_tables(path: Path, names: str = "") -> list[Table]:
@@ -227,9 +231,18 @@ class Clusters:
 
     def __iter__(self) -> Iterator[tuple[Array, Array]]:
         """The spheres of each cluster, and the contacts that hold it."""
-        for number in np.unique(self.of_sphere[self.of_sphere >= 0]):
-            spheres = np.flatnonzero(self.of_sphere == number)
-            yield spheres, np.flatnonzero(self.of_sphere[self.held] == number)
+        rows = groups(self.of_sphere[self.held])
+        none = np.zeros(0, dtype=np.int64)
+        for number, spheres in groups(self.of_sphere).items():
+            if number >= 0:
+                yield spheres, rows.get(number, none)
+
+
+def groups(numbers: Array) -> dict[int, Array]:
+    """Return number -> the places that have it, in ascending order of both."""
+    order = np.argsort(numbers, kind="stable")
+    found, first = np.unique(numbers[order], return_index=True)
+    return dict(zip(found.tolist(), np.split(order, first[1:]), strict=len(found) > 0))
 
 
 def clusters_of(listed: dict[str, Array], molecule: Array, movable: Array) -> Clusters:
@@ -259,6 +272,8 @@ def clusters_of(listed: dict[str, Array], molecule: Array, movable: Array) -> Cl
 
 def free_directions(normals: Array) -> Array:
     """(directions, 3) Unit vectors at right angles, along which none of the normals has a part."""
+    if not len(normals):
+        return np.eye(3)
     _, sizes, directions = np.linalg.svd(np.vstack([normals, np.zeros((3, 3))]))
     return np.asarray(directions[sizes <= HOLDS])
 
@@ -329,6 +344,7 @@ class _Frame:
     bodies: Table | None = None
     # What the step adds to energies, and the list of its contacts.
     gained: _Gained | None = None
+    clusters: Clusters | None = None
     listed_all: dict[str, Any] | None = None
     members: list[tuple[int, Array, Array]] | None = None
     # By a body's first sphere: the arms, and the inverse inertia.
@@ -369,6 +385,8 @@ class _Part:
         self.push_unknown = self.lines_unknown = False
         # Of each step that gained too much energy, where and how much.
         self.energy_found: dict[int, tuple[str, str]] = {}
+        # By the number of a body, which keeps its shape.
+        self.in_line: dict[float, bool] = {}
         self.shapes: list[Shape] = facts["shapes"]
         self.to_v = facts["acceleration_of_force"]
         self.curved = (
@@ -464,6 +482,13 @@ class _Part:
         i, j = i[seen], j[seen]
         gap = np.linalg.norm(self.apart(frame, i, j), axis=1) - frame.radius[i] - frame.radius[j]
         return i, j, gap
+
+    def clusters(self, frame: _Frame, listed: dict[str, Array]) -> Clusters:
+        """The clusters of a frame, by the list of its contacts."""
+        if frame.clusters is None:
+            movable = (frame.kind != FROZEN) & (frame.kind != OUTSIDE)
+            frame.clusters = clusters_of(listed, frame.molecule, movable)
+        return frame.clusters
 
     def movable(self, frame: _Frame) -> Array:
         """Indices of the spheres that walls hold back."""
@@ -837,8 +862,7 @@ class _Part:
             # What comes to rest in the step keeps none, either.
             moves = alone & (np.linalg.norm(after, axis=1) > 10 * ROUND_OFF * sizes)
             off = moves & (np.abs(after - momentum) > slack).any(axis=1)
-            movable = (new.kind != FROZEN) & (new.kind != OUTSIDE)
-            clusters = clusters_of(listed, new.molecule, movable)
+            clusters = self.clusters(new, listed)
             moves &= ~self.stopped(clusters, off, after, sizes)
             self.close("push kept", after[moves], momentum[moves], slack[moves], new.id[moves])
             self.report.seen["ends of pushing"] += 1
@@ -873,7 +897,7 @@ class _Part:
         slack = 10 * ROUND_OFF * (scale + inertia + 1e-300)
         movable = (new.kind != FROZEN) & (new.kind != OUTSIDE)
         wanted = np.where(movable[:, None], listed["total"], 0.0)
-        clusters = clusters_of(listed, new.molecule, movable)
+        clusters = self.clusters(new, listed)
         given = new.force - new.before
         self.cluster_momenta(new, clusters, given, slack)
         # Of what is at rest the velocity is taken away, which no contact force does.
@@ -885,7 +909,7 @@ class _Part:
                 of_grain[mine] = new.body_v[row]
                 alike[mine] &= not resting[row]
                 # What a push has left in bodies in a line is still being taken away.
-                alike[mine] &= not (self.has_pushed and self.is_in_line(arm))
+                alike[mine] &= not (self.has_pushed and self.is_in_line(new.molecule[mine[0]], arm))
                 # The round-off of a moment, of forces as far out as the surface, over short arms;
                 # all spheres share it.
                 longest = np.linalg.norm(arm, axis=1).max()
@@ -1098,7 +1122,7 @@ class _Part:
             stopped = self.stopped_bodies(new, listed, np.abs(new.body_v - kept_v), allowed)
             kept_v[stopped], kept_l[stopped] = new.body_v[stopped], new.body_l[stopped]
             for row, mine, arm in self.members(new):
-                in_line[row] = self.is_in_line(arm)
+                in_line[row] = self.is_in_line(new.molecule[mine[0]], arm)
                 if not (was_pushed or in_line[row]) or (in_line[row] and self.lines_unknown):
                     continue
                 left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
@@ -1134,8 +1158,7 @@ class _Part:
         for row, mine, _ in self.members(frame):
             velocity[mine] = frame.body_v[row]
             asked[mine] = (off[row] > allowed[row]).any()
-        movable = (frame.kind != FROZEN) & (frame.kind != OUTSIDE)
-        clusters = clusters_of(listed, frame.molecule, movable)
+        clusters = self.clusters(frame, listed)
         found = self.stopped(clusters, asked, velocity, frame.momentum_size)
         stopped = np.zeros(len(off), dtype=bool)
         for row, mine, _ in self.members(frame):
@@ -1155,10 +1178,12 @@ class _Part:
         slack = 10 * ROUND_OFF * (10 * size + self.fastest) + 0.01 * ROUND_OFF * size.max(initial=0)
         return np.asarray(np.linalg.norm(after, axis=1) <= slack)
 
-    def is_in_line(self, arm: Array) -> bool:
+    def is_in_line(self, molecule: float, arm: Array) -> bool:
         """Whether a body's spheres lie on a line, about which no force on them turns it."""
-        rank = np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
-        return bool(rank < REAL_TURNING)
+        if molecule not in self.in_line:
+            rank = np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
+            self.in_line[molecule] = bool(rank < REAL_TURNING)
+        return self.in_line[molecule]
 
     def to_strength(self, frame: _Frame, forces: Array) -> Array:
         """Sum of the sizes of the forces on each body's spheres."""
@@ -1405,7 +1430,7 @@ class _Part:
             work = sign * (n[frozen] * velocity[side[frozen]]).sum(axis=1)
             allowed[frozen] += np.maximum(0, impulse[frozen] * work)
         new.gained = _Gained(
-            clusters_of(listed, new.molecule, movable),
+            self.clusters(new, listed),
             np.where(movable[i], i, other),
             gained,
             size,
