@@ -49,8 +49,8 @@ struct Row {
   int contact;                // its place in Step::contacts
   double wall_motion;         // [length] by how much the wall closes the row's gap during the step
   bool as_at_start = true;    // the row asks for what it asked for at the start of the step
+  bool followed = false;      // the gap was set by where an earlier solution of the step ends
   bool asks_for_gap = false;    // at the start of the step, for no less
-  bool followed = false;        // the gap was set by where an earlier solution of the step ends
 };
 
 // How the gap of a row came nearer to what the end of the step asks for, in the last round that
