@@ -32,7 +32,8 @@ template <typename Batch> class PackedSweeps {
   bool prepare(const Start &start, double idle_gap, Host &host);
 
   // Takes a problem that was refined, and not anew, since the present impulses have solved it: what
-  // it had is packed, and `start` is to refer to what `prepare` was given. Without ghosts.
+  // it had is packed, and `start` is to refer to what `prepare` was given. Without ghosts and
+  // bodies (inelastic_search_chain.h).
   void go_on(const Start &start, const Refined &refined);
 
   // Makes the present impulses the centre of what follows. They are those of the problem now, and
@@ -57,7 +58,7 @@ template <typename Batch> class PackedSweeps {
   // Collective.
   void refresh(Host &host);
 
-  // As in PackedIterations. Targets are set four times until there are twice as many sweeps.
+  // As in PackedIterations. Targets are set twice until there are twice as many sweeps.
   static bool sets_targets(long sweep);
   void set_targets();
   void keep_velocities() { targets_.keep(velocities()); }

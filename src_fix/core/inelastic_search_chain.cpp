@@ -68,7 +68,8 @@ SolverResult SearchChain::search(ContactProblem &problem, const SolverLimits &li
   Solve solve(problem, limits, {gap_operator_, targets_, gap_, diagonal_, conjugate_gradients_},
               guess_, host);
   SolverResult &result = solve.result;
-  // What was refined is not solved any more.
+  // What was refined is not solved any more, and single precision has served until now: to find the
+  // targets of all constraints again would tell no more than that.
   const double unsolved = refined ? UNSOLVED_IN_SINGLE : solve.set_targets();
   if (unsolved <= 1.0)
     result.status = Status::CONVERGED;

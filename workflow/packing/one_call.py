@@ -67,8 +67,8 @@ def pack(
         height it is high enough to pour them in; without a container it is a box in which the bed
         is about as high as wide, for 1,000 spheres of 0.11 the 1 x 5 x 1 of the shipped decks
     seed : of the start and of the shaking, from 1 to 800000000
-    tolerance : largest overlap while they fall, smallest radii, from 1e-10 to 0.1; in the end it is
-        0.00001 (of bodies 0.00002) or this, whichever is less
+    tolerance : largest overlap while they settle, smallest radii, from 1e-10 to 0.1; shaken at
+        least 0.005, in the end 0.00001 (of bodies 0.00002) or this, whichever is less
     density : mass/length^3; with gravity the unit of the forces
     gravity : length/time^2, along -y
     ranks : number of MPI ranks, at most that of the cores
