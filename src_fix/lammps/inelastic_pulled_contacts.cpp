@@ -30,17 +30,20 @@ long PulledContacts::follow(std::size_t c, double gap_at_end, double opening, do
   if (gap_at_end < -tolerance) {
     gap = std::min(gap, contact.gap_now - row.wall_motion);
     if (step_.relinearisations > MOST_ROUNDS) return 0;
+  } else if (gap_at_end <= tolerance || along < LEAST_ALONG ||
+             step_.relinearisations > MOST_ROUNDS / 2) {
+    return 0;
+  } else if (!step_.pulls(c)) {
+    // A contact that pushes, and was set by the end of an earlier round, with other velocities.
+    gap = std::min(gap, contact.gap_now - row.wall_motion);
+    const bool was_lowered = !row.as_at_start && gap - contacts.gap[c] > step_.eps(in_eps::ALLOWED);
+    if (!was_lowered || !(contacts.impulse[c] > 0.0)) return 0;
+  } else if (contacts.impulse[c] > 0.0) {
+    // Surfaces that approach across a gap need no pull, and no push before they touch.
+    contacts.set[c] = {};
   } else {
-    if (gap_at_end <= tolerance || !step_.pulls(c) || along < LEAST_ALONG ||
-        step_.relinearisations > MOST_ROUNDS / 2)
-      return 0;
-    if (contacts.impulse[c] > 0.0) {
-      // Surfaces that approach across a gap need no pull, and no push before they touch.
-      contacts.set[c] = {};
-    } else {
-      gap = std::min(gap, most_closed(contact) - row.wall_motion);
-      if (gap <= contacts.gap[c]) return 0;
-    }
+    gap = std::min(gap, most_closed(contact) - row.wall_motion);
+    if (gap <= contacts.gap[c]) return 0;
   }
   if (contacts.gap[c] == gap) return 0;
   // The whole way at once, unlike approach(): what is still open after the rounds that may close it

@@ -28,7 +28,8 @@ class PulledContacts {
   // [length], and `along` is the cosine of the angle by which the normal turns. Surfaces that turn
   // about one another part, though their linearised gap stays; they are closed by no more than
   // most_closed(). Where they would overlap, at least the linearised gap is asked for, which is
-  // never more than that of two spheres. Not for bad starts. Returns how many constraints changed.
+  // never more than that of two spheres; where a push leaves open what an earlier round asked for,
+  // the gap is that of the present end. Not for bad starts. Returns how many constraints changed.
   long follow(std::size_t c, double gap_at_end, double opening, double along);
 
  private:
