@@ -35,12 +35,12 @@ def ends(record: core.Record, after: Table, shapes: list[Shape]) -> Array:
     away = x[first[pairs]] - x[second[pairs]]
     sizes = radius[first[pairs]] + radius[second[pairs]]
     end[pairs] = np.linalg.norm(away, axis=1) - sizes
-    for row in np.flatnonzero(~pairs):
-        k = first[row]
-        for shape in shapes:
-            for view in views(shape, x[k : k + 1], 0.0):
-                if view.number == -int(a["id2"][row]):
-                    end[row] = min(end[row], float(view.distance[0]) - radius[k])
+    rows = np.flatnonzero(~pairs)
+    wall = -a["id2"][rows].astype(int)
+    for shape in shapes:
+        for view in views(shape, x[first[rows]], 0.0):
+            gap = np.where(wall == view.number, view.distance - radius[first[rows]], np.inf)
+            end[rows] = np.minimum(end[rows], gap)
     return end
 
 
@@ -93,10 +93,12 @@ def against_exact(
     timestep : of a step of ordinary length
     not_accurate : whether the summary tells of steps in which only the tolerance was reached
     """
-    frames = {table.step: table for table in read_tables(folder / "particles.01.dump")}
+    records = [core.read_record(path) for path in records_in(folder)]
+    after = {record.step + 1 for record in records}
+    tables = read_tables(folder / "particles.01.dump", steps=after)
+    frames = {table.step: table for table in tables}
     compared, worst, problems = 0, 0.0, list[str]()
-    for path in records_in(folder):
-        record = core.read_record(path)
+    for record in records:
         deepest = -record.arrays["gap_now"].min(initial=0.0)
         if record.step + 1 not in frames or deepest > REGULAR * record.tolerance:
             continue

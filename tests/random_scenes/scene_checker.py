@@ -26,9 +26,10 @@ part of, whatever is stopped in it. Along the others stopping may take momentum 
 from __future__ import annotations
 
 import re
+import warnings
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -115,30 +116,44 @@ def cross(a: Array, b: Array) -> Array:
     return product
 
 
-def read_tables(path: Path, names: str = "") -> list[Table]:
-    """Read all whole frames of a text dump; `names` in place of those in the file."""
+def numbers_in(lines: list[str]) -> Array:
+    """All numbers of some lines; a ValueError where something else is in them."""
+    with warnings.catch_warnings():
+        # NumPy's fast reader only warns of what is no number, and stops there.
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(" ".join(lines), sep=" ")
+        except DeprecationWarning as error:
+            raise ValueError(str(error)) from error
+
+
+def read_tables(path: Path, names: str = "", steps: Container[int] | None = None) -> list[Table]:
+    """Read all whole frames of a text dump, or those of some steps.
+
+    `names` of the columns are in place of those in the file.
+    """
     if not path.exists():
         return []
     lines = path.read_text().splitlines()
     found, at = [], 0
     while at + 9 <= len(lines):
-        count = int(lines[at + 3])
-        block = lines[at + 9 : at + 9 + count]
-        columns = names.split() or lines[at + 8].split()[2:]
-        if len(block) < count:
+        begin, count = at, int(lines[at + 3])
+        at += 9 + count
+        if at > len(lines):
             break
+        step = int(lines[begin + 1])
+        if steps is not None and step not in steps:
+            continue
+        columns = names.split() or lines[begin + 8].split()[2:]
         try:
-            rows = np.array([line.split() for line in block], dtype=float)
-            rows = rows.reshape(count, len(columns))
+            rows = numbers_in(lines[begin + 9 : at]).reshape(count, len(columns))
         except ValueError:
             # The last line of a run that was stopped.
-            if at + 9 + count < len(lines):
+            if at < len(lines):
                 raise
             break
-        box = np.array([line.split()[:2] for line in lines[at + 5 : at + 8]], dtype=float)
-        step = int(lines[at + 1])
+        box = np.array([line.split()[:2] for line in lines[begin + 5 : begin + 8]], dtype=float)
         found.append(Table(step, box, {name: k for k, name in enumerate(columns)}, rows))
-        at += 9 + count
     return found
 
 
@@ -249,9 +264,9 @@ def clusters_of(listed: dict[str, Array], molecule: Array, movable: Array) -> Cl
     """The clusters of a list of contacts; `movable` tells which spheres contacts move."""
     count = len(molecule)
     grain = np.arange(count)
-    for number in np.unique(molecule[molecule > 0]):
-        mine = np.flatnonzero(molecule == number)
-        grain[mine] = mine[0]
+    of_bodies = np.flatnonzero(molecule > 0)
+    _, first, body = np.unique(molecule[of_bodies], return_index=True, return_inverse=True)
+    grain[of_bodies] = of_bodies[first[body]]
     acts = listed["force"] != 0
     i, j, pair, normal = (listed[name][acts] for name in ("i", "j", "pair", "n"))
     force = normal * listed["force"][acts][:, None]
@@ -274,7 +289,9 @@ def free_directions(normals: Array) -> Array:
     """(directions, 3) Unit vectors at right angles, along which none of the normals has a part."""
     if not len(normals):
         return np.eye(3)
-    _, sizes, directions = np.linalg.svd(np.vstack([normals, np.zeros((3, 3))]))
+    _, sizes, directions = np.linalg.svd(
+        np.vstack([normals, np.zeros((3, 3))]), full_matrices=False
+    )
     return np.asarray(directions[sizes <= HOLDS])
 
 
@@ -305,14 +322,66 @@ class _Gained:
     curved: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Seen:
-    """A wall of a shape, seen from one position."""
+    """What shapes show of one wall each from some positions.
 
-    shape: Shape
-    distance: float
+    Attributes
+    ----------
+    count : (rows,) by how many shapes the wall is shown
+    shape : (rows,) number of the one that shows it nearest; of this one are
+    distance, normal, curved : (rows, ...) as those of a View
+    """
+
+    count: Array
+    shape: Array
+    distance: Array
     normal: Array
-    curved: bool
+    curved: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Members:
+    """The spheres of the bodies of a frame, one body after the other.
+
+    Attributes
+    ----------
+    sphere, body : (members,) each one's index, and the row of its body
+    arm : (members, 3) from the body's centre of mass to its centre
+    first : (bodies,) the first sphere of each
+    far, largest : (bodies,) the length of the longest arm, and the largest radius
+    """
+
+    sphere: Array
+    body: Array
+    arm: Array
+    first: Array
+    far: Array
+    largest: Array
+
+    def sums(self, values: Array) -> Array:
+        """(bodies, ...) Over the members of each body, of a value of each member."""
+        total = np.zeros((len(self.first), *values.shape[1:]))
+        np.add.at(total, self.body, values)
+        return total
+
+    def __getitem__(self, row: int) -> tuple[Array, Array]:
+        """The spheres of one body, and their arms."""
+        mine = self.body == row
+        return self.sphere[mine], self.arm[mine]
+
+
+def inverse_inertia(mass: Array, radius: Array, members: _Members, *, solid: bool) -> Array:
+    """(bodies, 3, 3) About the centre of mass, from mass and radius of each member."""
+    arm = members.arm
+    round_part = mass * (arm**2).sum(axis=1) + (0.4 * mass * radius**2 if solid else 0.0)
+    moments = np.eye(3) * members.sums(round_part)[:, None, None]
+    moments -= members.sums(mass[:, None, None] * arm[:, :, None] * arm[:, None, :])
+    values, axes = np.linalg.eigh(moments)
+    # Point masses on a line do not turn about it.
+    turns_about = values > 1e-10 * values.max(axis=1, initial=0.0)[:, None]
+    inverse = np.where(turns_about, 1 / np.maximum(values, 1e-300), 0.0)
+    return np.asarray((axes * inverse[:, None, :]) @ axes.transpose(0, 2, 1))
 
 
 @dataclass(eq=False)
@@ -346,9 +415,9 @@ class _Frame:
     gained: _Gained | None = None
     clusters: Clusters | None = None
     listed_all: dict[str, Any] | None = None
-    members: list[tuple[int, Array, Array]] | None = None
-    # By a body's first sphere: the arms, and the inverse inertia.
-    inverse_inertia: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    members: _Members | None = None
+    # (bodies, 3, 3)
+    inverse_inertia: Array | None = None
     # The list, the linearised gaps at the end of the step, and where these are exact.
     listed: dict[str, Any] | None = None
     ends: Array = field(default_factory=lambda: np.zeros(0))
@@ -387,7 +456,13 @@ class _Part:
         self.energy_found: dict[int, tuple[str, str]] = {}
         # By the number of a body, which keeps its shape.
         self.in_line: dict[float, bool] = {}
+        # By the number of a wall, whether it is_flat(), and whether it is_exact().
+        self.flat: dict[int, bool] = {}
+        self.exact: dict[int, bool] = {}
         self.shapes: list[Shape] = facts["shapes"]
+        self.inside = np.array([shape["inside"] for shape in self.shapes], dtype=bool)
+        self.turns = np.array([turns(shape) for shape in self.shapes], dtype=bool)
+        self.moves = np.array([moves(shape) for shape in self.shapes], dtype=bool)
         self.to_v = facts["acceleration_of_force"]
         self.curved = (
             any(s["inside"] and s["kind"] in ("sphere", "cylinder", "cone") for s in self.shapes)
@@ -637,22 +712,25 @@ class _Part:
 
     # --- the list of contacts
 
+    @staticmethod
+    def places(frame: _Frame, ids: Array) -> Array:
+        """The index of the sphere with each ID, -1 where there is none."""
+        order = np.argsort(frame.id)
+        sorted_ids = frame.id[order]
+        at = np.minimum(np.searchsorted(sorted_ids, ids), len(order) - 1)
+        return np.where(sorted_ids[at] == ids, order[at], -1)
+
     def contacts(self, frame: _Frame, rows: Table) -> dict[str, Array] | None:
         """(e) Check each row; return the list with indices instead of IDs."""
-        index = {int(name): k for k, name in enumerate(frame.id)}
         first, second = rows["id1"].astype(int), rows["id2"].astype(int)
         self.report.seen["contacts"] += len(first)
         pairs = second > 0
-        known = [
-            a in index and (b in index or -self.facts["walls"] <= b < 0)
-            for a, b in zip(first, second, strict=True)
-        ]
-        if not all(known):
-            row = int(np.flatnonzero(~np.array(known))[0])
+        i, j = self.places(frame, first), self.places(frame, second)
+        known = (i >= 0) & ((j >= 0) | ((second < 0) & (second >= -self.facts["walls"])))
+        if not known.all():
+            row = int(np.flatnonzero(~known)[0])
             self.wrong("contact IDs", f"there is no {first[row]} or {second[row]}")
             return None
-        i = np.array([index[a] for a in first], dtype=int)
-        j = np.array([index.get(b, -1) for b in second], dtype=int)
         n, gap, force = rows["nx ny nz"], rows["gap"], rows["force"]
         slack = 10 * ROUND_OFF * self.lengths(frame)
         # Vectors to curved walls are small differences of large numbers just inside of the wall.
@@ -691,8 +769,8 @@ class _Part:
         )
         rounded = np.where(pairs[:, None], 0.0, np.round(n, 9))
         keys = np.column_stack([keys, rounded])
-        _, counts = np.unique(keys, axis=0, return_counts=True)
-        if (counts > 1).any():
+        keys = keys[np.lexsort(keys.T)]
+        if (keys[1:] == keys[:-1]).all(axis=1).any():
             self.wrong("contact", "one is listed twice")
         listed = {
             "i": i,
@@ -713,37 +791,48 @@ class _Part:
                 return view
         return None
 
-    def seen_from(self, x: Array, walls: Array, time: float) -> list[list[_Seen]]:
+    def seen_from(self, x: Array, walls: Array, time: float) -> _Seen:
         """What the shapes show of wall number `walls` from each position, as seen_by()."""
-        found: list[list[_Seen]] = [[] for _ in walls]
-        for shape in self.shapes if len(walls) else []:
-            open_rows = np.ones(len(walls), dtype=bool)
+        count = np.zeros(len(walls), dtype=int)
+        which, distance = np.full(len(walls), -1), np.full(len(walls), np.inf)
+        normal, curved = np.zeros((len(walls), 3)), np.zeros(len(walls), dtype=bool)
+        for number, shape in enumerate(self.shapes if len(walls) else []):
+            missing = np.ones(len(walls), dtype=bool)
             for view in views(shape, x, time):
-                for row in np.flatnonzero(open_rows & (walls == view.number)).tolist():
-                    distance = float(view.distance[row])
-                    found[row].append(_Seen(shape, distance, view.normal[row], view.curved))
-                    open_rows[row] = False
-        return found
+                shown = missing & (walls == view.number)
+                if not shown.any():
+                    continue
+                count += shown
+                missing &= ~shown
+                nearer = shown & (view.distance < distance)
+                which[nearer], curved[nearer] = number, view.curved
+                distance[nearer], normal[nearer] = view.distance[nearer], view.normal[nearer]
+        return _Seen(count, which, distance, normal, curved)
 
     def wall_contacts(self, frame: _Frame, listed: dict[str, Array]) -> None:
         """Normals and gaps of walls, where these are not tangent planes added for the end."""
         slack = 10 * ROUND_OFF * self.lengths(frame)
         rows = np.flatnonzero(~listed["pair"])
         seen = self.seen_from(frame.x[listed["i"][rows]], listed["wall"][rows], frame.time)
-        for row, found in zip(rows.tolist(), seen, strict=True):
-            k, number = listed["i"][row], listed["wall"][row]
-            if len(found) != 1:
-                self.wrong("wall", f"there are {len(found)} walls {number}")
-                continue
-            shape, view = found[0].shape, found[0]
-            same = np.linalg.norm(view.normal - listed["n"][row]) < 1e-9
-            planar = shape["inside"] and not view.curved and not turns(shape)
-            body = frame.molecule[k] > 0
-            if planar and not same:
-                self.wrong("normal of a wall", f"wall {number}, sphere {int(frame.id[k])}")
-            if same and not turns(shape) and (planar or not (body or moves(shape))):
-                gap = view.distance - frame.radius[k]
-                self.close("gap at a wall", listed["gap"][row], gap, slack + 1e-9 * abs(gap))
+        if (seen.count != 1).any():
+            row = int(np.flatnonzero(seen.count != 1)[0])
+            self.wrong("wall", f"there are {seen.count[row]} walls {listed['wall'][rows[row]]}")
+        one = seen.count == 1
+        rows, shape = rows[one], seen.shape[one]
+        distance, normal, curved = seen.distance[one], seen.normal[one], seen.curved[one]
+        sphere = listed["i"][rows]
+        same = np.linalg.norm(normal - listed["n"][rows], axis=1) < 1e-9
+        planar = self.inside[shape] & ~curved & ~self.turns[shape]
+        other = planar & ~same
+        if other.any():
+            row = int(np.flatnonzero(other)[0])
+            name = int(frame.id[sphere[row]])
+            self.wrong("normal of a wall", f"wall {listed['wall'][rows[row]]}, sphere {name}")
+        free_and_still = (frame.molecule[sphere] == 0) & ~self.moves[shape]
+        told = same & ~self.turns[shape] & (planar | free_and_still)
+        gap = (distance - frame.radius[sphere])[told]
+        given = listed["gap"][rows][told]
+        self.close("gap at a wall", given, gap, slack + 1e-9 * np.abs(gap))
 
     # --- forces
 
@@ -905,16 +994,19 @@ class _Part:
         of_grain = after.copy()
         if new.bodies is not None:
             resting = self.resting(new)
-            for row, mine, arm in self.members(new):
-                of_grain[mine] = new.body_v[row]
-                alike[mine] &= not resting[row]
-                # What a push has left in bodies in a line is still being taken away.
-                alike[mine] &= not (self.has_pushed and self.is_in_line(new.molecule[mine[0]], arm))
-                # The round-off of a moment, of forces as far out as the surface, over short arms;
-                # all spheres share it.
-                longest = np.linalg.norm(arm, axis=1).max()
-                over = 1 + new.radius[mine].max() / max(longest, 1e-300)
-                slack[mine] = over * slack[mine].max()
+            members = self.members(new)
+            mine, body = members.sphere, members.body
+            of_grain[mine] = new.body_v[body]
+            alike[mine] &= ~resting[body]
+            # What a push has left in bodies in a line is still being taken away.
+            if self.has_pushed:
+                alike[mine] &= ~self.are_in_line(new)[body]
+            # The round-off of a moment, of forces as far out as the surface, over short arms; all
+            # spheres share it.
+            largest = np.zeros(len(members.first))
+            np.maximum.at(largest, body, slack[mine])
+            over = 1 + members.largest / np.maximum(members.far, 1e-300)
+            slack[mine] = (over * largest)[body]
         other = (np.abs(given - wanted) > slack[:, None]).any(axis=1)
         new.stopped = self.stopped(clusters, alike & other, of_grain, sizes)
         self.report.seen["stopped spheres"] += int((other & (new.stopped | ~alike)).sum())
@@ -987,46 +1079,38 @@ class _Part:
         slack = ROUND_OFF * (sizes + 1e-100 * sizes.max(initial=0.0) + 1e-300)[:, None]
         self.close("velocity", now[alone], after[alone], slack[alone], new.id[alone])
 
-    def inertia(self, frame: _Frame, mine: Array, arm: Array) -> Array:
-        """Moments of a body about its centre of mass."""
-        m = frame.mass[mine]
-        moments = np.eye(3) * (m * (arm**2).sum(axis=1)).sum() - (arm * m[:, None]).T @ arm
-        if self.facts["inertia"] == "solid":
-            moments += np.eye(3) * (0.4 * m * frame.radius[mine] ** 2).sum()
-        return np.asarray(moments)
+    def spin(self, frame: _Frame, momentum: Array) -> Array:
+        """(bodies, 3) Angular velocities by angular momenta."""
+        if frame.inverse_inertia is None:
+            members, solid = self.members(frame), self.facts["inertia"] == "solid"
+            mass, radius = frame.mass[members.sphere], frame.radius[members.sphere]
+            frame.inverse_inertia = inverse_inertia(mass, radius, members, solid=solid)
+        return np.asarray((frame.inverse_inertia @ momentum[:, :, None])[:, :, 0])
 
-    def spin(self, frame: _Frame, mine: Array, arm: Array, momentum: Array) -> Array:
-        """Angular velocity of a body by its angular momentum."""
-        kept = frame.inverse_inertia.get(int(mine[0]))
-        # The arms of another moment are not those of members().
-        if kept is None or kept[0] is not arm:
-            kept = arm, self.find_inverse_inertia(frame, mine, arm)
-            frame.inverse_inertia[int(mine[0])] = kept
-        return np.asarray(kept[1] @ momentum)
-
-    def find_inverse_inertia(self, frame: _Frame, mine: Array, arm: Array) -> Array:
-        """Of a body, about its centre of mass."""
-        values, axes = np.linalg.eigh(self.inertia(frame, mine, arm))
-        # Point masses on a line do not turn about it.
-        inverse = np.where(values > 1e-10 * values.max(), 1 / np.maximum(values, 1e-300), 0.0)
-        return np.asarray((axes * inverse) @ axes.T)
-
-    def members(self, frame: _Frame) -> list[tuple[int, Array, Array]]:
-        """Each row of the bodies' dump, its spheres, and their arms from the centre of mass."""
+    def members(self, frame: _Frame) -> _Members:
+        """The spheres of each row of the bodies' dump."""
         if frame.members is None:
-            frame.members = list(self.find_members(frame))
+            frame.members = self.find_members(frame)
         return frame.members
 
-    def find_members(self, frame: _Frame) -> Iterator[tuple[int, Array, Array]]:
-        """Find what members() keeps."""
+    @staticmethod
+    def find_members(frame: _Frame) -> _Members:
+        """Find what members() keeps. The dump is in the order of the numbers of bodies."""
         assert frame.bodies is not None
-        for row, molecule in enumerate(frame.bodies["mol"]):
-            mine = np.flatnonzero(frame.molecule == molecule)
-            arm = frame.x[mine] - frame.bodies["x y z"][row]
-            for axis, period in enumerate(frame.periods):
-                if period > 0:
-                    arm[:, axis] -= period * np.rint(arm[:, axis] / period)
-            yield row, mine, arm
+        names = frame.bodies["mol"]
+        row = np.minimum(np.searchsorted(names, frame.molecule), len(names) - 1)
+        sphere = np.flatnonzero(names[row] == frame.molecule)
+        sphere = sphere[np.argsort(row[sphere], kind="stable")]
+        body = row[sphere]
+        arm = frame.x[sphere] - frame.bodies["x y z"][body]
+        for axis, period in enumerate(frame.periods):
+            if period > 0:
+                arm[:, axis] -= period * np.rint(arm[:, axis] / period)
+        far, largest = np.zeros(len(names)), np.zeros(len(names))
+        np.maximum.at(far, body, np.linalg.norm(arm, axis=1))
+        np.maximum.at(largest, body, frame.radius[sphere])
+        first = sphere[np.searchsorted(body, np.arange(len(names)))]
+        return _Members(sphere, body, arm, first, far, largest)
 
     def turned(self, new: _Frame, last: _Frame | None) -> None:
         """Momentum and angular momentum of every body: one kick by the forces of its spheres."""
@@ -1034,20 +1118,20 @@ class _Part:
         order = np.argsort(new.bodies["mol"])
         new.bodies = Table(new.step, new.bodies.box, new.bodies.columns, new.bodies.rows[order])
         new.members = None
-        count = len(order)
-        force, moment, sizes = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 2))
-        for row, mine, arm in self.members(new):
-            mass = new.mass[mine].sum()
-            length = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
-            self.close("mass of a body", new.bodies["mass"][row], mass, ROUND_OFF * mass)
-            centre = (new.mass[mine, None] * arm).sum(axis=0) / mass
-            # The spheres are put in place anew in each step.
-            slack = 100 * ROUND_OFF * self.lengths(new)
-            self.close("centre of a body", centre, np.zeros(3), slack)
-            force[row] = new.force[mine].sum(axis=0)
-            moment[row] = cross(arm, new.force[mine]).sum(axis=0)
-            strong = np.linalg.norm(new.force[mine], axis=1).sum()
-            sizes[row] = strong / mass, strong * length
+        count, members = len(order), self.members(new)
+        mine, arm = members.sphere, members.arm
+        of_members = members.sums(new.mass[mine])
+        given = new.bodies["mass"]
+        self.close("mass of a body", given, of_members, ROUND_OFF * of_members, new.bodies["mol"])
+        centre = members.sums(new.mass[mine, None] * arm) / of_members[:, None]
+        # The spheres are put in place anew in each step.
+        slack = 100 * ROUND_OFF * self.lengths(new)
+        self.close("centre of a body", centre, np.zeros((count, 3)), slack, new.bodies["mol"])
+        force = members.sums(new.force[mine])
+        moment = members.sums(cross(arm, new.force[mine]))
+        strong = members.sums(np.linalg.norm(new.force[mine], axis=1))
+        length = members.far + members.largest
+        sizes = np.column_stack([strong / of_members, strong * length])
         mass = new.bodies["mass"][:, None]
         v, angular = new.bodies["vx vy vz"], new.bodies["angmomx angmomy angmomz"]
         half = 0.5 * new.h * self.to_v
@@ -1088,15 +1172,13 @@ class _Part:
         else:
             kept_v, kept_l = last.kept_v, last.kept_l
         kept_v, kept_l = kept_v.copy(), kept_l.copy()
-        lengths = np.zeros(len(kept_v))
-        for row, mine, arm in self.members(new):
-            kept_v[row] += kick * acting[mine].sum(axis=0) / new.bodies["mass"][row]
-            kept_l[row] += kick * cross(arm, acting[mine]).sum(axis=0)
-            lengths[row] = np.linalg.norm(arm, axis=1).max() + new.radius[mine].max()
+        members = self.members(new)
+        mine, arm = members.sphere, members.arm
+        kept_v += kick * members.sums(acting[mine]) / new.bodies["mass"][:, None]
+        kept_l += kick * members.sums(cross(arm, acting[mine]))
+        lengths = members.far + members.largest
         # Of what is at rest the momentum is taken away.
-        resting = self.resting(new)
-        for row, mine, _ in self.members(new):
-            resting[row] |= new.stopped[mine[0]]
+        resting = self.resting(new) | new.stopped[members.first]
         kept_v[resting], kept_l[resting] = new.body_v[resting], new.body_l[resting]
         was_pushed = last is not None and not last.settled
         # The last step of a run takes the push out of the whole-step velocity, not out of this one.
@@ -1115,24 +1197,22 @@ class _Part:
             )
             turning += ROUND_OFF * mass * lengths * self.fastest + 1e-300
             names = new.bodies["mol"]
-            in_line = np.zeros(len(names), dtype=bool)
+            in_line = self.are_in_line(new)
             if was_pushed:
                 allowed += 2 * self.eps / new.h
             # What comes to rest in the step keeps none.
             stopped = self.stopped_bodies(new, listed, np.abs(new.body_v - kept_v), allowed)
             kept_v[stopped], kept_l[stopped] = new.body_v[stopped], new.body_l[stopped]
-            for row, mine, arm in self.members(new):
-                in_line[row] = self.is_in_line(new.molecule[mine[0]], arm)
-                if not (was_pushed or in_line[row]) or (in_line[row] and self.lines_unknown):
-                    continue
-                left = self.spin(new, mine, arm, new.body_l[row] - kept_l[row])
-                speeds = np.linalg.norm(cross(left, arm), axis=1)
-                # No force on spheres in a line takes away what lies along it, until the line has
-                # turned: what is kept of such bodies is followed from the start.
-                slack = 2 * self.eps / new.h if in_line[row] else 0.0
-                self.close(
-                    "turning push kept", speeds, 0 * speeds, allowed[row] + slack, new.id[mine]
-                )
+            told = (in_line | was_pushed) & ~(in_line & self.lines_unknown)
+            left = self.spin(new, new.body_l - kept_l)
+            told_of = told[members.body]
+            body = members.body[told_of]
+            speeds = np.linalg.norm(cross(left[body], arm[told_of]), axis=1)
+            # No force on spheres in a line takes away what lies along it, until the line has
+            # turned: what is kept of such bodies is followed from the start.
+            slack = np.where(in_line, 2 * self.eps / new.h, 0.0)
+            ids = new.id[mine[told_of]]
+            self.close("turning push kept", speeds, 0 * speeds, (allowed + slack)[body], ids)
             if not was_pushed:
                 free = ~in_line
                 self.close(
@@ -1155,15 +1235,13 @@ class _Part:
         accelerate = self.to_v / frame.mass[:, None]
         velocity = frame.v + 0.5 * frame.h * accelerate * frame.force
         asked = np.zeros(len(frame.x), dtype=bool)
-        for row, mine, _ in self.members(frame):
-            velocity[mine] = frame.body_v[row]
-            asked[mine] = (off[row] > allowed[row]).any()
+        members = self.members(frame)
+        mine, body = members.sphere, members.body
+        velocity[mine] = frame.body_v[body]
+        asked[mine] = (off > allowed[:, None]).any(axis=1)[body]
         clusters = self.clusters(frame, listed)
         found = self.stopped(clusters, asked, velocity, frame.momentum_size)
-        stopped = np.zeros(len(off), dtype=bool)
-        for row, mine, _ in self.members(frame):
-            stopped[row] = found[mine[0]]
-        return stopped
+        return np.asarray(found[members.first])
 
     def resting(self, frame: _Frame) -> Array:
         """(bodies,) Whether a body has no velocity in the step, beside the forces on all."""
@@ -1171,24 +1249,28 @@ class _Part:
         half = 0.5 * frame.h * self.to_v
         mass, v = frame.bodies["mass"], frame.bodies["vx vy vz"]
         size = np.linalg.norm(v, axis=1) + half * self.to_strength(frame, frame.before) / mass
-        after = v.copy()
-        for row, mine, _ in self.members(frame):
-            after[row] += half * frame.force[mine].sum(axis=0) / mass[row]
+        members = self.members(frame)
+        after = v + half * members.sums(frame.force[members.sphere]) / mass[:, None]
         # Sums of the forces on some spheres, and velocities that came from those of others.
         slack = 10 * ROUND_OFF * (10 * size + self.fastest) + 0.01 * ROUND_OFF * size.max(initial=0)
         return np.asarray(np.linalg.norm(after, axis=1) <= slack)
 
-    def is_in_line(self, molecule: float, arm: Array) -> bool:
-        """Whether a body's spheres lie on a line, about which no force on them turns it."""
-        if molecule not in self.in_line:
-            rank = np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
-            self.in_line[molecule] = bool(rank < REAL_TURNING)
-        return self.in_line[molecule]
+    def are_in_line(self, frame: _Frame) -> Array:
+        """(bodies,) Whether its spheres lie on a line, about which no force on them turns it."""
+        assert frame.bodies is not None
+        names = frame.bodies["mol"].tolist()
+        for row, name in enumerate(names):
+            if name not in self.in_line:
+                _, arm = self.members(frame)[row]
+                rank = np.linalg.matrix_rank(arm, tol=1e-6 * self.facts["smallest"])
+                self.in_line[name] = bool(rank < REAL_TURNING)
+        return np.array([self.in_line[name] for name in names], dtype=bool)
 
     def to_strength(self, frame: _Frame, forces: Array) -> Array:
         """Sum of the sizes of the forces on each body's spheres."""
         size = np.linalg.norm(forces, axis=1) + np.linalg.norm(frame.force, axis=1)
-        return np.array([size[mine].sum() for _, mine, _ in self.members(frame)])
+        members = self.members(frame)
+        return members.sums(size[members.sphere])
 
     def velocities(self, frame: _Frame) -> Array:
         """Of the spheres during the step, from momentum alone; those of bodies by their turning."""
@@ -1197,9 +1279,9 @@ class _Part:
         velocity[fixed] = frame.v[fixed]
         if frame.bodies is None:
             return velocity
-        for row, mine, arm in self.members(frame):
-            spin = self.spin(frame, mine, arm, frame.body_l[row])
-            velocity[mine] = frame.body_v[row] + cross(spin, arm)
+        members = self.members(frame)
+        spin = self.spin(frame, frame.body_l)[members.body]
+        velocity[members.sphere] = frame.body_v[members.body] + cross(spin, members.arm)
         return velocity
 
     def complementary(
@@ -1217,8 +1299,7 @@ class _Part:
         relative = velocity[i] - np.where(pair[:, None], velocity[j], 0.0)
         asked = np.where(listed["gap"] < -REGULAR * self.eps, 0.0, listed["gap"])
         end = asked + new.h * (n * relative).sum(axis=1)
-        for row in np.flatnonzero(~pair).tolist():
-            end[row] -= self.wall_motion(new, listed, row)
+        end -= self.wall_motion(new, listed)
         ends = np.full(len(i), self.eps)
         if self.facts["warn"]:
             ends = np.maximum(ends, new.thermo["f_contact[3]"])
@@ -1264,12 +1345,12 @@ class _Part:
             if listed["pair"][row]:
                 end = float(np.linalg.norm(self.apart(new, i, j)))
                 end -= new.radius[i] + new.radius[j]
+            elif not self.is_flat(wall):
+                # A tangent plane holds, from which the wall curves away.
+                continue
             else:
                 seen = [self.seen_by(s, wall, new.x[i : i + 1], new.time) for s in self.shapes]
                 (view,) = [view for view in seen if view is not None]
-                if not self.is_flat(wall):
-                    # A tangent plane holds, from which the wall curves away.
-                    continue
                 end = float(view.distance[0] - new.radius[i])
             if wall and self.angle(last, i) >= HALF_A_TURN:
                 continue
@@ -1291,40 +1372,53 @@ class _Part:
         the angular velocity of the start, and once in two halves, the second by that of the middle
         of the step (Richardson's method): the faster of both counts.
         """
-        for row, mine, arm in self.members(frame):
-            if sphere in mine:
-                spin = self.spin(frame, mine, arm, frame.body_l[row])
-                # A quaternion is turned by a straight step and made one long again.
-                half = Rotation.from_quat([*(frame.h * spin / 4), 1.0])
-                middle = self.spin(frame, mine, half.apply(arm), frame.body_l[row])
-                fastest = max(np.linalg.norm(spin), np.linalg.norm(middle))
-                return float(frame.h * fastest)
-        return 0.0
+        if frame.bodies is None or not frame.molecule[sphere] > 0:
+            return 0.0
+        members = self.members(frame)
+        row = int(members.body[members.sphere == sphere][0])
+        momentum = frame.body_l[row]
+        spin = self.spin(frame, frame.body_l)[row]
+        # A quaternion is turned by a straight step and made one long again.
+        half = Rotation.from_quat([*(frame.h * spin / 4), 1.0])
+        turned = replace(members, arm=half.apply(members.arm))
+        mass, radius = frame.mass[members.sphere], frame.radius[members.sphere]
+        solid = self.facts["inertia"] == "solid"
+        middle = inverse_inertia(mass, radius, turned, solid=solid)[row] @ momentum
+        return float(frame.h * max(np.linalg.norm(spin), np.linalg.norm(middle)))
 
     def is_flat(self, number: int) -> bool:
         """Whether a wall is plane, and not the side of an obstacle, which has edges."""
-        seen = [(s, self.seen_by(s, number, np.zeros((1, 3)), 0.0)) for s in self.shapes]
-        return any(s["inside"] and view and not view.curved for s, view in seen)
+        if number not in self.flat:
+            seen = [(s, self.seen_by(s, number, np.zeros((1, 3)), 0.0)) for s in self.shapes]
+            self.flat[number] = any(s["inside"] and v and not v.curved for s, v in seen)
+        return self.flat[number]
 
     def is_exact(self, number: int) -> bool:
         """Whether a wall is plane, and keeps its direction."""
-        for shape in self.shapes:
-            if shape["inside"] and not turns(shape):
-                for view in views(shape, np.zeros((1, 3)), 0.0):
-                    if view.number == number:
-                        return not view.curved
-        return False
+        if number not in self.exact:
+            seen = [
+                view
+                for shape in self.shapes
+                if shape["inside"] and not turns(shape)
+                for view in views(shape, np.zeros((1, 3)), 0.0)
+                if view.number == number
+            ]
+            self.exact[number] = bool(seen) and not seen[0].curved
+        return self.exact[number]
 
-    def wall_motion(self, new: _Frame, listed: dict[str, Array], row: int) -> float:
-        """How far a wall comes nearer in the step, seen from where the sphere is now."""
-        k, number = listed["i"][row], listed["wall"][row]
-        for shape in filter(moves, self.shapes):
-            now = self.seen_by(shape, number, new.x[k : k + 1], new.time)
-            if now is not None:
-                later = self.seen_by(shape, number, new.x[k : k + 1], new.time + new.h)
-                assert later is not None
-                return float(now.distance[0] - later.distance[0])
-        return 0.0
+    def wall_motion(self, new: _Frame, listed: dict[str, Array]) -> Array:
+        """(rows,) How far walls come nearer in the step, seen from where the spheres are now."""
+        nearer = np.zeros(len(listed["i"]))
+        for row in np.flatnonzero(~listed["pair"]).tolist() if self.moves.any() else []:
+            k, number = listed["i"][row], listed["wall"][row]
+            for shape in filter(moves, self.shapes):
+                now = self.seen_by(shape, number, new.x[k : k + 1], new.time)
+                if now is not None:
+                    later = self.seen_by(shape, number, new.x[k : k + 1], new.time + new.h)
+                    assert later is not None
+                    nearer[row] = now.distance[0] - later.distance[0]
+                    break
+        return nearer
 
     def energy(
         self,
@@ -1359,33 +1453,33 @@ class _Part:
         # By so much a turn that the step would make without contacts takes a sphere off its line.
         curved = np.zeros(len(new.mass))
         if new.bodies is not None:
-            for row, mine, arm in self.members(new):
-                v, momentum = new.body_v[row], new.body_l[row]
-                mass = new.bodies["mass"][row]
-                impulses = added[mine]
-                contacts = kick * self.to_v * listed["total"][mine]
-                besides = np.linalg.norm((impulses - contacts).sum(axis=0))
-                if besides <= ROUND_OFF * np.linalg.norm(impulses, axis=1).sum():
-                    # Where it is not stopped the rest is a moment that LAMMPS's integrator needs.
-                    impulses = contacts
-                v_before = v - impulses.sum(axis=0) / mass
-                l_before = momentum - cross(arm, impulses).sum(axis=0)
-                spin = self.spin(new, mine, arm, momentum)
-                spin_before = self.spin(new, mine, arm, l_before)
-                before[mine] = v_before + cross(spin_before, arm)
-                angle = float(new.h * np.linalg.norm(spin_before))
-                curved[mine] = np.linalg.norm(arm, axis=1) * min(0.5 * angle**2, 2.0)
-                gained[mine] = 0.0
-                gained[mine[0]] = 0.5 * mass * (v @ v - v_before @ v_before) + 0.5 * (
-                    momentum @ spin - l_before @ spin_before
-                )
-                size[mine[0]] += abs(momentum @ spin) + abs(l_before @ spin_before)
+            members = self.members(new)
+            mine, body, arm = members.sphere, members.body, members.arm
+            v, momentum, mass = new.body_v, new.body_l, new.bodies["mass"]
+            impulses = added[mine]
+            contacts = kick * self.to_v * listed["total"][mine]
+            besides = np.linalg.norm(members.sums(impulses - contacts), axis=1)
+            all_of_them = members.sums(np.linalg.norm(impulses, axis=1))
+            # Where it is not stopped the rest is a moment that LAMMPS's integrator needs.
+            none_besides = (besides <= ROUND_OFF * all_of_them)[body, None]
+            impulses = np.where(none_besides, contacts, impulses)
+            v_before = v - members.sums(impulses) / mass[:, None]
+            l_before = momentum - members.sums(cross(arm, impulses))
+            spin, spin_before = self.spin(new, momentum), self.spin(new, l_before)
+            before[mine] = v_before[body] + cross(spin_before[body], arm)
+            angle = new.h * np.linalg.norm(spin_before, axis=1)
+            bend = np.minimum(0.5 * angle**2, 2.0)
+            curved[mine] = np.linalg.norm(arm, axis=1) * bend[body]
+            turning = (momentum * spin).sum(axis=1), (l_before * spin_before).sum(axis=1)
+            gained[mine] = 0.0
+            gained[members.first] = 0.5 * (
+                mass * ((v**2).sum(axis=1) - (v_before**2).sum(axis=1)) + turning[0] - turning[1]
+            )
+            size[members.first] += np.abs(turning[0]) + np.abs(turning[1])
         i, j, pair, n = listed["i"], listed["j"], listed["pair"], listed["n"]
         impulse = listed["force"] * kick * self.to_v
         other = np.where(pair, j, i)
-        motion = np.zeros(len(i))
-        for row in np.flatnonzero(~pair).tolist():
-            motion[row] = self.wall_motion(new, listed, row)
+        motion = self.wall_motion(new, listed)
         u = (n * (velocity[i] - np.where(pair[:, None], velocity[j], 0.0))).sum(axis=1)
         u_before = (n * (before[i] - np.where(pair[:, None], before[j], 0.0))).sum(axis=1)
         u, u_before = u - motion / new.h, u_before - motion / new.h
@@ -1466,10 +1560,8 @@ class _Part:
         closed[pair] = of.end[pair] - end[pair]
         rows = np.flatnonzero(acts & ~pair)
         seen = self.seen_from(new.x[i[rows]], listed["wall"][rows], new.time)
-        for row, found in zip(rows.tolist(), seen, strict=True):
-            if found:
-                nearest = min(view.distance for view in found)
-                closed[row] = of.end[row] - nearest + new.radius[i[row]]
+        found = seen.count > 0
+        closed[rows[found]] = (of.end[rows] - seen.distance + new.radius[i[rows]])[found]
         closed = np.where(acts, np.maximum(of.curved, closed), of.curved)
         turning = np.abs(of.impulse) * closed / last.h
         cluster = of.clusters.of_sphere[of.sphere]
