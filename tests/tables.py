@@ -3,7 +3,8 @@
 `python -m tests.tables NAME` prints one of them. `contacts` shows the coordination number of
 spheres against time step, tolerance and solver, `loose` the same at a loose tolerance against
 solver and accuracy, `accuracy` the time of a run and the error of each grain against the accuracy,
-`forces` the error of single contact forces against tolerance and accuracy,
+`forces` the error of single contact forces against tolerance and accuracy, `shaken` packings
+against those of the phase that shakes, `settled` the height of beds against the time step,
 `near` the coordination number of dimers that are almost spheres against the tolerance, `network`
 the floppy modes and states of self-stress of measured contacts, `start` a regular start of dimers
 beside a random one, `inertia` point masses beside solid spheres, `turning` the look at the end of
@@ -28,7 +29,12 @@ import numpy as np
 from PIL import Image
 
 from lammps_inelastic import core
-from lammps_inelastic.analysis import ParticleDump, draw_packing, read_run_log
+from lammps_inelastic.analysis import (
+    ParticleDump,
+    draw_packing,
+    read_particle_frame,
+    read_run_log,
+)
 from lammps_inelastic.analysis.pictures import few_colours
 from lammps_inelastic.analysis.run_log import Run as RunOfLog
 from lammps_inelastic.workflow.tradeoff.states import records_in
@@ -206,6 +212,56 @@ def accuracy(seeds: int) -> Iterator[str]:
             f"| {value:g} | {iterations:.0f} | {seconds:.1f} | {error:.4f} | {nearly:.2f} | "
             f"{row([packing for _, packing in packings])} |"
         )
+
+
+# Accuracy and tolerance [radii] while spheres are shaken: those of the decks, and of later phases.
+SHAKEN_WITH = ((0.3, 0.005), (0.03, 0.0005))
+
+
+def shaken(seeds: int) -> Iterator[str]:
+    yield "| accuracy_agitated | tolerance_agitated | packing fraction % | coordination number |"
+    yield "|---|---|---|---|"
+    for value, tolerance in SHAKEN_WITH:
+        variables = {"accuracy_agitated": value, "tolerance_agitated": tolerance}
+        yield f"| {value:g} | {tolerance:g} | {row(pour(variables, seeds))} |"
+
+
+# Longest time steps of hard contacts, and how far the neighbour list reaches then [diameters]. The
+# first is the one with which the others are compared.
+SETTLED_WITH = ((0.0025, 0.4), (0.005, 0.5), (0.01, 0.8), (0.02, 1.2))
+# Of soft contacts: overlaps at rest [radii].
+SETTLED_SOFTLY = (0.0005, 0.005)
+PHASES = ("agitated", "settling", "resting", "tightening", "measuring")
+
+
+def settled(seeds: int) -> Iterator[str]:
+    """Print how high spheres lie that fell and settled by themselves, against the time step."""
+    ways: dict[str, dict[str, object]] = {
+        f"hard, h = {h:g}": {"dt": h, "reach": reach} for h, reach in SETTLED_WITH
+    }
+    ways |= {
+        f"soft, {tolerance:g} r": {"contacts": "soft", "tolerance": tolerance}
+        for tolerance in SETTLED_SOFTLY
+    }
+    unmoved = {f"steps_{phase}": 0 for phase in PHASES}
+    heights: dict[str, list[float]] = {way: [] for way in ways}
+    for seed in range(1, seeds + 1):
+        with tempfile.TemporaryDirectory() as name:
+            start = Path(name) / "start"
+            run_deck(start, shipped_deck("spheres"), unmoved | {"seed": seed})
+            packing = {"packing": start / "packing.restart", "time_settling": 3}
+            for number, (way, variables) in enumerate(ways.items()):
+                folder = Path(name) / str(number)
+                run_deck(folder, shipped_deck("settling"), packing | variables)
+                spheres = read_particle_frame(folder / "particles.lammpsdump").spheres
+                heights[way].append(float(spheres.positions[:, 1].mean()) / (2 * RADIUS))
+    yield "| contacts | mean height / d | more than the first, with the same starts |"
+    yield "|---|---|---|"
+    first = next(iter(heights.values()))
+    for way, found in heights.items():
+        more = [one - other for one, other in zip(found, first, strict=True)]
+        difference = spread(more, 4) if found is not first else ""
+        yield f"| {way} | {spread(found, 4)} | {difference} |"
 
 
 # Of forces: tolerances of the count [radii], with the deck's accuracy there; and accuracies up to
@@ -534,6 +590,8 @@ TABLES = {
     "loose": loose,
     "accuracy": accuracy,
     "forces": forces,
+    "shaken": shaken,
+    "settled": settled,
     "near": near,
     "network": network,
     "start": start,
