@@ -19,6 +19,7 @@ Status SearchChain::run(Solve &solve, bool single_precision, const Refined *refi
       if (search->is_single() && !single_precision) break;
       end = refined ? search->go_on(solve, *refined) : search->run(solve);
       refined = nullptr;
+      if (end == End::SOLVED) solved_by_ = search.get();
       if (end == End::ROUND_OFF && search->is_single()) {
         single_precision = false;
         end = End::GO_ON;
@@ -53,7 +54,7 @@ SolverResult SearchChain::go_on(ContactProblem &problem, const Refined &refined,
                                 const SolverLimits &limits, Host &host)
 {
   if (refined.anew || !problem.bodies.empty() || host.has_ghosts() ||
-      !searches_.front()->can_go_on())
+      solved_by_ != searches_.front().get() || !solved_by_->can_go_on())
     return solve(problem, limits, host);
   judge_refined(problem, refined, limits, guess_);
   return search(problem, limits, &refined, host);
@@ -68,6 +69,7 @@ SolverResult SearchChain::search(ContactProblem &problem, const SolverLimits &li
   Solve solve(problem, limits, {gap_operator_, targets_, gap_, diagonal_, conjugate_gradients_},
               guess_, host);
   SolverResult &result = solve.result;
+  solved_by_ = nullptr;
   // What was refined is not solved any more, and single precision has served until now: to find the
   // targets of all constraints again would tell no more than that.
   const double unsolved = refined ? UNSOLVED_IN_SINGLE : solve.set_targets();

@@ -21,9 +21,10 @@ class SearchChain final : public Solver {
   explicit SearchChain(Searches searches) : searches_(std::move(searches)) {}
 
   SolverResult solve(ContactProblem &problem, const SolverLimits &limits, Host &host) override;
-  // Where the first search has solved the problem it goes on with what it has packed. The solve
-  // begins anew with ghosts, since what ranks share may have changed, and with bodies, whose rounds
-  // follow their turns and are more without that.
+  // Where the first search has solved the problem it goes on with what it has packed; where the
+  // first guess or another search has, that is not of this problem. The solve begins anew with
+  // ghosts, too, since what ranks share may have changed, and with bodies, whose rounds follow
+  // their turns and are more without that.
   SolverResult go_on(ContactProblem &problem, const Refined &refined, const SolverLimits &limits,
                      Host &host) override;
 
@@ -35,6 +36,8 @@ class SearchChain final : public Solver {
   Searches searches_;
   ConjugateGradients conjugate_gradients_;
   Guess guess_;
+  // The search that has solved the last problem. What the others hold may be of an earlier one.
+  const Search *solved_by_ = nullptr;
 };
 
 }    // namespace inelastic

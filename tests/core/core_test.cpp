@@ -953,6 +953,42 @@ void test_rounds_go_on()
   CHECK_ALL_NEAR(velocity[0], velocity[1], 100.0 * TOLERANCE / TIMESTEP);
 }
 
+// Sweeps have solved an earlier problem. The first round of this one is solved without them, by the
+// first guess where nothing is known, or in double precision where the first guess is far off.
+// What is added then is not put to what they hold, which is of the earlier problem.
+void test_rounds_begin_with_their_own_problem(bool far_off)
+{
+  SerialHost host;
+  const ContactProblem all = make_crystal(4);
+  ContactProblem beginning = all;
+  beginning.contacts.clear();
+  // [momentum] 1e3 of what the crystal has; 1e13 tolerances as a length.
+  if (far_off) {
+    add_contact(beginning, 0, WALL, UP, 0.0);
+    beginning.contacts.impulse[0] = 1.0e4;
+  }
+  std::vector<double> velocity[2];
+  long iterations[2];
+  for (const bool used : {false, true}) {
+    const auto solver = make_solver("sweeps");
+    if (used) {
+      ContactProblem earlier = make_column(6, true);
+      const SolverResult solved = solver->solve(earlier, {TOLERANCE, 1000}, host);
+      CHECK(solved.status == Status::CONVERGED);
+      CHECK_ABOVE(solved.iterations, 0L);
+    }
+    ContactProblem growing = beginning;
+    HiddenContacts source(all);
+    const ProjectionResult result =
+        project(growing, source, *solver, {TOLERANCE, 100000}, 100, host, velocity[used]);
+    CHECK(result.status == Status::CONVERGED);
+    CHECK_ABOVE(result.rounds, 2);
+    iterations[used] = result.iterations;
+  }
+  CHECK_EQUAL(iterations[1], iterations[0]);
+  CHECK(velocity[1] == velocity[0]);
+}
+
 void test_round_limit()
 {
   SerialHost host;
@@ -1759,6 +1795,8 @@ int main()
   test_contacts_are_found_in_rounds();
   test_same_answer_as_with_all_contacts();
   test_rounds_go_on();
+  test_rounds_begin_with_their_own_problem(false);
+  test_rounds_begin_with_their_own_problem(true);
   test_round_limit();
   test_iterations_of_all_rounds_are_limited();
   test_concave_wall_is_linearised_again();
