@@ -111,9 +111,13 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
   law_adds_ = false;
   const double given_back = fastest_given_back();
   if (given_back == 0.0 && !parts_) return false;
-  // Overlaps are known to the round-off of a length alone.
+  // Overlaps are known to the round-off of a length alone, and velocities to what the accuracy
+  // leaves of one that opens EPS in a regular step: less than that, of an impulse of the last step
+  // that this one has no use for, is no sign of a network without room.
   const double least_known = std::numeric_limits<double>::epsilon() * step_.largest_radius;
-  const double speed = TIMES_AS_FAST * std::max(given_back, least_known / step_.problem.timestep);
+  const double least_told = step_.eps(step_.settings.accuracy) / step_.regular_timestep;
+  const double speed = TIMES_AS_FAST *
+      std::max({given_back, least_known / step_.problem.timestep, least_told});
   add_up(target);
   double law_adds = 0.0;
   for (std::size_t k = 0; k < clusters_.size(); ++k) {

@@ -4,7 +4,7 @@
 // no bound: such a step is to be solved again, with overlaps as deep as they are.
 //
 // For a cluster of mass M (inelastic_clusters.h), of whose overlaps none is given back faster than
-// b [length / time], a step may add
+// b [length / time], at least the accuracy's part of EPS in a regular step, a step may add
 //
 //   1/2 M (10 b)^2 + sum over contacts of |lambda| (t + s) / h
 //

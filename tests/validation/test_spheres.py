@@ -145,6 +145,7 @@ def test_overlap_of_every_step(name: str, tmp_path: Path) -> None:
     values: dict[str, object] = {
         "dt": timestep,
         "dump_every": 1,
+        "tolerance_agitated": 0.0005,
         "steps_agitated": 250,
         "steps_settling": 100,
         "steps_resting": 0,
