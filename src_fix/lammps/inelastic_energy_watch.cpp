@@ -116,8 +116,8 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
   // that this one has no use for, is no sign of a network without room.
   const double least_known = std::numeric_limits<double>::epsilon() * step_.largest_radius;
   const double least_told = step_.eps(step_.settings.accuracy) / step_.regular_timestep;
-  const double speed = TIMES_AS_FAST *
-      std::max({given_back, least_known / step_.problem.timestep, least_told});
+  const double speed =
+      TIMES_AS_FAST * std::max({given_back, least_known / step_.problem.timestep, least_told});
   add_up(target);
   double law_adds = 0.0;
   for (std::size_t k = 0; k < clusters_.size(); ++k) {
