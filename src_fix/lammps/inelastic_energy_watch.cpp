@@ -111,13 +111,13 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
   law_adds_ = false;
   const double given_back = fastest_given_back();
   if (given_back == 0.0 && !parts_) return false;
-  // Overlaps are known to the round-off of a length alone, and velocities to what the accuracy
-  // leaves of one that opens EPS in a regular step: less than that, of an impulse of the last step
-  // that this one has no use for, is no sign of a network without room.
+  // Overlaps are known to the round-off of a length alone.
   const double least_known = std::numeric_limits<double>::epsilon() * step_.largest_radius;
-  const double least_told = step_.eps(step_.settings.accuracy) / step_.regular_timestep;
-  const double speed =
-      TIMES_AS_FAST * std::max({given_back, least_known / step_.problem.timestep, least_told});
+  const double speed = TIMES_AS_FAST * std::max(given_back, least_known / step_.problem.timestep);
+  // What the accuracy leaves of a velocity that opens EPS in a regular step, of an impulse of the
+  // last step that this one has no use for, say, is no sign of a network without room.
+  const double least_told =
+      TIMES_AS_FAST * step_.eps(step_.settings.accuracy) / step_.regular_timestep;
   add_up(target);
   double law_adds = 0.0;
   for (std::size_t k = 0; k < clusters_.size(); ++k) {
@@ -127,7 +127,9 @@ bool EnergyWatch::adds_too_much(const std::vector<double> &target)
     // What is added where surfaces part is told apart (steps_of_law).
     if (does[PARTS] == 0.0) added_ = std::max(added_, added);
     const double residuals =
-        std::min(s[TARGETS], step_.settings.accuracy * does[APPROACH] * s[IMPULSES]);
+        std::min(s[TARGETS],
+                 std::max(step_.settings.accuracy * does[APPROACH] * s[IMPULSES],
+                          0.5 * s[MASS] * least_told * least_told));
     const double least = 0.5 * s[MASS] * speed * speed + residuals + ROUND_OFF * s[SIZE];
     const double most = least + s[TURNS];
     // Where surfaces part others may gain by that, whatever is given back.

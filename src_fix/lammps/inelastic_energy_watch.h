@@ -4,15 +4,16 @@
 // no bound: such a step is to be solved again, with overlaps as deep as they are.
 //
 // For a cluster of mass M (inelastic_clusters.h), of whose overlaps none is given back faster than
-// b [length / time], at least the accuracy's part of EPS in a regular step, a step may add
+// b [length / time], a step may add
 //
 //   1/2 M (10 b)^2 + sum over contacts of |lambda| (t + s) / h
 //
 // t is the target of the contact [length] (inelastic_contact_targets.h), s the length by which its
 // gap closes because bodies turn, or walls curve, in the step: velocities open it by as much more.
 // Targets grow with the velocities that they are for, and would allow what throws a grain out of a
-// wedge: where that is less, a cluster has the accuracy's part of the fastest approach of two of
-// its surfaces without contacts in place of t / h.
+// wedge: where that is less, a cluster has A, the accuracy, times the fastest approach of two of
+// its surfaces without contacts in place of t / h, but no less in sum than 1/2 M (10 A EPS / h)^2,
+// h of the regular step: residuals as slow as that are no sign of a network without room.
 
 #ifndef INELASTIC_ENERGY_WATCH_H
 #define INELASTIC_ENERGY_WATCH_H
