@@ -3,14 +3,18 @@
 #include "inelastic_constraints.h"
 #include "inelastic_ghost_exchange.h"
 #include "inelastic_mover.h"
+#include "inelastic_random.h"
 #include "inelastic_step.h"
 
 #include "atom.h"
+#include "domain.h"
 #include "update.h"
 
 #include "fmt/format.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <vector>
 
 using namespace LAMMPS_NS;
 using namespace Inelastic_NS;
@@ -22,11 +26,12 @@ namespace {
 // hundredth less than asked for. (With a tenth a bed whose spheres grow by a tenth needs five times
 // as many steps.)
 constexpr double GIVES_WAY = 0.01;
-// Overlaps open where they do so by at least this part of what is asked for. In dense starts and in
-// beds that swell it is never below 0.2, in jammed packings at most 0.003.
+// Overlaps open where they do so by at least this part of what is asked for. In dense starts it is
+// never below 0.2, in beds that swell mostly above 0.05, in jammed packings at most 0.003; in
+// between are layers that are pressed together in their plane.
 constexpr double OPENS = 0.02;
 // They are not expected to open any more after so many steps in which they did not.
-constexpr int MOST_IN_VAIN = 3;
+constexpr int MOST_IN_VAIN = 6;
 
 // Both projections of a step as one result.
 void add(inelastic::ProjectionResult &result, const inelastic::ProjectionResult &pushed)
@@ -89,8 +94,9 @@ void PushApart::ask_for_all(bool gives_way)
 }
 
 // Counts bad overlaps, and looks how far they open and what the push leaves of them. Returns
-// whether none becomes deeper than the deepest by more than a push may open it: walls that close
-// would drive spheres into one another where these give way. Collective.
+// whether they open all in all, or at least none becomes deeper than the deepest by more than a
+// push may open it: walls that close would drive spheres into one another where these give way.
+// Collective.
 bool PushApart::look_at_opening(bool solved)
 {
   const inelastic::ContactSet &contacts = step_.problem.contacts;
@@ -136,7 +142,42 @@ bool PushApart::look_at_opening(bool solved)
   else if (looked_at_ != update->ntimestep)
     ++in_vain_;
   looked_at_ = update->ntimestep;
-  return maxima[0] == 0.0;
+  return opens || maxima[0] == 0.0;
+}
+
+// Adds to the predicted velocities a random motion of what overlaps badly. Spheres that are pressed
+// together in a plane, as a layer on a floor, do not open by any small push, though beside the
+// plane there is room: this brings them out of it. Where there is no room it changes nothing.
+// Collective.
+void PushApart::stir()
+{
+  constexpr std::uint32_t SEED = 1;
+  inelastic::ContactProblem &problem = step_.problem;
+  const inelastic::ContactSet &contacts = problem.contacts;
+  const auto particles = static_cast<std::size_t>(problem.particles);
+  std::vector<double> stirred(particles, 0.0);    // -1 for those
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const Contact &contact = step_.contact_of(c);
+    if (!constraints_.overlaps().is_bad(contact.gap_now)) continue;
+    stirred[contacts.first[c]] = -1.0;
+    if (!contact.is_with_wall()) stirred[contacts.second[c]] = -1.0;
+  }
+  ranks_.least_over_ghosts(stirred.data(), 1);
+  // Velocities of free spheres, impulses on those in bodies.
+  std::vector<double> by(3 * particles, 0.0);
+  for (std::size_t i = 0; i < particles; ++i) {
+    const bool free = !step_.is_member(static_cast<int>(i));
+    const double inverse_mass = free ? problem.inverse_mass[i]
+                                     : problem.bodies.inverse_mass[problem.bodies.body[i]];
+    if (stirred[i] == 0.0 || inverse_mass == 0.0) continue;
+    const double speed = 2.0 * PUSH_LIMIT * atom->radius[i] / step_.regular_timestep;
+    const auto uniform = inelastic::uniform_vector(SEED, static_cast<std::uint64_t>(atom->tag[i]),
+                                                   static_cast<std::uint64_t>(update->ntimestep));
+    for (int d = 0; d < domain->dimension; ++d)
+      by[3 * i + d] = uniform[d] * (free ? speed : speed / inverse_mass);
+  }
+  if (!problem.bodies.empty()) problem.bodies.velocity_change(by.data());
+  for (std::size_t k = 0; k < by.size(); ++k) problem.predicted_velocity[k] += by[k];
 }
 
 void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
@@ -144,13 +185,17 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   inelastic::ContactProblem &problem = step_.problem;
   const inelastic::ContactSet contacts = problem.contacts;
   const std::size_t number_of_contacts = step_.contacts.size();
-  problem.predicted_velocity = step_.velocity;
+  const std::vector<double> unpushed = step_.velocity;
+  problem.predicted_velocity = unpushed;
   step_.phase = Phase::PUSH;
   step_.relinearisations = 0;
   if (movers_.any_turns()) constraints_.entangled().find();
   const inelastic::ContactSet with_locked = problem.contacts;
   // What no longer opens while it gives way may be the rest, which opens at once: so it is tried.
-  if (in_vain_ > 0) gives_way_ = false;
+  if (in_vain_ > 0) {
+    gives_way_ = false;
+    stir();
+  }
   // Iterations of the first trial. Thousands of spheres that have room for what is asked take far
   // fewer.
   constexpr long MOST = 10000;
@@ -177,5 +222,6 @@ void PushApart::run(inelastic::ProjectionResult &result, const Project &project)
   step_.rows.resize(contacts.size());
   step_.contacts.resize(number_of_contacts);
   if (!step_.law_states.empty()) step_.law_states.resize(number_of_contacts);
+  problem.predicted_velocity = unpushed;
   movers_.note_push(problem, step_.velocity);
 }

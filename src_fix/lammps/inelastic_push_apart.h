@@ -55,6 +55,7 @@ class PushApart : protected Pointers {
   void begin_trial(const inelastic::ContactSet &contacts);
   void ask_for_all(bool gives_way);
   bool look_at_opening(bool solved);
+  void stir();
 
   Step &step_;
   Constraints &constraints_;

@@ -288,3 +288,39 @@ def test_a_bed_whose_spheres_grow_swells(
     assert depth[0] >= 0.9 * 2 * radius * (growth - 1)
     assert depth[-1] <= 5e-4 * radius * SLACK
     assert not any(" are left " in line for line in result.warnings)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_flat_layer_without_room_in_its_plane_buckles(
+    ranks: int, tmp_path: Path, lmp: Runner
+) -> None:
+    """Spheres on a floor that fill it overlap, and have room above: all overlaps open.
+
+    No small push opens them: the normals of their overlaps all lie in the plane.
+    """
+    across, number = 2 * RADIUS, 8
+    width = across * number
+    rows = np.arange(number)
+    points = [[(x + 0.5) * across, RADIUS, (z + 0.5) * across] for x in rows for z in rows]
+    deck = scene(
+        points,
+        RADIUS,
+        tmp_path,
+        tolerance=EPS,
+        timestep=0.01,
+        skin=0.1,
+        box=((0, width), (0, 1), (0, width)),
+        boundary="p f p",
+        setup=f"processors {ranks} 1 1\nregion floor plane 0 0 0 0 1 0\n",
+        options="region floor shorten yes",
+        gravity=False,
+    ).replace(f"pair_style zero {across:.17g}", "pair_style zero 0.12")
+    grow = f"set group all diameter {1.03 * across}\n"
+    result = lmp(deck + "run 5\n" + grow + DUMP_PARTICLES + "run 100\n", ranks=ranks)
+    depth = result.runs[1]["f_contact[4]"]
+    # Each overlaps its four neighbours by the growth, or most of it (after the first step).
+    assert depth[0] >= 0.02 * across
+    assert depth[-1] <= EPS * SLACK
+    assert not any(" are left " in line for line in result.warnings)
+    # No push is kept as momentum: what is left are overlaps with four neighbours of at most 2 EPS.
+    assert np.abs(read_dump(tmp_path / "particles.dump")[-1].velocities).max() <= 4 * 2 * EPS / 0.01
